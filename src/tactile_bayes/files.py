@@ -1,0 +1,62 @@
+"""Files written whole: a reader sees the old file or the new one, never half of either."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+__all__ = ["write_atomically"]
+
+
+@contextmanager
+def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary path to write to, and put it in the place of `path` when the block has succeeded.
+
+    The temporary file lies in the same directory and has the same suffix. At the end of the block it is brought
+    to the disk, renamed, and the directory is brought to the disk; if the block raises, it is removed and what
+    was at `path` stays as it was.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to be written. A symbolic link is followed.
+
+    Yields
+    ------
+    pathlib.Path
+        Where the block has to write.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the block wrote no file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     target = Path(directory) / "answer.txt"
+    ...     with write_atomically(target) as temporary:
+    ...         _ = temporary.write_text("42")
+    ...     target.read_text()
+    '42'
+    """
+    target = Path(path).resolve()
+    temporary = target.with_name(f".{secrets.token_hex(8)}.tmp{target.suffix}")
+    try:
+        yield temporary
+        with open(temporary, "r+b") as written:
+            os.fsync(written.fileno())
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    if os.name != "nt":  # Windows cannot open a directory, and its rename is journalled anyway
+        directory = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(directory)
+        finally:
+            os.close(directory)

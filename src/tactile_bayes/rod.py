@@ -1,0 +1,94 @@
+"""The rod: its length and stiffness, and with them the conversion between SI and dimensionless units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["Rod"]
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A straight uniform rod.
+
+    Without arguments the rod is dimensionless: lengths are in units of the rod's length L, moments of EI/L,
+    forces of EI/L² (equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945).
+
+    Parameters
+    ----------
+    length : float
+        Length L from the pivot to the tip [m].
+    flexural_rigidity : float
+        Young's modulus times second moment of area, EI [N m²].
+    diameter : float
+        Diameter of a rod of circular cross-section [m]. The rod touches with its surface, half a diameter beside
+        its centreline; 0 (the default) is a rod without thickness.
+
+    Raises
+    ------
+    ParameterError
+        If length or flexural rigidity is not positive and finite, or the diameter is negative.
+
+    Examples
+    --------
+    >>> rod = Rod(length=0.1, flexural_rigidity=1.2e-5)
+    >>> rod.moment_unit, rod.force_unit
+    (0.00012, 0.0012)
+    """
+
+    length: float = 1.0
+    flexural_rigidity: float = 1.0
+    diameter: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ParameterError(f"the rod's {name} is {value!r}: give a positive number [{unit}]")
+        if not (math.isfinite(self.diameter) and self.diameter >= 0):
+            raise ParameterError(f"the rod's diameter is {self.diameter!r}: give zero or a positive number [m]")
+
+    @classmethod
+    def circular(cls, length: float, diameter: float, youngs_modulus: float) -> Rod:
+        """Rod of solid circular cross-section: EI = E π d⁴ / 64.
+
+        Parameters
+        ----------
+        length, diameter : float
+            Length and diameter [m].
+        youngs_modulus : float
+            Young's modulus E [Pa].
+
+        Examples
+        --------
+        >>> wire = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
+        >>> round(wire.flexural_rigidity, 6)
+        0.002428
+        """
+        for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
+            if not (math.isfinite(value) and value > 0):
+                raise ParameterError(f"the rod's {name} is {value!r}: give a positive number")
+        return cls(length, youngs_modulus * math.pi * diameter**4 / 64, diameter)
+
+    @property
+    def is_dimensionless(self) -> bool:
+        """Whether length and flexural rigidity are both the unit."""
+        return self.length == 1.0 and self.flexural_rigidity == 1.0
+
+    @property
+    def length_unit(self) -> float:
+        """What a dimensionless length of one is [m]."""
+        return self.length
+
+    @property
+    def moment_unit(self) -> float:
+        """What a dimensionless moment of one is, EI/L [N m]."""
+        return self.flexural_rigidity / self.length
+
+    @property
+    def force_unit(self) -> float:
+        """What a dimensionless force of one is, EI/L² [N]."""
+        return self.flexural_rigidity / self.length**2
