@@ -1,0 +1,146 @@
+"""What every strictly convex contour offers, and how a family is defined."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.errors import ContourError
+
+__all__ = ["Contour", "Floats", "Graph", "Index", "Locus", "Parameter", "finite", "refuse_unless"]
+
+Floats = NDArray[np.float64]
+Parameter = float | Floats
+Index = NDArray[np.intp]
+
+
+class Locus(NamedTuple):
+    """Points of a contour at given parameters, with the rates at which arc length and slope angle grow there."""
+
+    x: Floats
+    y: Floats
+    slope_angle: Floats
+    arclength_rate: Floats
+    """dσ/dp > 0, σ the arc length."""
+    slope_rate: Floats
+    """dα/dp ≥ 0; zero only where the radius of curvature is infinite."""
+
+
+class Contour(ABC):
+    """Lower boundary of a strictly convex object, traversed from left to right.
+
+    A family is a frozen dataclass of its parameters, which are scalars or arrays that broadcast: one contour object may
+    hold many contours. Its own parameter p may be whatever makes point and slope angle continuous functions of it.
+    A family says how to go from p to the point (`locate`), from slope angle to p (`parameter_of_slope`), how high the
+    contour is at x, and where it ends.
+    """
+
+    @abstractmethod
+    def locate(self, parameter: ArrayLike) -> Locus:
+        """Points at the contour's own parameter."""
+
+    @abstractmethod
+    def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
+        """The contour's own parameter at a slope angle [rad]; NaN where the contour has no such slope."""
+
+    @abstractmethod
+    def height(self, x: ArrayLike) -> Floats:
+        """Height of the contour at x; NaN beyond its ends.
+
+        Parameters
+        ----------
+        x : array_like
+            In the contour's unit of length.
+        """
+
+    @property
+    @abstractmethod
+    def domain(self) -> tuple[Floats, Floats]:
+        """Least and greatest parameter; at a finite end the contour is over."""
+
+    @property
+    def knots(self) -> tuple[Floats, ...]:
+        """Parameters between the ends at which the radius of curvature jumps."""
+        return ()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Common shape of the parameters: () for a single contour."""
+        return np.broadcast(*vars(self).values()).shape
+
+    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
+        """The same contours with every parameter an array of one shape, as `take` wants them."""
+        return type(self)(**{k: np.broadcast_to(np.asarray(v, dtype=float), shape) for k, v in vars(self).items()})
+
+    def take(self, index: Index) -> Self:
+        """The contours at `index`, of a contour whose parameters are all arrays of one shape."""
+        chosen = object.__new__(type(self))  # the parameters have been checked, and this is called in inner loops
+        chosen.__dict__.update({name: value[index] for name, value in vars(self).items()})
+        return chosen
+
+    def point(self, slope_angle: ArrayLike) -> tuple[Floats, Floats]:
+        """Point at which the contour has a slope angle.
+
+        Parameters
+        ----------
+        slope_angle : array_like
+            In (−π/2, π/2) [rad].
+
+        Returns
+        -------
+        x, y : ndarray
+            NaN where the contour has no such slope.
+        """
+        locus = self.locate(self.parameter_of_slope(slope_angle))
+        return locus.x, locus.y
+
+    def radius_of_curvature(self, slope_angle: ArrayLike) -> Floats:
+        """ρ = dσ/dα at a slope angle, in the contour's unit of length; infinite where the curvature vanishes.
+
+        Parameters
+        ----------
+        slope_angle : array_like
+            In (−π/2, π/2) [rad].
+        """
+        locus = self.locate(self.parameter_of_slope(slope_angle))
+        with np.errstate(divide="ignore"):
+            return locus.arclength_rate / locus.slope_rate
+
+
+class Graph(Contour):
+    """A contour that is easiest to give as the graph y = g(x): its parameter is x."""
+
+    @abstractmethod
+    def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """g(x), g'(x) and g''(x)."""
+
+    @property
+    def domain(self) -> tuple[Floats, Floats]:
+        return np.asarray(-np.inf), np.asarray(np.inf)
+
+    def locate(self, parameter: ArrayLike) -> Locus:
+        x = np.asarray(parameter, dtype=float)
+        g, slope, bend = self.derivatives(x)
+        x, g = np.broadcast_arrays(x, g)
+        steepness = 1.0 + slope * slope
+        return Locus(x, g, np.arctan(slope), np.sqrt(steepness), bend / steepness)
+
+    def height(self, x: ArrayLike) -> Floats:
+        return self.derivatives(np.asarray(x, dtype=float))[0]
+
+
+def refuse_unless(holds: Any, family: str, rule: str, **values: Parameter) -> None:
+    """Raise ContourError, naming the first offending values, where a rule on the parameters of a family fails."""
+    if np.all(holds):
+        return
+    fails = ~np.asarray(holds)
+    found = ", ".join(f"{k} = {np.broadcast_to(v, fails.shape)[fails].flat[0]}" for k, v in values.items())
+    raise ContourError(f"{family}: {rule}; found {found}")
+
+
+def finite(*values: Parameter) -> Any:
+    """Where all of some parameters are finite."""
+    return np.logical_and.reduce(np.broadcast_arrays(*(np.isfinite(v) for v in values)))

@@ -1,0 +1,47 @@
+"""The four profiles of Merker et al. 2018, doi 10.1155/2018/1613945, equations 21 to 24."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from tactile_bayes.contours.base import Contour
+from tactile_bayes.contours.circle import Circle
+from tactile_bayes.contours.joined import Joined
+from tactile_bayes.contours.parabola import Parabola
+from tactile_bayes.contours.power_law import PowerLaw
+from tactile_bayes.errors import ContourError
+
+__all__ = ["paper_profile"]
+
+
+def paper_profile(name: Literal["I", "II", "III", "IV"], q: float) -> Contour:
+    """One of the paper's profiles.
+
+    I is 0.7 x² + q, II is 0.5 x² + q, III is 1 − √(1 − x²) + q, and IV is 0.5 x² + q for x < 0 and x⁴ + q for x ≥ 0.
+
+    Parameters
+    ----------
+    name : {"I", "II", "III", "IV"}
+        Which profile.
+    q : float
+        Distance of the vertex above the x axis, in rod lengths.
+
+    Raises
+    ------
+    ContourError
+        If there is no profile of that name.
+
+    Examples
+    --------
+    >>> paper_profile("II", q=0.5)
+    Parabola(a=0.5, q=0.5, x_c=0.0)
+    """
+    if name == "I":
+        return Parabola(0.7, q)
+    if name == "II":
+        return Parabola(0.5, q)
+    if name == "III":
+        return Circle(1.0, q)
+    if name == "IV":
+        return Joined(Parabola(0.5, q), PowerLaw(1.0, 4.0, q))
+    raise ContourError(f"there is no profile {name!r}: choose 'I', 'II', 'III' or 'IV'")

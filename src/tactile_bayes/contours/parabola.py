@@ -1,0 +1,69 @@
+"""Parabolas: profiles I and II of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finite, refuse_unless
+
+__all__ = ["Parabola"]
+
+
+@dataclass(frozen=True)
+class Parabola(Contour):
+    """y = a (x − x_c)² + q.
+
+    Parameters
+    ----------
+    a : array_like
+        Half the curvature at the vertex, > 0 [1/length].
+    q : array_like
+        Height of the vertex [length].
+    x_c : array_like
+        Position of the vertex [length].
+
+    Raises
+    ------
+    ContourError
+        If a is not positive (the object would not be convex), or a parameter is not finite.
+
+    Examples
+    --------
+    >>> x, y = Parabola(0.5, q=0.3).point(np.pi / 4)
+    >>> x.round(12), y.round(12)
+    (np.float64(1.0), np.float64(0.8))
+    """
+
+    a: Parameter
+    q: Parameter
+    x_c: Parameter = 0.0
+
+    def __post_init__(self) -> None:
+        a = np.asarray(self.a)
+        refuse_unless(
+            (a > 0) & np.isfinite(a), "Parabola", "a must be positive, else the object is not strictly convex", a=a
+        )
+        refuse_unless(finite(self.q, self.x_c), "Parabola", "q and x_c must be finite", q=self.q, x_c=self.x_c)
+
+    @property
+    def domain(self) -> tuple[Floats, Floats]:
+        steepest = np.full(np.broadcast(self.a, self.q, self.x_c).shape, np.nextafter(0.5 * np.pi, 0.0))
+        return -steepest, steepest
+
+    def locate(self, parameter: ArrayLike) -> Locus:
+        alpha = np.asarray(parameter, dtype=float)
+        t = np.tan(alpha)
+        a, q, x_c = (np.asarray(p, dtype=float) for p in (self.a, self.q, self.x_c))
+        radius = (1.0 + t * t) ** 1.5 / (2.0 * a)
+        x, y, alpha, radius = np.broadcast_arrays(x_c + t / (2.0 * a), q + t * t / (4.0 * a), alpha, radius)
+        return Locus(x, y, alpha, radius, np.ones_like(alpha))
+
+    def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
+        alpha = np.asarray(slope_angle, dtype=float)
+        return np.where(np.abs(alpha) < 0.5 * np.pi, alpha, np.nan)
+
+    def height(self, x: ArrayLike) -> Floats:
+        return np.asarray(self.a * (np.asarray(x, dtype=float) - self.x_c) ** 2 + self.q)

@@ -1,0 +1,82 @@
+"""A contour as the rod sees it: from the pivot, in rod lengths, mirrored for a backward sweep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_bayes.contours.base import Contour, Floats, Index, Locus
+
+__all__ = ["SeenContour"]
+
+
+@dataclass(frozen=True)
+class SeenContour:
+    """Many contours of one family, each seen by a rod on its own pivot; a "lane" is one of them.
+
+    The rod's centreline stays `standoff` (half the rod's diameter) outside the object, so what it traces is the
+    parallel curve, strictly convex like the contour. All sweeps seen this way are forward ones.
+
+    Parameters
+    ----------
+    contour : Contour
+        With parameters that are all arrays of shape (lanes,).
+    base_x, base_y : ndarray, shape (lanes,)
+        Pivots, in the contour's unit of length.
+    length : float
+        The rod's length, in the same unit.
+    standoff : float
+        Half the rod's diameter, in the same unit.
+    mirrored : bool
+        Whether the sweep is a backward one.
+    """
+
+    contour: Contour
+    base_x: Floats
+    base_y: Floats
+    length: float
+    standoff: float
+    mirrored: bool
+
+    @property
+    def lanes(self) -> int:
+        return int(self.base_x.size)
+
+    def locate(self, lane: Index, parameter: Floats) -> Locus:
+        """Points relative to the pivot in rod lengths; `lane` and `parameter` broadcast. The parameter is seen too:
+        it still grows from left to right."""
+        sign = -1.0 if self.mirrored else 1.0
+        x, y, slope, arclength_rate, slope_rate = self.contour.take(lane).locate(sign * parameter)
+        if self.standoff:
+            x = x + self.standoff * np.sin(slope)
+            y = y - self.standoff * np.cos(slope)
+            arclength_rate = arclength_rate + self.standoff * slope_rate
+        return Locus(
+            sign * (x - self.base_x[lane]) / self.length,
+            (y - self.base_y[lane]) / self.length,
+            sign * slope,
+            arclength_rate / self.length,
+            slope_rate,
+        )
+
+    def domain(self) -> tuple[Floats, Floats]:
+        """Least and greatest parameter of every lane, infinite ones brought in to just beyond the rod's reach."""
+        lo, hi = (np.broadcast_to(end, (self.lanes,)).astype(float) for end in self.contour.domain)
+        if self.mirrored:
+            lo, hi = -hi, -lo
+        lanes = np.arange(self.lanes)
+        for end, outward in ((lo, -1.0), (hi, 1.0)):
+            open_ended = ~np.isfinite(end)
+            reach = self.length
+            while np.any(open_ended):
+                end[open_ended] = outward * reach
+                x = self.locate(lanes[open_ended], end[open_ended]).x
+                open_ended[open_ended] = outward * x <= 1.0
+                reach *= 2.0
+        return lo, hi
+
+    def knots(self) -> Floats:
+        """Parameters, shape (knots, lanes), at which the radius of curvature jumps."""
+        knots = np.array([np.broadcast_to(k, (self.lanes,)) for k in self.contour.knots], dtype=float)
+        return (-knots if self.mirrored else knots).reshape(-1, self.lanes)

@@ -1,0 +1,478 @@
+"""The equilibrium path: states from first contact to snap-off, for many contours at once.
+
+Arrays only; everything in rod lengths, EI/L and EI/L², seen as forward sweeps (`SeenContour` mirrors backward ones).
+A path runs along the contour from first contact (the tip, or a tangent line from the pivot, whichever is first)
+against the sense of the contour's parameter, until the drive angle has its first maximum: the snap-off. It is cut
+where the phase changes and where the contour's curvature jumps; on each segment all observables are smooth and are
+interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes import chebyshev
+from tactile_bayes.contours.base import Locus
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.elastica import Wrench, tangential_arclength, wrench_from_contact
+from tactile_bayes.roots import falling_root
+
+__all__ = ["CHANNELS", "Paths", "Reach", "SnapOff", "States", "trace"]
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+CHANNELS = ("holding_moment", "force_x", "force_y")
+
+
+class Reach(IntEnum):
+    """Whether a rod finds its contour."""
+
+    TOUCHES = 0
+    TOO_FAR = 1
+    """No point is within the rod's length."""
+    CUTS_PIVOT = 2
+    """The pivot is not below the contour."""
+    ENDS = 3
+    """The rod would first touch beyond an end of the contour."""
+
+
+class SnapOff(IntEnum):
+    """How a path ends."""
+
+    NEVER = 0
+    FOLD = 1
+    """A smooth maximum of the drive angle."""
+    CORNER = 2
+    """The maximum lies where the phase changes or the contour's curvature jumps."""
+    THRUST = 3
+    """The line of force has come to pass through the pivot: no holding moment is left."""
+
+
+class States(NamedTuple):
+    """Exact states on the paths."""
+
+    parameter: Floats
+    """The contour's parameter, seen."""
+    x: Floats
+    y: Floats
+    """Point at which rod's centreline and the contour (seen) touch."""
+    slope_angle: Floats
+    wrench: Wrench
+
+
+class _Segments(NamedTuple):
+    """Smooth stretches of all the paths; lanes may have one or several, in the order of the path."""
+
+    lane: Index
+    begin: Floats
+    """Contour parameter where the stretch begins (the greater one)."""
+    end: Floats
+    tip: NDArray[np.bool_]
+    """Whether the tip touches here."""
+    rooted: NDArray[np.bool_]
+    """Whether contact began here with the tip: loads then grow like the square root of the arc since."""
+
+    def take(self, index: Any) -> _Segments:
+        return _Segments(*(a[index] for a in self))
+
+    def along(self, way: Floats) -> tuple[Floats, Floats]:
+        """Contour parameter a way of 0 to 1 along, in which loads are smooth, and its derivative."""
+        span = self.end - self.begin
+        parameter = self.begin + span * np.where(self.rooted, way * way, way)
+        return parameter, span * np.where(self.rooted, 2.0 * way, 1.0)
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Paths of many contours, a lane each; see `trace`.
+
+    `reach` says which lanes have one; for the others angles are NaN and nothing is ever loaded.
+    """
+
+    seen: SeenContour
+    friction_angle: float
+    reach: NDArray[np.int8]
+    distance: Floats
+    """Least distance of the contour from the pivot, in rod lengths."""
+    first_angle: Floats
+    """Drive angle of first contact."""
+    first_parameter: Floats
+    snap_angle: Floats
+    """Drive angle of snap-off."""
+    snap_parameter: Floats
+    snap_off: NDArray[np.int8]
+    segments: _Segments
+    """What there is of each path up to snap-off."""
+    begin_angle: Floats
+    end_angle: Floats
+    """Drive angles at the ends of every segment."""
+    steadiness: Floats
+    """Rate of the drive angle at the end of every segment over its mean rate, at most 1; 0 where it ends in a fold."""
+    coefficients: Floats
+    """Of way along the segment, holding moment, force_x and force_y over the drive angle: (order, 4, segment)."""
+
+    def observables(self, drive_angles: Floats) -> Floats:
+        """Holding moment and forces at given drive angles; zero out of contact.
+
+        Parameters
+        ----------
+        drive_angles : ndarray, shape (k,) or (lanes, k)
+
+        Returns
+        -------
+        ndarray, shape (lanes, k, 3)
+        """
+        angles = np.broadcast_to(drive_angles, (self.seen.lanes, np.shape(drive_angles)[-1]))
+        out = np.zeros((*angles.shape, 3))
+        segment, sample = self._loaded(angles)
+        lane = self.segments.lane[segment]
+        # Samples of a segment side by side, so that one product with its coefficients serves them all.
+        count = np.bincount(segment, minlength=self.segments.lane.size)
+        rank = np.arange(segment.size) - (np.cumsum(count) - count)[segment]
+        turn = np.zeros((count.size, int(count.max(initial=0))))
+        turn[segment, rank] = self._turn(segment, angles[lane, sample])
+        basis = chebyshev.polynomials(self.coefficients.shape[0], turn)
+        out[lane, sample] = (basis @ np.moveaxis(self.coefficients[:, 1:], -1, 0))[segment, rank]
+        return out
+
+    def states(self, lane: Index, drive_angles: Floats) -> States:
+        """Exact states at drive angles, shape (k,), on lanes, shape (k,); NaN and `NONE` out of contact."""
+        angles = np.asarray(drive_angles, dtype=float)
+        by_lane = np.full((self.seen.lanes, angles.size), np.nan)
+        by_lane[lane, np.arange(angles.size)] = angles
+        segment, sample = self._loaded(by_lane)
+        way = chebyshev.evaluate(self.coefficients[:, 0, segment], self._turn(segment, angles[sample]))
+        parameter = np.full(angles.size, np.nan)
+        parameter[sample] = self._polish(segment, way, angles[sample])
+        return self.states_at(lane, parameter)
+
+    def states_at(self, lane: Index, parameter: Floats) -> States:
+        """Exact states at the contour's parameters, whether on the path or beyond its end."""
+        return _states(self.seen, lane, parameter, self.friction_angle)
+
+    def _loaded(self, angles: Floats) -> tuple[Index, Index]:
+        """Pairs of segment and sample such that the sample's angle, shape (lanes, k), lies in the segment."""
+        at = angles[self.segments.lane]
+        last = _last_of_lane(self.segments.lane)
+        with np.errstate(invalid="ignore"):
+            inside = (at >= self.begin_angle[:, None]) & (at < self.end_angle[:, None])
+            segment, sample = np.nonzero(inside | (last[:, None] & (at == self.end_angle[:, None])))
+        return segment, sample
+
+    def _turn(self, segment: Index, angle: Floats) -> Floats:
+        """Drive angle on a segment from 0 to 1, stretched toward its end so that states are smooth functions of it."""
+        begin, end, steady = self.begin_angle[segment], self.end_angle[segment], self.steadiness[segment]
+        left = np.clip((end - angle) / (end - begin), 0.0, 1.0)
+        with np.errstate(invalid="ignore"):
+            ahead = 2.0 * left / (steady + np.sqrt(steady * steady + 4.0 * (1.0 - steady) * left))
+        return 1.0 - np.where(left > 0.0, ahead, 0.0)
+
+    def _polish(self, segment: Index, way: Floats, angle: Floats) -> Floats:
+        """Contour parameters at which the exact drive angle is the given one, by Newton in the variable of `_turn`."""
+        chosen = self.segments.take(segment)
+        begin, end, steady = self.begin_angle[segment], self.end_angle[segment], self.steadiness[segment]
+        target = self._turn(segment, angle)
+        way = np.clip(way, 0.0, 1.0)
+        for _ in range(3):
+            parameter, parameter_rate = chosen.along(way)
+            state = self.states_at(chosen.lane, parameter)
+            turn = self._turn(segment, state.wrench.drive_angle)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                rate = _angle_rate(self.seen, chosen.lane, state) * parameter_rate / (end - begin)
+                step = (turn - target) * (steady + 2.0 * (1.0 - steady) * (1.0 - turn)) / rate
+            way = np.clip(np.where(np.isfinite(step), way - step, way), 0.0, 1.0)
+        return chosen.along(way)[0]
+
+
+def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, exact_events: bool = True) -> Paths:
+    """Follow the equilibria of every lane from first contact to snap-off.
+
+    Parameters
+    ----------
+    seen : SeenContour
+    friction_angle : float
+        δ = arctan μ [rad].
+    order : int
+        Number of Chebyshev nodes on a segment.
+    exact_events : bool
+        Whether phase changes and snap-off are computed to rounding, or to the accuracy of the interpolation.
+    """
+    reach, distance, begin, end, tip_first = _limits(seen, friction_angle)
+    segments = _segments(seen, np.flatnonzero(reach == Reach.TOUCHES), begin, end, tip_first, friction_angle, order)
+    if exact_events:
+        segments = _polish_changes(seen, segments, friction_angle)
+
+    # Over the way along the contour: drive angle and its first maximum.
+    ways = np.broadcast_to(chebyshev.nodes(order), (segments.lane.size, order))
+    states = _states(seen, segments.lane[:, None], segments.take(np.s_[:, None]).along(ways)[0], friction_angle)
+    angle = chebyshev.coefficients(states.wrench.drive_angle)
+    keep, stop, kind = _first_maximum(segments, angle)
+    loads = [chebyshev.coefficients(getattr(states.wrench, name))[:, keep] for name in CHANNELS]
+    segments, angle = segments.take(keep), angle[:, keep]
+    folds = kind == SnapOff.FOLD
+    if exact_events:
+        stop = np.where(folds, _polish_fold(seen, segments, angle, stop, friction_angle), stop)
+
+    # Over the drive angle: where on the way it takes the values that the nodes want.
+    first, last = _first_of_lane(segments.lane), _last_of_lane(segments.lane)
+    end_parameter, _ = segments.along(stop)
+    end_angle = chebyshev.evaluate(angle, stop)
+    if exact_events:
+        at_end = _states(seen, segments.lane, end_parameter, friction_angle).wrench.drive_angle
+        end_angle = np.where(np.isfinite(at_end), at_end, end_angle)
+    locus = seen.locate(segments.lane, segments.begin)
+    begin_angle = np.where(first, np.arctan2(locus.y, locus.x), np.append(np.nan, end_angle[:-1])[: first.size])
+    node = chebyshev.nodes(order)
+    end_rate = chebyshev.evaluate(chebyshev.derivative(angle), stop) * stop / (end_angle - begin_angle)
+    steadiness = np.where(folds, 0.0, np.clip(end_rate, 0.0, 1.0))
+    ahead = 1.0 - node[:, None]
+    wanted = end_angle - (end_angle - begin_angle) * ahead * (steadiness + (1.0 - steadiness) * ahead)
+    way = _invert(angle, np.broadcast_to(stop, wanted.shape), wanted)
+    curves = [way, *(chebyshev.evaluate(load[:, None], way) for load in loads)]
+
+    def per_lane(values: Floats, of: NDArray[np.bool_]) -> Floats:
+        out = np.full(seen.lanes, np.nan)
+        out[segments.lane[of]] = values[of]
+        return out
+
+    snap_off = np.zeros(seen.lanes, dtype=np.int8)
+    snap_off[segments.lane[last]] = kind[last]
+    return Paths(
+        seen=seen,
+        friction_angle=friction_angle,
+        reach=reach,
+        distance=distance,
+        first_angle=per_lane(begin_angle, first),
+        first_parameter=per_lane(segments.begin, first),
+        snap_angle=per_lane(end_angle, last),
+        snap_parameter=per_lane(end_parameter, last),
+        snap_off=snap_off,
+        segments=segments,
+        begin_angle=begin_angle,
+        end_angle=end_angle,
+        steadiness=steadiness,
+        coefficients=chebyshev.coefficients(np.moveaxis(np.stack(curves), 1, -1)),
+    )
+
+
+def _states(seen: SeenContour, lane: Index, parameter: Floats, friction_angle: float) -> States:
+    locus = seen.locate(lane, parameter)
+    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle)
+    return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
+
+
+def _angle_rate(seen: SeenContour, lane: Index, state: States) -> Floats:
+    """Derivative of the drive angle by the contour's parameter."""
+    locus = seen.locate(lane, state.parameter)
+    along, facing = _frame(locus)
+    distance2 = locus.x**2 + locus.y**2
+    bearing_rate = -facing * locus.arclength_rate / distance2
+    with np.errstate(invalid="ignore"):
+        by_distance = state.wrench.by_distance * 2.0 * along * locus.arclength_rate
+        return bearing_rate + state.wrench.by_slope * (locus.slope_rate - bearing_rate) + by_distance
+
+
+def _frame(locus: Locus) -> tuple[Floats, Floats]:
+    """The vector from the pivot to the contour along the contour and into the object."""
+    cos, sin = np.cos(locus.slope_angle), np.sin(locus.slope_angle)
+    return locus.x * cos + locus.y * sin, locus.y * cos - locus.x * sin
+
+
+def _limits(
+    seen: SeenContour, friction_angle: float
+) -> tuple[NDArray[np.int8], Floats, Floats, Floats, NDArray[np.bool_]]:
+    """Reach, least distance, parameters of first contact and of thrust, and whether the tip touches first."""
+    lanes = np.arange(seen.lanes)
+    lo, hi = seen.domain()
+
+    def thrust(tilt: float) -> Callable[[Index, Floats], tuple[Floats, Floats]]:
+        """Lever arm of a force that is turned by `tilt` from the normal."""
+        cos, sin = np.cos(tilt), np.sin(tilt)
+
+        def lever(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
+            locus = seen.locate(lane, parameter)
+            along, facing = _frame(locus)
+            along_rate = locus.arclength_rate + facing * locus.slope_rate
+            return cos * along + sin * facing, cos * along_rate - sin * along * locus.slope_rate
+
+        return lever
+
+    def facing_root(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
+        locus = seen.locate(lane, parameter)
+        along, facing = _frame(locus)
+        return facing, -along * locus.slope_rate
+
+    def within_root(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
+        locus = seen.locate(lane, parameter)
+        along, _ = _frame(locus)
+        return 1.0 - locus.x**2 - locus.y**2, -2.0 * along * locus.arclength_rate
+
+    lever = thrust(0.0)
+    straddles = (lever(lanes, hi)[0] > 0.0) & (lever(lanes, lo)[0] < 0.0)
+    ends = np.where(lever(lanes, hi)[0] > 0.0, lo, hi)
+    nearest = np.where(straddles, falling_root(lever, np.where(straddles, hi, lo), lo), ends)
+    locus = seen.locate(lanes, nearest)
+    distance, below = np.hypot(locus.x, locus.y), _frame(locus)[1] > 0.0
+
+    end = falling_root(thrust(friction_angle), hi, nearest) if friction_angle else nearest
+    tangent = falling_root(facing_root, end, hi)
+    at_hi, at_tangent, at_end = (seen.locate(lanes, p) for p in (hi, tangent, end))
+    tip_first = np.hypot(at_tangent.x, at_tangent.y) > 1.0
+    begin = np.where(tip_first, falling_root(within_root, end, tangent), tangent)
+    open_end = (_frame(at_hi)[1] > 0.0) & (np.hypot(at_hi.x, at_hi.y) <= 1.0)
+
+    reach = np.full(seen.lanes, Reach.TOUCHES, dtype=np.int8)
+    reach[~straddles | open_end] = Reach.ENDS
+    reach[(distance >= 1.0) | (np.hypot(at_end.x, at_end.y) >= 1.0)] = Reach.TOO_FAR
+    reach[~below] = Reach.CUTS_PIVOT
+    return reach, distance, begin, end, tip_first
+
+
+def _segments(
+    seen: SeenContour,
+    lanes: Index,
+    begin: Floats,
+    end: Floats,
+    tip_first: NDArray[np.bool_],
+    friction_angle: float,
+    order: int,
+) -> _Segments:
+    """Cut the paths at knots, and where tangential contact takes exactly the rod's length."""
+    knots = np.sort(np.clip(seen.knots()[:, lanes], end[lanes], begin[lanes]), axis=0)[::-1]
+    bounds = np.vstack([begin[lanes], knots, end[lanes]])
+    start, stop = bounds[:-1].T.ravel(), bounds[1:].T.ravel()
+    lane = np.repeat(lanes, bounds.shape[0] - 1)
+    some = start - stop > 1e-13 * (begin[lane] - end[lane])
+    lane, start, stop = lane[some], start[some], stop[some]
+
+    node = chebyshev.nodes(order)
+    locus = seen.locate(lane[:, None], start[:, None] + (stop - start)[:, None] * node)
+    excess = chebyshev.coefficients(tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0)
+    grid = np.concatenate([[0.0], node, [1.0]])
+    beyond = chebyshev.evaluate(excess[:, :, None], grid) > 0.0
+    piece, cell = np.nonzero(beyond[:, :-1] != beyond[:, 1:])
+    sign = np.where(beyond[piece, cell], 1.0, -1.0)
+    slope = chebyshev.derivative(excess)
+
+    def signed(i: Index, z: Floats) -> tuple[Floats, Floats]:
+        at = piece[i]
+        return sign[i] * chebyshev.evaluate(excess[:, at], z), sign[i] * chebyshev.evaluate(slope[:, at], z)
+
+    change = falling_root(signed, grid[cell], grid[cell + 1])
+    owner = np.concatenate([np.arange(lane.size), piece])
+    cut = np.concatenate([np.zeros(lane.size), change])
+    order_of = np.lexsort((cut, owner))
+    owner, cut = owner[order_of], cut[order_of]
+    following = np.where(_last_of_lane(owner), 1.0, np.append(cut[1:], 1.0)[: cut.size])
+    tip = chebyshev.evaluate(excess[:, owner], 0.5 * (cut + following)) > 0.0
+    span = (stop - start)[owner]
+    lane = lane[owner]
+    return _Segments(
+        lane,
+        start[owner] + cut * span,
+        start[owner] + following * span,
+        tip,
+        tip_first[lane] & _first_of_lane(lane),
+    )
+
+
+def _polish_changes(seen: SeenContour, segments: _Segments, friction_angle: float) -> _Segments:
+    """Phase changes to rounding, by secants from the interpolant's answer."""
+    inner = np.flatnonzero(~_first_of_lane(segments.lane))
+    inner = inner[segments.tip[inner] != segments.tip[inner - 1]]
+    lane = segments.lane[inner]
+    room = np.minimum(segments.begin[inner - 1] - segments.end[inner - 1], segments.begin[inner] - segments.end[inner])
+
+    def excess(parameter: Floats) -> Floats:
+        locus = seen.locate(lane, parameter)
+        return tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0
+
+    old, now = segments.begin[inner] + 1e-4 * room, segments.begin[inner]
+    at_old, at_now = excess(old), excess(now)
+    for _ in range(4):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = at_now * (now - old) / (at_now - at_old)
+        new = np.where(np.isfinite(step) & (np.abs(step) < 0.1 * room), now - step, now)
+        old, at_old, now = now, at_now, new
+        at_now = excess(now)
+    begin, end = segments.begin.copy(), segments.end.copy()
+    begin[inner] = end[inner - 1] = now
+    return segments._replace(begin=begin, end=end)
+
+
+def _first_maximum(segments: _Segments, angle: Floats) -> tuple[Index, Floats, NDArray[np.int8]]:
+    """Segments up to the first maximum of the drive angle, how far each is followed, and how the last one ends."""
+    slope = chebyshev.derivative(angle)
+    grid = np.linspace(0.0, 1.0, 2 * angle.shape[0] + 1)
+    falls = chebyshev.evaluate(slope[:, :, None], grid) <= 0.0
+    any_fall, cell = falls.any(axis=1), falls.argmax(axis=1)
+    fold = any_fall & (cell > 0)
+    before: Index = np.cumsum(any_fall) - any_fall
+    first = np.maximum.accumulate(np.where(_first_of_lane(segments.lane), np.arange(before.size), 0))
+    keep = np.flatnonzero((before == before[first]) & (fold | ~any_fall))
+
+    bend = chebyshev.derivative(slope)
+    kept_fold = fold[keep]
+    at = keep[kept_fold]
+
+    def rate(i: Index, z: Floats) -> tuple[Floats, Floats]:
+        return chebyshev.evaluate(slope[:, at[i]], z), chebyshev.evaluate(bend[:, at[i]], z)
+
+    stop = np.ones(keep.size)
+    stop[kept_fold] = falling_root(rate, grid[cell[at] - 1], grid[cell[at]])
+    kind = np.full(keep.size, SnapOff.NEVER, dtype=np.int8)
+    last = _last_of_lane(segments.lane[keep])
+    whole = _last_of_lane(segments.lane)[keep]
+    kind[last] = np.where(whole, SnapOff.THRUST, SnapOff.CORNER)[last]
+    kind[kept_fold] = SnapOff.FOLD
+    return keep, stop, kind
+
+
+def _polish_fold(seen: SeenContour, segments: _Segments, angle: Floats, stop: Floats, friction_angle: float) -> Floats:
+    """Ways at which the exact derivative of the drive angle vanishes: Newton with the interpolant's curvature."""
+    bend = chebyshev.evaluate(chebyshev.derivative(chebyshev.derivative(angle)), stop)
+    for _ in range(5):
+        parameter, parameter_rate = segments.along(stop)
+        state = _states(seen, segments.lane, parameter, friction_angle)
+        step = _angle_rate(seen, segments.lane, state) * parameter_rate / bend
+        stop = np.where(np.abs(step) < 1e-2, np.clip(stop - step, 0.0, 1.0), stop)
+    return stop
+
+
+def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
+    """Arguments in [0, stop] at which interpolants that grow there take wanted values, shape (k, functions)."""
+    slope = np.zeros_like(coefficients)
+    slope[:-1] = chebyshev.derivative(coefficients)
+    both = np.stack([coefficients, slope], axis=1)[:, :, None]
+    z = stop * chebyshev.nodes(wanted.shape[0])[:, None]
+    for _ in range(8):
+        value, rate = chebyshev.evaluate(both, z)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = (value - wanted) / rate
+        z = np.clip(z - step, 0.0, stop)
+        if np.all(np.abs(step) < 1e-9 * stop):
+            return z
+
+    def missing(i: Index, at: Floats) -> tuple[Floats, Floats]:
+        value, rate = chebyshev.evaluate(both[:, :, 0, which[i]], at)
+        return goal[i] - value, -rate
+
+    k, which = np.nonzero(~(np.abs(step) < 1e-9 * stop))
+    goal = wanted[k, which]
+    z[k, which] = falling_root(missing, np.zeros(k.size), np.broadcast_to(stop, wanted.shape)[k, which])
+    return z
+
+
+def _first_of_lane(lane: Index) -> NDArray[np.bool_]:
+    return np.append(True, np.diff(lane) != 0)[: lane.size]
+
+
+def _last_of_lane(lane: Index) -> NDArray[np.bool_]:
+    return np.append(np.diff(lane) != 0, True)[: lane.size] if lane.size else np.zeros(0, dtype=bool)

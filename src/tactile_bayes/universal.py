@@ -1,0 +1,210 @@
+"""The two universal maps of a rod in contact: how its ends lie → the piece of elastica that joins them.
+
+In tangential contact the angle of the chord over the contour's tangent alone gives the amplitude (one variable); in tip
+contact the chord's length and its angle over the force give amplitude and direction at the contact (two variables).
+Both are tabulated as Chebyshev series when first used, and polished by Newton's method on the exact arc.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebvander
+from numpy.typing import NDArray
+
+from tactile_bayes import chebyshev
+from tactile_bayes.arc import Arc, ArcSlopes, arc_and_slopes, arc_to, chord_angle, lever, slack, slack_slope
+from tactile_bayes.roots import falling_root
+
+__all__ = ["TangentialArcs", "TipArcs", "tangential_arcs", "tip_arcs"]
+
+Floats = NDArray[np.float64]
+
+_SETTLED = 1e-11
+"""Relative Newton step at which a first-order correction of the arc leaves nothing but rounding, and its derivatives
+can stay as they are."""
+
+_MAX_STEPS = 40
+
+_CHI_MAX = 3.2
+"""A little over π, the amplitude at which the line of force passes through the pivot."""
+
+_TILT_MAX = 0.5 * np.pi + 0.02
+"""Greatest ε1 = π/2 − ψ1 in the table of tip contacts; with friction it can be a little more."""
+
+
+class TangentialArcs(NamedTuple):
+    """Tangential contacts."""
+
+    amplitude: Floats
+    arc: Arc
+    by_chi: ArcSlopes
+
+
+class TipArcs(NamedTuple):
+    """Tip contacts."""
+
+    amplitude: Floats
+    tilt: Floats
+    """ε1 = π/2 − ψ1."""
+    arc: Arc
+    by_chi: ArcSlopes
+    by_psi1: ArcSlopes
+
+
+def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:
+    """Arcs with amplitude χ ∈ [0, π] whose chord stands at `angle` ≥ 0 over the direction at the contact.
+
+    Newton on the square root of the angle, which is nearly proportional to χ.
+    """
+    target = np.sqrt(angle)
+    level = np.minimum(angle, 0.5 * np.pi)
+    guess = target * np.sqrt(chebyshev.evaluate(_tangential_table(), level / (0.5 * np.pi)))
+    chi = np.where(m == 0.5, guess, np.minimum(np.sqrt(3.0 / np.sqrt(m * (1.0 - m))) * target, np.pi))
+    result = _Collected(angle.size, 10)
+    active = np.arange(angle.size)
+    for _ in range(_MAX_STEPS):
+        x = chi[active]
+        arc, by_chi = arc_to(x, m[active])
+        value, slope = chord_angle(arc, by_chi)
+        root = np.sqrt(value)
+        with np.errstate(invalid="ignore"):
+            step = np.where(x > 0.0, (root - target[active]) * 2.0 * root / slope, 0.0)
+        done = np.abs(step) <= _SETTLED * x
+        x = x - step
+        result.store(active, done, (x, *_moved(arc, x, m[active], (by_chi, -step)), *by_chi))
+        chi[active] = np.clip(x, 0.5 * chi[active], np.pi)
+        active = active[~done]
+        if not active.size:
+            break
+    amplitude, *rest = result.columns
+    return TangentialArcs(amplitude, Arc(*rest[:5]), ArcSlopes(*rest[5:]))
+
+
+def tip_arcs(lack: Floats, tilt: Floats) -> TipArcs:
+    """Arcs of length one with amplitude χ ∈ [0, π], by chord: √(1 − lack²) long, and `tilt` off the force's line.
+
+    `tilt` ∈ [0, π/2 + δ] is π/2 minus the chord's angle over the direction across the force.
+    """
+    chi, tilt1 = _tip_guess(lack, tilt)
+    return _polished_tips(lack, tilt, chi, tilt1)
+
+
+def _polished_tips(lack: Floats, tilt: Floats, chi: Floats, tilt1: Floats) -> TipArcs:
+    result = _Collected(lack.size, 15)
+    active = np.arange(lack.size)
+    for _ in range(_MAX_STEPS):
+        x, t = chi[active], tilt1[active]
+        arc, by_chi, by_psi1 = arc_and_slopes(x, np.sin(0.5 * t) ** 2)
+        angle, angle_x = chord_angle(arc, by_chi)
+        angle_t = -chord_angle(arc, by_psi1)[1]
+        value = slack(arc)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value_x, value_t = slack_slope(arc, value, by_chi), -slack_slope(arc, value, by_psi1)
+            miss, miss_tilt = value - lack[active], t - angle - tilt[active]
+            det = value_x * (1.0 - angle_t) + value_t * angle_x
+            dx = np.where(x > 0.0, (miss * (1.0 - angle_t) - value_t * miss_tilt) / det, 0.0)
+            dt = np.where(x > 0.0, (value_x * miss_tilt + angle_x * miss) / det, 0.0)
+        done = (np.abs(dx) <= _SETTLED * x) & (np.abs(dt) <= _SETTLED * t)
+        moved = _moved(arc, x - dx, np.sin(0.5 * (t - dt)) ** 2, (by_chi, -dx), (by_psi1, dt))
+        result.store(active, done, (x - dx, t - dt, *moved, *by_chi, *by_psi1))
+        chi[active] = np.clip(x - dx, 0.5 * x, np.minimum(1.5 * x, _CHI_MAX))
+        tilt1[active] = np.clip(t - dt, 0.5 * t, 0.5 * (t + np.pi))
+        active = active[~done]
+        if not active.size:
+            break
+    amplitude, tilt_out, *rest = result.columns
+    return TipArcs(amplitude, tilt_out, Arc(*rest[:5]), ArcSlopes(*rest[5:9]), ArcSlopes(*rest[9:]))
+
+
+class _Collected:
+    """Columns filled as entries settle; NaN for those that never do."""
+
+    def __init__(self, size: int, columns: int) -> None:
+        self.size = size
+        self.columns: list[Floats] = [np.full(size, np.nan) for _ in range(columns)]
+
+    def store(self, active: NDArray[np.intp], done: NDArray[np.bool_], values: tuple[Floats, ...]) -> None:
+        if done.all() and active.size == self.size:
+            self.columns = list(values)
+            return
+        where = active[done]
+        for column, value in zip(self.columns, values, strict=True):
+            column[where] = value[done]
+
+
+def _moved(arc: Arc, chi: Floats, m: Floats, *steps: tuple[ArcSlopes, Floats]) -> Arc:
+    """An arc after a small step, whose amplitude and parameter are now χ and m."""
+    length, shortfall, offset, turn, _ = arc
+    for slopes, step in steps:
+        length = length + slopes.length * step
+        shortfall = shortfall + slopes.shortfall * step
+        offset = offset + slopes.offset * step
+        turn = turn + slopes.turn * step
+    return Arc(length, shortfall, offset, turn, lever(chi, m))
+
+
+@functools.cache
+def _tangential_table() -> Floats:
+    """Coefficients of χ²/angle over angle/(π/2), frictionless; to 1e-14."""
+    angle = chebyshev.nodes(34) * 0.5 * np.pi
+
+    def missing(i: NDArray[np.intp], chi: Floats) -> tuple[Floats, Floats]:
+        value, slope = chord_angle(*arc_to(chi, np.full(chi.size, 0.5)))
+        return angle[i] - value, -slope
+
+    chi = falling_root(missing, np.zeros(angle.size), np.full(angle.size, _CHI_MAX))
+    return chebyshev.coefficients(chi**2 / angle)
+
+
+class _TipTable(NamedTuple):
+    """Chebyshev coefficients over polar coordinates in (tilt, lack): angle, and share of the greatest radius."""
+
+    radius: Floats
+    chi2: Floats
+    tilt: Floats
+
+
+@functools.cache
+def _tip_table() -> _TipTable:
+    angles, radii = 40, 32  # enough for 1e-12 without friction: one Newton step then leaves rounding alone
+    angle = chebyshev.nodes(angles) * 0.5 * np.pi
+    m = np.full(angles, np.sin(0.5 * _TILT_MAX) ** 2)
+
+    def polar(chi: Floats) -> tuple[Floats, Floats, Floats]:
+        arc, by_chi = arc_to(chi, m[: chi.size])
+        chord, turning = chord_angle(arc, by_chi)
+        lack, tilt = slack(arc), _TILT_MAX - chord
+        radius = np.hypot(lack, tilt)
+        return np.arctan2(lack, tilt), (tilt * slack_slope(arc, lack, by_chi) + lack * turning) / radius**2, radius
+
+    def missing(i: NDArray[np.intp], chi: Floats) -> tuple[Floats, Floats]:
+        value, slope, _ = polar(chi)
+        return angle[i] - value, -slope
+
+    edge = falling_root(missing, np.full(angles, 1e-3), np.full(angles, _CHI_MAX))
+    radius = polar(edge)[2]
+    share = chebyshev.nodes(radii)
+    lack, tilt = (np.outer(trig(angle) * radius, share).ravel() for trig in (np.sin, np.cos))
+    # To first order in ε1 the amplitude depends on the angle alone, and the edge's serves as a first guess.
+    start = np.repeat(edge, radii), np.outer(np.full(angles, _TILT_MAX), share).ravel()
+    found = _polished_tips(lack, tilt, *start)
+    chi2, tilt1 = (a.reshape(angles, radii) for a in (found.amplitude**2, found.tilt))
+
+    def fit(values: Floats) -> Floats:
+        return chebyshev.coefficients(chebyshev.coefficients(values))
+
+    return _TipTable(chebyshev.coefficients(radius), fit(chi2 / angle[:, None]), fit(tilt1 / share))
+
+
+def _tip_guess(lack: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+    table = _tip_table()
+    angle = np.arctan2(lack, tilt)
+    place = angle / (0.5 * np.pi)
+    share = np.minimum(np.hypot(lack, tilt) / chebyshev.evaluate(table.radius, place), 1.0)
+    by_angle = chebvander(2.0 * place - 1.0, table.chi2.shape[0] - 1)
+    by_share = chebvander(2.0 * share - 1.0, table.chi2.shape[1] - 1)
+    chi2, tilt1 = (((by_angle @ c) * by_share).sum(axis=1) for c in (table.chi2, table.tilt))
+    return np.sqrt(angle * chi2), tilt1 * share
