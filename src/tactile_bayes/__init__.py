@@ -1,0 +1,66 @@
+"""Bayesian inverse problems for tactile sensors made of a flexible rod on a pivot.
+
+Contour → scan → record → load cell → contact points and contour posterior → band:
+
+>>> import tactile_bayes as tb
+>>> scan = tb.scan(tb.contours.paper_profile("II", q=0.5))
+>>> measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, seed=1)
+>>> contacts = tb.reconstruct(measured)
+
+Names load when they are first used, so that importing the package is quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_MODULES = ("contours", "elastica", "plotting")
+
+_HOMES = {
+    "LoadCell": "load_cell",
+    "Rod": "rod",
+    "contour_band": "uncertainty.band",
+    "equilibria": "scanning",
+    "infer_contour": "inference.contour",
+    "infer_point_load": "inference.point_load",
+    "read_record": "record",
+    "reconstruct": "reconstruction",
+    "scan": "scanning",
+    "to_arviz": "inference.result",
+    "write_record": "record",
+}
+
+__all__ = ["__version__", *_MODULES, *_HOMES]
+
+if TYPE_CHECKING:
+    from tactile_bayes import contours as contours
+    from tactile_bayes import elastica as elastica
+    from tactile_bayes import plotting as plotting
+    from tactile_bayes.inference.contour import infer_contour as infer_contour
+    from tactile_bayes.inference.point_load import infer_point_load as infer_point_load
+    from tactile_bayes.inference.result import to_arviz as to_arviz
+    from tactile_bayes.load_cell import LoadCell as LoadCell
+    from tactile_bayes.reconstruction import reconstruct as reconstruct
+    from tactile_bayes.record import read_record as read_record
+    from tactile_bayes.record import write_record as write_record
+    from tactile_bayes.rod import Rod as Rod
+    from tactile_bayes.scanning import equilibria as equilibria
+    from tactile_bayes.scanning import scan as scan
+    from tactile_bayes.uncertainty.band import contour_band as contour_band
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f"tactile_bayes.{name}")
+    if name in _HOMES:
+        value = getattr(importlib.import_module(f"tactile_bayes.{_HOMES[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'tactile_bayes' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,369 @@
+"""Step 1 as a user asks for it: a rod sweeps along a contour, and the base feels it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.contours.base import Contour
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, Wrench, wrench_from_contact
+from tactile_bayes.errors import ContourError, ParameterError, ReachError
+from tactile_bayes.path import Paths, Reach, SnapOff, States, trace
+from tactile_bayes.record import COLUMNS, make_record
+from tactile_bayes.rod import Rod
+
+__all__ = ["Event", "Scan", "SweepEvents", "equilibria", "scan", "sweep_paths"]
+
+Direction = Literal["forward", "backward"]
+Floats = NDArray[np.float64]
+
+PHASE_NAMES = {NONE: "none", TIP: "tip", TANGENTIAL: "tangential"}
+"""Words for the contact phases."""
+
+_ORDER = 32
+_MARGIN = 15
+"""Steps of the drive before first contact and after snap-off."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A distinguished state of a sweep, in the units of the scan.
+
+    Attributes
+    ----------
+    kind : str
+        "tip" or "tangential" at first contact; "tip → tangential" and so on at a change; "fold" (a smooth maximum of
+        the drive angle), "corner" (a maximum where the phase changes or the contour's curvature jumps) or "thrust"
+        (the line of force has come to pass through the pivot) at snap-off.
+    drive_angle, slope_angle : float
+        [rad].
+    contact_x, contact_y, contact_arclength : float
+        Contact point on the object and arc length of the rod up to it [length].
+    holding_moment, force_x, force_y : float
+        Base wrench.
+    """
+
+    kind: str
+    drive_angle: float
+    slope_angle: float
+    contact_x: float
+    contact_y: float
+    contact_arclength: float
+    holding_moment: float
+    force_x: float
+    force_y: float
+
+
+@dataclass(frozen=True)
+class SweepEvents:
+    """Where contact begins, changes its phase and ends in one sweep."""
+
+    first_contact: Event
+    transitions: tuple[Event, ...]
+    snap_off: Event
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What `scan` returns.
+
+    Attributes
+    ----------
+    record : xr.Dataset
+        The record, dimension "sample", with `truth_` columns for what the base cannot feel.
+    events : mapping of str to SweepEvents
+        By direction.
+    contour : Contour
+        What was scanned.
+    """
+
+    record: xr.Dataset
+    events: Mapping[str, SweepEvents]
+    contour: Contour
+
+
+def equilibria(
+    contour: Contour,
+    slope_angles: ArrayLike,
+    *,
+    base: tuple[float, float] = (0.0, 0.0),
+    direction: Direction = "forward",
+    rod: Rod | None = None,
+    friction: float = 0.0,
+) -> xr.Dataset:
+    """States in which the rod touches a contour at given slope angles.
+
+    Where a sweep would already have let go they are equilibria all the same, if unstable ones: equations 19 and 20 of
+    Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form.
+
+    Parameters
+    ----------
+    contour : Contour
+        In metres if `rod` is given in SI, else in rod lengths.
+    slope_angles : array_like, shape (n,)
+        Slope angles α of the contour at the contact [rad]; those of a backward sweep are mostly negative.
+    base : (float, float)
+        The pivot, in the contour's unit of length.
+    direction : {"forward", "backward"}
+        Sense of the drive: forward is counter-clockwise.
+    rod : Rod, optional
+        By default the dimensionless rod.
+    friction : float
+        Coulomb's coefficient μ of the sliding rod.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "slope_angle": drive_angle, holding_moment, force_x, force_y, contact_arclength, contact_phase ("tip",
+        "tangential" or "none"), contact_x, contact_y, tip_angle; NaN where the rod cannot reach.
+
+    Raises
+    ------
+    ParameterError
+        If a slope angle is outside (−π/2, π/2), or an argument is none that is offered.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import paper_profile
+    >>> states = equilibria(paper_profile("II", q=0.5), [0.0608483016, 0.4])
+    >>> states.drive_angle.values.round(6), states.contact_phase.values.tolist()
+    (array([3.154275, 1.994616]), ['tip', 'tangential'])
+    """
+    alpha = np.atleast_1d(np.asarray(slope_angles, dtype=float))
+    if alpha.ndim != 1 or not np.all(np.abs(alpha) < 0.5 * np.pi):
+        raise ParameterError("slope_angles must be a list of angles in (−π/2, π/2) radians")
+    seen = _seen(contour, base, direction, rod or Rod())
+    lane = np.zeros(alpha.size, dtype=np.intp)
+    parameter = (-1.0 if seen.mirrored else 1.0) * contour.parameter_of_slope(alpha)
+    locus = seen.locate(lane, parameter)
+    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, np.arctan(friction))
+    states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
+    columns = _columns(seen, states, rod or Rod())
+    reached = columns["contact_phase"] != "none"
+    data = {}
+    for name, values in columns.items():
+        if name == "slope_angle":
+            continue
+        if name != "contact_phase":
+            values = np.where(reached, values, np.nan)
+        data[name] = ("slope_angle", values, _attributes(name, rod))
+    return xr.Dataset(data, coords={"slope_angle": ("slope_angle", alpha, _attributes("slope_angle", rod))})
+
+
+def scan(
+    contour: Contour,
+    *,
+    direction: Literal["both", "forward", "backward"] = "both",
+    base: tuple[float, float] = (0.0, 0.0),
+    drive_step: float = float(np.radians(1.0)),
+    drive_angles: ArrayLike | None = None,
+    rod: Rod | None = None,
+    friction: float = 0.0,
+) -> Scan:
+    """Sweep the rod along a contour and record what its base feels, from before first contact to after snap-off.
+
+    Parameters
+    ----------
+    contour : Contour
+        In metres if `rod` is given in SI, else in rod lengths.
+    direction : {"both", "forward", "backward"}
+        Which sweeps; "both" is a forward sweep (number 0), then a backward one (number 1).
+    base : (float, float)
+        The pivot, in the contour's unit of length. The contour must lie above it.
+    drive_step : float
+        Step of the drive [rad]; the grid consists of its multiples, and reaches 15 steps beyond contact on both sides.
+    drive_angles : array_like, shape (n,), optional
+        A grid of one's own [rad], used in increasing order forward and in decreasing order backward.
+    rod : Rod, optional
+        By default the dimensionless rod. One with a diameter touches with its surface.
+    friction : float
+        Coulomb's coefficient μ of the sliding rod.
+
+    Returns
+    -------
+    Scan
+        Outside contact the load is zero and the `truth_` columns are NaN, their phase "none".
+
+    Raises
+    ------
+    ReachError
+        If the rod is too short to touch the contour.
+    ContourError
+        If the pivot is not below the contour, or the rod would touch beyond an end of it.
+    ParameterError
+        If an argument is none that is offered.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import paper_profile
+    >>> result = scan(paper_profile("II", q=0.5))
+    >>> round(result.events["forward"].snap_off.drive_angle, 6)
+    3.154275
+    """
+    directions: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
+    rod = rod or Rod()
+    if not (np.isfinite(drive_step) and drive_step > 0.0):
+        raise ParameterError(f"drive_step is {drive_step!r}: give a positive angle in radians")
+    grid = None if drive_angles is None else np.unique(np.asarray(drive_angles, dtype=float))
+    if grid is not None and not (grid.size and np.all(np.isfinite(grid)) and np.all(np.abs(grid) <= 2.0 * np.pi)):
+        raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
+
+    sweeps: list[dict[str, NDArray[np.generic]]] = []
+    events: dict[str, SweepEvents] = {}
+    for number, sense in enumerate(directions):
+        paths = sweep_paths(contour, base=base, direction=sense, rod=rod, friction=friction)
+        events[sense] = _events(paths, rod)
+        if grid is None:
+            first, snap = np.sort([events[sense].first_contact.drive_angle, events[sense].snap_off.drive_angle])
+            steps = np.arange(np.floor(first / drive_step) - _MARGIN, np.ceil(snap / drive_step) + _MARGIN + 1)
+            angles = steps * drive_step
+        else:
+            angles = grid
+        sweeps.append(_sweep(paths, angles[:: 1 if sense == "forward" else -1], number, sense, base, rod))
+    columns = {name: np.concatenate([sweep[name] for sweep in sweeps]) for name in sweeps[0]}
+    return Scan(make_record(columns, rod=rod), events, contour)
+
+
+def sweep_paths(
+    contour: Contour,
+    *,
+    base: tuple[float, float] = (0.0, 0.0),
+    direction: Direction = "forward",
+    rod: Rod | None = None,
+    friction: float = 0.0,
+) -> Paths:
+    """The exact path of one sweep along one contour, or a refusal that says why there is none.
+
+    Parameters and errors are those of `scan`.
+    """
+    rod = rod or Rod()
+    seen = _seen(contour, base, direction, rod)
+    height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
+    if np.any(height <= base[1]):
+        raise ContourError(
+            f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
+            f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
+        )
+    paths = trace(seen, friction_angle=float(np.arctan(friction)), order=_ORDER)
+    match Reach(int(paths.reach[0])):
+        case Reach.TOO_FAR:
+            raise ReachError(
+                f"the contour is out of reach: its nearest point is {paths.distance[0] * rod.length:.6g} from the "
+                f"pivot at ({base[0]:g}, {base[1]:g}), and the rod is {rod.length:g} long"
+            )
+        case Reach.CUTS_PIVOT:
+            raise ContourError(
+                f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
+                "contour or lower the pivot"
+            )
+        case Reach.ENDS:
+            side = "right" if direction == "forward" else "left"
+            raise ContourError(
+                f"in a {direction} sweep the rod would first touch beyond the contour's {side} end, where nothing is "
+                "known of the object: extend the contour, or move the pivot"
+            )
+    return paths
+
+
+def _seen(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SeenContour:
+    if direction not in ("forward", "backward"):
+        raise ParameterError(f"direction is {direction!r}: choose 'forward' or 'backward'")
+    if contour.shape != ():
+        raise ParameterError(f"one contour is wanted here, not an array of shape {contour.shape}")
+    x, y = (np.full(1, float(b)) for b in base)
+    return SeenContour(contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, direction == "backward")
+
+
+def _columns(seen: SeenContour, states: States, rod: Rod) -> dict[str, NDArray[np.generic]]:
+    """States in the world's signs and units; the contact point is the object's, not the centreline's."""
+    sign = -1.0 if seen.mirrored else 1.0
+    wrench = states.wrench
+    standoff = seen.standoff / seen.length
+    x = states.x - standoff * np.sin(states.slope_angle)
+    y = states.y + standoff * np.cos(states.slope_angle)
+
+    def turned(angle: Floats) -> Floats:
+        return np.pi - angle if seen.mirrored else angle
+
+    return {
+        "drive_angle": turned(wrench.drive_angle),
+        "holding_moment": sign * wrench.holding_moment * rod.moment_unit,
+        "force_x": sign * wrench.force_x * rod.force_unit,
+        "force_y": wrench.force_y * rod.force_unit,
+        "contact_arclength": wrench.contact_arclength * rod.length_unit,
+        "contact_phase": np.array([PHASE_NAMES[int(phase)] for phase in wrench.phase]),
+        "contact_x": seen.base_x[0] + sign * x * rod.length_unit,
+        "contact_y": seen.base_y[0] + y * rod.length_unit,
+        "tip_angle": turned(wrench.tip_angle),
+        "slope_angle": sign * states.slope_angle,
+    }
+
+
+def _sweep(
+    paths: Paths, angles: Floats, number: int, direction: Direction, base: tuple[float, float], rod: Rod
+) -> dict[str, NDArray[np.generic]]:
+    lane = np.zeros(angles.size, dtype=np.intp)
+    states = paths.states(lane, np.pi - angles if paths.seen.mirrored else angles)
+    columns = _columns(paths.seen, states, rod)
+    loaded = columns["contact_phase"] != "none"
+    sweep: dict[str, NDArray[np.generic]] = {
+        "sweep": np.full(angles.size, number),
+        "direction": np.full(angles.size, direction),
+        "base_x": np.full(angles.size, float(base[0])),
+        "base_y": np.full(angles.size, float(base[1])),
+        "drive_angle": angles,
+    }
+    for name in ("holding_moment", "force_x", "force_y"):
+        sweep[name] = np.where(loaded, columns[name], 0.0)
+    for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle", "contact_phase"):
+        sweep[f"truth_{name}"] = columns[name]
+    return sweep
+
+
+def _events(paths: Paths, rod: Rod) -> SweepEvents:
+    segments = paths.segments
+    inner = np.flatnonzero(segments.tip[1:] != segments.tip[:-1])
+    parameters = np.concatenate([paths.first_parameter, segments.end[inner], paths.snap_parameter])
+    states = paths.states_at(np.zeros(parameters.size, dtype=np.intp), parameters)
+    # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
+    wrench = _at_rest_first(states, bool(segments.tip[0]))
+    columns = _columns(paths.seen, states._replace(wrench=wrench), rod)
+    words = ["tip" if tip else "tangential" for tip in segments.tip]
+    kinds = [
+        words[0],
+        *(f"{words[i]} → {words[i + 1]}" for i in inner),
+        SnapOff(int(paths.snap_off[0])).name.lower(),
+    ]
+    names = [name for name in Event.__dataclass_fields__ if name != "kind"]
+    found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
+    return SweepEvents(found[0], tuple(found[1:-1]), found[-1])
+
+
+def _at_rest_first(states: States, tip: bool) -> Wrench:
+    x, y = states.x[0], states.y[0]
+    bearing, distance = np.arctan2(y, x), np.hypot(x, y)
+    rest = {
+        "drive_angle": bearing,
+        "tip_angle": bearing,
+        "contact_arclength": 1.0 if tip else distance,
+        "holding_moment": 0.0,
+        "force_x": 0.0,
+        "force_y": 0.0,
+        "phase": TIP if tip else TANGENTIAL,
+    }
+    columns = {name: value.copy() for name, value in states.wrench._asdict().items()}
+    for name, value in rest.items():
+        columns[name][0] = value
+    return Wrench(**columns)
+
+
+def _attributes(name: str, rod: Rod | None) -> dict[str, str]:
+    column = COLUMNS[name]
+    units = "dimensionless" if rod is None or rod.is_dimensionless else "SI"
+    return {"units": column.unit_in(units), "long_name": column.long_name}
