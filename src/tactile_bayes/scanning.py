@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -140,7 +140,7 @@ def equilibria(
         raise ParameterError("slope_angles must be a list of angles in (−π/2, π/2) radians")
     seen = _seen(contour, base, direction, rod or Rod())
     lane = np.zeros(alpha.size, dtype=np.intp)
-    parameter = (-1.0 if seen.mirrored else 1.0) * contour.parameter_of_slope(alpha)
+    parameter = (-1.0 if seen.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
     locus = seen.locate(lane, parameter)
     wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, np.arctan(friction))
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
@@ -277,19 +277,21 @@ def _seen(contour: Contour, base: tuple[float, float], direction: Direction, rod
     if contour.shape != ():
         raise ParameterError(f"one contour is wanted here, not an array of shape {contour.shape}")
     x, y = (np.full(1, float(b)) for b in base)
-    return SeenContour(contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, direction == "backward")
+    return SeenContour(
+        contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, np.array([direction == "backward"])
+    )
 
 
-def _columns(seen: SeenContour, states: States, rod: Rod) -> dict[str, NDArray[np.generic]]:
+def _columns(seen: SeenContour, states: States, rod: Rod) -> dict[str, NDArray[Any]]:
     """States in the world's signs and units; the contact point is the object's, not the centreline's."""
-    sign = -1.0 if seen.mirrored else 1.0
+    sign = -1.0 if seen.mirrored[0] else 1.0
     wrench = states.wrench
     standoff = seen.standoff / seen.length
     x = states.x - standoff * np.sin(states.slope_angle)
     y = states.y + standoff * np.cos(states.slope_angle)
 
     def turned(angle: Floats) -> Floats:
-        return np.pi - angle if seen.mirrored else angle
+        return np.pi - angle if seen.mirrored[0] else angle
 
     return {
         "drive_angle": turned(wrench.drive_angle),
@@ -309,7 +311,7 @@ def _sweep(
     paths: Paths, angles: Floats, number: int, direction: Direction, base: tuple[float, float], rod: Rod
 ) -> dict[str, NDArray[np.generic]]:
     lane = np.zeros(angles.size, dtype=np.intp)
-    states = paths.states(lane, np.pi - angles if paths.seen.mirrored else angles)
+    states = paths.states(lane, np.pi - angles if paths.seen.mirrored[0] else angles)
     columns = _columns(paths.seen, states, rod)
     loaded = columns["contact_phase"] != "none"
     sweep: dict[str, NDArray[np.generic]] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_bayes.contours.base import Contour, Floats, Index, Locus
 
@@ -28,7 +29,7 @@ class SeenContour:
         The rod's length, in the same unit.
     standoff : float
         Half the rod's diameter, in the same unit.
-    mirrored : bool
+    mirrored : ndarray of bool, shape (lanes,)
         Whether the sweep is a backward one.
     """
 
@@ -37,7 +38,7 @@ class SeenContour:
     base_y: Floats
     length: float
     standoff: float
-    mirrored: bool
+    mirrored: NDArray[np.bool_]
 
     @property
     def lanes(self) -> int:
@@ -46,7 +47,7 @@ class SeenContour:
     def locate(self, lane: Index, parameter: Floats) -> Locus:
         """Points relative to the pivot in rod lengths; `lane` and `parameter` broadcast. The parameter is seen too:
         it still grows from left to right."""
-        sign = -1.0 if self.mirrored else 1.0
+        sign = np.where(self.mirrored[lane], -1.0, 1.0)
         x, y, slope, arclength_rate, slope_rate = self.contour.take(lane).locate(sign * parameter)
         if self.standoff:
             x = x + self.standoff * np.sin(slope)
@@ -63,8 +64,7 @@ class SeenContour:
     def domain(self) -> tuple[Floats, Floats]:
         """Least and greatest parameter of every lane, infinite ones brought in to just beyond the rod's reach."""
         lo, hi = (np.broadcast_to(end, (self.lanes,)).astype(float) for end in self.contour.domain)
-        if self.mirrored:
-            lo, hi = -hi, -lo
+        lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
         lanes = np.arange(self.lanes)
         for end, outward in ((lo, -1.0), (hi, 1.0)):
             open_ended = ~np.isfinite(end)
@@ -79,4 +79,4 @@ class SeenContour:
     def knots(self) -> Floats:
         """Parameters, shape (knots, lanes), at which the radius of curvature jumps."""
         knots = np.array([np.broadcast_to(k, (self.lanes,)) for k in self.contour.knots], dtype=float)
-        return (-knots if self.mirrored else knots).reshape(-1, self.lanes)
+        return np.where(self.mirrored, -1.0, 1.0) * knots.reshape(-1, self.lanes)
