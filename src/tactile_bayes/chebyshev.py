@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-__all__ = ["coefficients", "derivative", "evaluate", "nodes", "polynomials"]
+__all__ = ["coefficients", "derivative", "evaluate", "nodes", "polynomials", "tabulate"]
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +35,11 @@ def coefficients(values: Floats) -> Floats:
 def evaluate(coefficients: Floats, z: Floats) -> Floats:
     """Interpolants at z, which broadcasts against the trailing axes of the coefficients."""
     return np.asarray(chebyshev.chebval(2.0 * z - 1.0, coefficients, tensor=False), dtype=float)
+
+
+def tabulate(coefficients: Floats, z: Floats) -> Floats:
+    """All interpolants at the same points z, shape (k,): an array of shape (…, k)."""
+    return np.moveaxis(np.tensordot(polynomials(coefficients.shape[0], z), coefficients, 1), 0, -1)
 
 
 def polynomials(count: int, z: Floats) -> Floats:

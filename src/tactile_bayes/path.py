@@ -31,6 +31,10 @@ Index = NDArray[np.intp]
 CHANNELS = ("holding_moment", "force_x", "force_y")
 
 
+_LAST_STEP = 1e-6
+"""Newton step on an interpolant, as a share of the segment, whose square is below the interpolation's error."""
+
+
 class Reach(IntEnum):
     """Whether a rod finds its contour."""
 
@@ -356,7 +360,7 @@ def _segments(
     locus = seen.locate(lane[:, None], start[:, None] + (stop - start)[:, None] * node)
     excess = chebyshev.coefficients(tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0)
     grid = np.concatenate([[0.0], node, [1.0]])
-    beyond = chebyshev.evaluate(excess[:, :, None], grid) > 0.0
+    beyond = chebyshev.tabulate(excess, grid) > 0.0
     piece, cell = np.nonzero(beyond[:, :-1] != beyond[:, 1:])
     sign = np.where(beyond[piece, cell], 1.0, -1.0)
     slope = chebyshev.derivative(excess)
@@ -411,7 +415,7 @@ def _first_maximum(segments: _Segments, angle: Floats) -> tuple[Index, Floats, N
     """Segments up to the first maximum of the drive angle, how far each is followed, and how the last one ends."""
     slope = chebyshev.derivative(angle)
     grid = np.linspace(0.0, 1.0, 2 * angle.shape[0] + 1)
-    falls = chebyshev.evaluate(slope[:, :, None], grid) <= 0.0
+    falls = chebyshev.tabulate(slope, grid) <= 0.0
     any_fall, cell = falls.any(axis=1), falls.argmax(axis=1)
     fold = any_fall & (cell > 0)
     before: Index = np.cumsum(any_fall) - any_fall
@@ -457,14 +461,15 @@ def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
             step = (value - wanted) / rate
         z = np.clip(z - step, 0.0, stop)
-        if np.all(np.abs(step) < 1e-9 * stop):
+        settled = np.abs(step) < _LAST_STEP * stop
+        if np.all(settled):
             return z
 
     def missing(i: Index, at: Floats) -> tuple[Floats, Floats]:
         value, rate = chebyshev.evaluate(both[:, :, 0, which[i]], at)
         return goal[i] - value, -rate
 
-    k, which = np.nonzero(~(np.abs(step) < 1e-9 * stop))
+    k, which = np.nonzero(~settled)
     goal = wanted[k, which]
     z[k, which] = falling_root(missing, np.zeros(k.size), np.broadcast_to(stop, wanted.shape)[k, which])
     return z

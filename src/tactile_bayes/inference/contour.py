@@ -1,0 +1,432 @@
+"""The posterior of a contour, given a whole record."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+from threadpoolctl import threadpool_limits
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.errors import ParameterError, ReachError
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
+from tactile_bayes.inference.families import Family, Prior, family_named
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.result import provenance, sample_stats
+from tactile_bayes.inference.start import best_optimum
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.path import Reach
+from tactile_bayes.reconstruction import reconstruct, with_rod
+from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, record_hash, rod_of, validate
+from tactile_bayes.rod import Rod
+
+__all__ = ["contours_of", "default_priors", "infer_contour"]
+
+Floats = NDArray[np.float64]
+
+_KEPT_DRAWS = 250
+"""Draws of each chain for which predictions and events are stored."""
+
+_PRIOR_DRAWS = 1000
+
+
+class _Noise(NamedTuple):
+    """What is inferred about the load cell's noise."""
+
+    cell: LoadCell
+    """In the record's units; the scale's factor applies to it."""
+    names: tuple[str, ...]
+    channels: tuple[tuple[str, ...], ...]
+    """The channels that each parameter scales."""
+    priors: dict[str, Prior]
+
+
+def infer_contour(
+    measured: xr.Dataset,
+    *,
+    family: str = "parabola",
+    load_cell: LoadCell | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    seed: int,
+    rod: Rod | None = None,
+    friction: float = 0.0,
+    settings: SamplerSettings | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> xr.DataTree:
+    """Posterior of a contour's parameters from a whole record, by independent emcee ensembles.
+
+    Every sample counts, also the unloaded ones: a contour that would have been touched later, or let go earlier, than
+    the record shows is unlikely. Contours that some sweep of the record could not reach are excluded. The walkers start
+    around a robust least-squares optimum that begins at the contact points of Step 2, or at the best of many draws from
+    the prior where channels are missing.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A record; SI or dimensionless, channels may be missing.
+    family : {"parabola", "circle"}
+        What shape the contour is known to have.
+    load_cell : LoadCell, optional
+        The sensor, in the record's units; by default the data sheet that the record carries. Its noise is taken as
+        known up to the factor `noise_scale`, which is inferred. Without any, `moment_noise` and `force_noise` are.
+    priors : mapping of str to frozen scipy.stats distribution, optional
+        In place of some of `default_priors`, in the record's units.
+    seed : int
+        The same seed, the same draws.
+    rod : Rod, optional
+        In place of the rod that an SI record states.
+    friction : float
+        Coulomb's coefficient μ, taken as known.
+    settings : SamplerSettings, optional
+        When to stop, and how much to spend at most.
+    progress : callable, optional
+        Is given a `Progress` after each look at the diagnostics.
+
+    Returns
+    -------
+    xr.DataTree
+        In ArviZ's layout and the record's units, a chain being an ensemble: `posterior`, `sample_stats`, `prior`,
+        `posterior_predictive` and `log_likelihood` (by sample; of some of the draws), `events` (first contact and
+        snap-off of each sweep, of the same draws), `observed_data`, `constant_data`. Attributes: version, seed,
+        settings, hash of the data, `converged` and a `message` in words.
+
+    Raises
+    ------
+    RecordError
+        If `measured` is no record.
+    ParameterError
+        If the family is unknown, a prior does not belong to a parameter, or the load cell has no noise on a channel.
+    InferenceError
+        If no contour of the family is found that the rod can reach.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> result = infer_contour(measured, family="parabola", load_cell=cell, seed=1, settings=quick)
+    >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
+    (True, ['a', 'q', 'x_c', 'noise_scale'])
+    """
+    measured = with_rod(validate(measured), rod)
+    settings = settings or SamplerSettings()
+    chosen = family_named(family)
+    noise = _noise(measured, load_cell)
+    chosen_priors = {**_contour_priors(measured, chosen), **noise.priors}
+    for name in priors or {}:
+        if name not in chosen_priors:
+            raise ParameterError(
+                f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}"
+            )
+    chosen_priors.update(priors or {})
+    model = _Model(measured, chosen, noise, chosen_priors, friction)
+    seeds = np.random.SeedSequence(seed).spawn(4)
+    with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
+        start = model.start(seeds[0], settings)
+        draws = sample(
+            model.log_probability, start, names=model.names, seed=seeds[1], settings=settings, progress=progress
+        )
+        groups = model.groups(draws, np.random.default_rng(seeds[2]))
+        groups["prior"] = model.prior_draws(np.random.default_rng(seeds[3]))
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = provenance(
+        draws,
+        seed=seed,
+        settings=settings,
+        data_sha256=record_hash(measured),
+        family=family,
+        friction=friction,
+        priors=json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
+        units=measured.attrs["units"],
+        **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
+        load_cell_force_noise=noise.cell.force_noise,
+        load_cell_moment_noise=noise.cell.moment_noise,
+    )
+    return tree
+
+
+def default_priors(
+    measured: xr.Dataset, family: str = "parabola", load_cell: LoadCell | None = None
+) -> dict[str, Prior]:
+    """The priors that `infer_contour` takes where it is given none, in the record's units.
+
+    They follow from pivot and rod length alone, never from what was measured. Vertex: within a rod length of the pivot
+    sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r: log-normal around L/2, both with
+    standard deviation 1 of the logarithm. noise_scale: log-normal around 1, standard deviation 0.5 of the logarithm.
+    Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Contours out of reach are excluded on top.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> list(default_priors(scan(paper_profile("II", q=0.5)).record))
+    ['a', 'q', 'x_c', 'moment_noise', 'force_noise']
+    """
+    measured = validate(measured)
+    return {**_contour_priors(measured, family_named(family)), **_noise(measured, load_cell).priors}
+
+
+def contours_of(draws: xr.Dataset, family: str) -> Contour:
+    """The contours of posterior or prior draws, with parameters of shape (all draws,)."""
+    chosen = family_named(family)
+    return chosen.build(*(draws[name].values.ravel() for name in chosen.parameters))
+
+
+def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
+    base = float(measured.base_x.mean()), float(measured.base_y.mean())
+    return family.default_priors(base, rod_of(measured).length)
+
+
+def _noise(measured: xr.Dataset, load_cell: LoadCell | None) -> _Noise:
+    cell = load_cell or LoadCell.from_record(measured)
+    present = present_channels(measured)
+    if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
+        return _Noise(cell, ("noise_scale",), (CHANNELS,), {"noise_scale": stats.lognorm(s=0.5)})
+    rod = rod_of(measured)
+    sources = {"moment_noise": (("holding_moment",), rod.moment_unit), "force_noise": (CHANNELS[1:], rod.force_unit)}
+    sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
+    return _Noise(
+        LoadCell(force_noise=1.0, moment_noise=1.0),
+        tuple(sources),
+        tuple(channels for channels, _ in sources.values()),
+        {name: stats.loguniform(1e-6 * unit, 10.0 * unit) for name, (_, unit) in sources.items()},
+    )
+
+
+def _in_words(prior: Prior) -> str:
+    law = getattr(prior, "dist", None)
+    if law is None:
+        return repr(prior)
+    arguments = [f"{a:g}" for a in prior.args] + [f"{k}={v:g}" for k, v in prior.kwds.items()]  # type: ignore[attr-defined]
+    return f"{law.name}({', '.join(arguments)})"
+
+
+class _Model:
+    """Prior times likelihood, as a function of arrays of parameters."""
+
+    def __init__(
+        self, measured: xr.Dataset, family: Family, noise: _Noise, priors: Mapping[str, Prior], friction: float
+    ) -> None:
+        self.measured = measured
+        self.family = family
+        self.noise = noise
+        self.priors = priors
+        self.names = (*family.parameters, *noise.names)
+        self.likelihood = RecordLikelihood(measured, noise.cell, friction)
+
+    def contours(self, points: Floats) -> Contour:
+        return self.family.build(*points[:, : len(self.family.parameters)].T)
+
+    def noise_scale(self, points: Floats) -> Floats:
+        """Factors on the load cell's standard deviations, shape (n, 3)."""
+        scale = np.ones((points.shape[0], len(CHANNELS)))
+        for name, channels in zip(self.noise.names, self.noise.channels, strict=True):
+            scale[:, [CHANNELS.index(c) for c in channels]] = points[:, [self.names.index(name)]]
+        return scale
+
+    def log_prior(self, points: Floats) -> Floats:
+        return np.sum([self.priors[name].logpdf(points[:, i]) for i, name in enumerate(self.names)], axis=0)
+
+    def log_probability(self, points: Floats) -> Floats:
+        """Up to the prior's normalisation over contours within reach; −inf outside its support or reach."""
+        values = self.log_prior(points)
+        inside = np.flatnonzero(np.isfinite(values))
+        if inside.size:
+            chosen = points[inside]
+            values[inside] += self.likelihood.log_likelihood(self.contours(chosen), self.noise_scale(chosen))
+        return values
+
+    def draw_prior(self, rng: np.random.Generator, count: int) -> tuple[Floats, float]:
+        """Draws within reach, and the share of all draws that they are."""
+        found, drawn = [np.empty((0, len(self.names)))], 0
+        while sum(map(len, found)) < count:
+            if drawn >= 200 * count:
+                raise ReachError(
+                    f"of {drawn} contours from the prior the rod can reach only {sum(map(len, found))} in every sweep: "
+                    "are base, rod length and units right, and the priors in the record's units?"
+                )
+            points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
+            drawn += count
+            points = points[np.isfinite(self.log_prior(points))]
+            reach = self.likelihood.paths(self.contours(points)).reach.reshape(-1, len(points))
+            found.append(points[(reach == Reach.TOUCHES).all(axis=0)])
+        points = np.concatenate(found)
+        return points[:count], len(points) / drawn
+
+    # ---- where to start
+
+    def start(self, seed: np.random.SeedSequence, settings: SamplerSettings) -> Floats:
+        """Walkers scattered twice as wide as a normal approximation around the optimum."""
+        rng = np.random.default_rng(seed)
+        size = len(self.family.parameters)
+        deviation = self._rough_noise()
+        measured = self.likelihood.measured
+        present = ~np.isnan(measured).all(axis=0)
+
+        def residuals(points: Floats) -> Floats:
+            allowed = np.isfinite(self.log_prior(self._with_noise(points, deviation)))
+            out = np.broadcast_to(measured / deviation, (len(points), *measured.shape)).copy()
+            if allowed.any():
+                predicted, _ = self.likelihood.predict(self.contours(points[allowed]))
+                out[allowed] -= predicted / deviation
+            return out[..., present].reshape(len(points), -1)
+
+        spread = np.array([float(self.priors[name].std()) for name in self.family.parameters])
+        candidates, _ = self.draw_prior(rng, 400)
+        costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
+        chosen = [candidates[i, :size] for i in np.argsort(costs)[:2]]
+        by_contacts = self._from_contacts()
+        if by_contacts is not None:
+            chosen.insert(0, by_contacts)
+        optimum = best_optimum(residuals, np.array(chosen), spread)
+
+        width = 2.0 * np.sqrt(np.diag(optimum.covariance))
+        square = np.linalg.cholesky(optimum.covariance * np.outer(*(2 * [np.minimum(spread / width, 1.0)])))
+        scale = self._fitted_noise(optimum.residuals.reshape(-1, int(present.sum())), deviation, present)
+
+        def draw(rng: np.random.Generator, count: int) -> Floats:
+            points = np.empty((count, len(self.names)))
+            points[:, :size] = optimum.point + 2.0 * rng.normal(size=(count, size)) @ square.T
+            points[:, size:] = scale * np.exp(0.2 * rng.normal(size=(count, scale.size)))
+            return points
+
+        return scatter_walkers(self.log_probability, draw, parameters=len(self.names), seed=seed, settings=settings)
+
+    def _rough_noise(self) -> Floats:
+        """Standard deviation of each channel from the median step between neighbouring samples, shape (3,)."""
+        steps = np.diff(self.likelihood.measured, axis=0)
+        deviation = np.ones(len(CHANNELS))
+        for i, column in enumerate(steps.T):
+            if not np.isnan(column).all():
+                level = 1.4826 * np.median(np.abs(column)) / np.sqrt(2.0)
+                deviation[i] = max(level, 1e-4 * np.max(np.abs(self.likelihood.measured[:, i])), 1e-12)
+        return deviation
+
+    def _with_noise(self, points: Floats, deviation: Floats) -> Floats:
+        """Contour parameters filled up with noise parameters."""
+        known = self.likelihood.load_cell.standard_deviations
+        ratio = deviation / np.array([known[name] or 1.0 for name in CHANNELS])
+        noise = [float(np.median(ratio[[CHANNELS.index(c) for c in channels]])) for channels in self.noise.channels]
+        return np.concatenate([points, np.broadcast_to(noise, (len(points), len(noise)))], axis=1)
+
+    def _fitted_noise(self, residuals: Floats, deviation: Floats, present: NDArray[np.bool_]) -> Floats:
+        """Noise parameters that fit the optimum's residuals, outliers aside."""
+        fitted = deviation.copy()
+        fitted[present] *= np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
+        return self._with_noise(np.empty((1, 0)), fitted)[0]
+
+    def _from_contacts(self) -> Floats | None:
+        """The family fitted to Step 2's contact points."""
+        if len(present_channels(self.measured)) < len(CHANNELS):
+            return None
+        contacts = reconstruct(
+            self.measured, load_cell=self.noise.cell if self.noise.names == ("noise_scale",) else None
+        )
+        force = np.hypot(self.measured.force_x.values, self.measured.force_y.values)
+        firm = (contacts.status.values == "ok") & (force > 0.1 * force.max())
+        if np.count_nonzero(firm) < 2 * len(self.family.parameters):
+            return None
+        values = self.family.fit(contacts.contact_x.values[firm], contacts.contact_y.values[firm])
+        point = np.array([values[name] for name in self.family.parameters])
+        inside = [np.isfinite(self.priors[n].logpdf(v)) for n, v in zip(self.family.parameters, point, strict=True)]
+        return point if all(inside) else None
+
+    # ---- what comes out
+
+    def groups(self, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
+        """The result's groups except the prior."""
+        chains, count, _ = draws.samples.shape
+        kept = np.unique(np.linspace(0, count - 1, min(count, _KEPT_DRAWS)).astype(int))
+        points = draws.samples[:, kept].reshape(-1, len(self.names))
+        predicted, likelihood, events = [], [], []
+        for part in np.array_split(points, max(1, len(points) // 200)):
+            contours, scale = self.contours(part), self.noise_scale(part)
+            predicted.append(self.likelihood.predict(contours)[0])
+            likelihood.append(self.likelihood.log_likelihood(contours, scale, pointwise=True))
+            events.append(self._events(contours))
+        shape = (chains, kept.size)
+        coords = {"chain": np.arange(chains), "draw": kept}
+        deviation = self._deviations(points)
+        noisy = np.concatenate(predicted) + deviation[:, None] * rng.normal(size=(len(points), *predicted[0].shape[1:]))
+        units = self._load_units()
+        predictive, observed = {}, {}
+        for i, name in enumerate(CHANNELS):
+            observed[name] = self.measured[name]
+            if name in present_channels(self.measured):
+                values = noisy[..., i].reshape(*shape, -1) * units[i]
+                predictive[name] = (("chain", "draw", "sample"), values, self.measured[name].attrs)
+        return {
+            "posterior": self._labelled(draws.samples, np.arange(count)),
+            "sample_stats": sample_stats(draws),
+            "posterior_predictive": xr.Dataset(predictive, coords=coords),
+            "log_likelihood": xr.Dataset(
+                {"record": (("chain", "draw", "sample"), np.concatenate(likelihood).reshape(*shape, -1))}, coords=coords
+            ),
+            "events": self._labelled_events(
+                {name: np.concatenate([event[name] for event in events]).reshape(*shape, -1) for name in events[0]},
+                coords,
+            ),
+            "observed_data": xr.Dataset(observed),
+            "constant_data": self.measured.drop_vars(CHANNELS).drop_attrs(deep=False),
+        }
+
+    def _labelled_events(self, events: Mapping[str, Floats], coords: Mapping[str, Any]) -> xr.Dataset:
+        units = self.measured.attrs["units"]
+        variables = {}
+        for name, values in events.items():
+            column = COLUMNS[name.removeprefix("first_").removeprefix("snap_off_")]
+            variables[name] = (("chain", "draw", "stroke"), values, {"units": column.unit_in(units)})
+        strokes = ["backward" if stroke.backward else "forward" for stroke in self.likelihood.strokes]
+        return xr.Dataset(variables, coords={**coords, "stroke": strokes})
+
+    def prior_draws(self, rng: np.random.Generator) -> xr.Dataset:
+        points, share = self.draw_prior(rng, _PRIOR_DRAWS)
+        return self._labelled(points[None], np.arange(len(points))).assign_attrs(share_within_reach=share)
+
+    def _labelled(self, samples: Floats, draw: NDArray[np.intp]) -> xr.Dataset:
+        coords = {"chain": np.arange(samples.shape[0]), "draw": draw}
+        return xr.Dataset(
+            {
+                name: (("chain", "draw"), samples[..., i], {"units": self._unit(name)})
+                for i, name in enumerate(self.names)
+            },
+            coords=coords,
+        )
+
+    def _unit(self, name: str) -> str:
+        if self.measured.attrs["units"] == "dimensionless":
+            return "1"
+        powers = {0: "1", 1: "m", -1: "1/m"}
+        return {"moment_noise": "N m", "force_noise": "N"}.get(name) or powers[self.family.length_powers.get(name, 0)]
+
+    def _load_units(self) -> Floats:
+        rod = self.likelihood.rod
+        return np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+
+    def _deviations(self, points: Floats) -> Floats:
+        """Standard deviations of the noise, dimensionless, shape (n, 3)."""
+        known = self.likelihood.load_cell.standard_deviations
+        return self.noise_scale(points) * np.array([known[name] for name in CHANNELS])
+
+    def _events(self, contours: Contour) -> dict[str, Floats]:
+        """First contact and snap-off in every stroke, in the record's units, each of shape (n, strokes)."""
+        count = contours.shape[0]
+        paths = self.likelihood.paths(contours, exact_events=True)
+        lanes = np.arange(paths.seen.lanes)
+        backward = paths.seen.mirrored
+        out = {}
+        for label, angle, parameter in (
+            ("first", paths.first_angle, paths.first_parameter),
+            ("snap_off", paths.snap_angle, paths.snap_parameter),
+        ):
+            locus = paths.seen.contour.take(lanes).locate(np.where(backward, -parameter, parameter))
+            out[f"{label}_drive_angle"] = np.where(backward, np.pi - angle, angle)
+            out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
+        return {name: values.reshape(-1, count).T for name, values in out.items()}

@@ -1,0 +1,116 @@
+"""How likely a whole record is, for many contours at once: its loaded samples, its unloaded ones, and the change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.path import Paths, Reach, trace
+from tactile_bayes.record import CHANNELS, rod_of, to_dimensionless
+
+__all__ = ["RecordLikelihood"]
+
+Floats = NDArray[np.float64]
+
+_ORDER = 16
+"""Interpolates loads to about 1e-5 of their largest value, far below any load cell's noise."""
+
+
+@dataclass(frozen=True)
+class _Stroke:
+    """Samples with one pivot and one direction."""
+
+    base: tuple[float, float]
+    backward: bool
+    samples: NDArray[np.intp]
+
+
+class RecordLikelihood:
+    """The record as a function of contour and noise.
+
+    Contours are in the record's unit of length, loads inside in EI/L and EI/L². Because loads drop to zero at snap-off,
+    contours that would have let go earlier or held on longer than the record shows are told apart by it.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    load_cell : LoadCell
+        In the record's units.
+    friction : float
+        Coulomb's coefficient μ.
+    """
+
+    def __init__(self, measured: xr.Dataset, load_cell: LoadCell, friction: float = 0.0) -> None:
+        self.rod = rod_of(measured)
+        self.friction_angle = float(np.arctan(friction))
+        record = to_dimensionless(measured)
+        self.load_cell = load_cell.dimensionless(self.rod)
+        self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
+        angle = record.drive_angle.values
+        backward = record.direction.values == "backward"
+        place = np.stack([measured.base_x.values, measured.base_y.values, backward], axis=-1)
+        kinds, which = np.unique(place, axis=0, return_inverse=True)
+        self.strokes = [
+            _Stroke((float(x), float(y)), bool(b), np.flatnonzero(which == k)) for k, (x, y, b) in enumerate(kinds)
+        ]
+        longest = max(stroke.samples.size for stroke in self.strokes)
+        self._angles = np.full((len(self.strokes), longest), np.nan)
+        for row, stroke in zip(self._angles, self.strokes, strict=True):
+            seen = angle[stroke.samples]
+            row[: seen.size] = np.pi - seen if stroke.backward else seen
+
+    def paths(self, contours: Contour, *, exact_events: bool = False) -> Paths:
+        """Paths of every contour in every stroke; lane k·n + i is contour i in stroke k."""
+        count = contours.shape[0]
+        strokes = len(self.strokes)
+        index = np.tile(np.arange(count), strokes)
+        base_x, base_y, backward = (
+            np.repeat(np.array(column), count)
+            for column in (
+                [s.base[0] for s in self.strokes],
+                [s.base[1] for s in self.strokes],
+                [s.backward for s in self.strokes],
+            )
+        )
+        seen = SeenContour(contours.take(index), base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
+        return trace(seen, friction_angle=self.friction_angle, order=_ORDER, exact_events=exact_events)
+
+    def predict(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
+        """Noise-free loads, shape (n, samples, 3), and which contours every stroke can reach, shape (n,)."""
+        count = contours.shape[0]
+        paths = self.paths(contours)
+        reached = (paths.reach == Reach.TOUCHES).reshape(-1, count).all(axis=0)
+        loads = paths.observables(np.repeat(self._angles, count, axis=0))
+        predicted = np.zeros((count, *self.measured.shape))
+        for k, stroke in enumerate(self.strokes):
+            sign = np.array([-1.0, -1.0, 1.0]) if stroke.backward else 1.0
+            predicted[:, stroke.samples] = sign * loads[k * count : (k + 1) * count, : stroke.samples.size]
+        return predicted, reached
+
+    def log_likelihood(self, contours: Contour, noise_scale: Any = 1.0, *, pointwise: bool = False) -> Floats:
+        """Log-likelihood of each contour, shape (n,), or of each sample under it, (n, samples); −inf out of reach.
+
+        Parameters
+        ----------
+        contours : Contour
+            With parameters of shape (n,).
+        noise_scale : array_like, broadcastable to shape (n, 3)
+            Factor on the load cell's standard deviations, by channel.
+        pointwise : bool
+            Whether samples are kept apart.
+        """
+        predicted, reached = self.predict(contours)
+        values = self.load_cell.log_likelihood(self.measured, predicted, noise_scale=noise_scale, pointwise=pointwise)
+        if np.any(np.isnan(values)):
+            raise ParameterError(f"the likelihood is not a number for {contours}: please report this contour")
+        values[~reached] = -np.inf
+        return values

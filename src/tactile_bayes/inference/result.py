@@ -1,0 +1,128 @@
+"""What every posterior carries, how it is stored, and how it is handed to ArviZ."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.files import write_atomically
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
+
+__all__ = ["posterior_draws", "provenance", "read_result", "sample_stats", "to_arviz", "write_result"]
+
+
+def sample_stats(draws: Draws) -> xr.Dataset:
+    """The group `sample_stats`: log-probability of every draw, and how the ensembles fared."""
+    chains, count = draws.log_probability.shape
+    return xr.Dataset(
+        {
+            "lp": (("chain", "draw"), draws.log_probability),
+            "acceptance_rate": ("chain", draws.acceptance),
+            "r_hat": ("parameter", draws.r_hat),
+            "ess_bulk": ("parameter", draws.ess_bulk),
+            "ess_tail": ("parameter", draws.ess_tail),
+            "autocorrelation_time": ("parameter", draws.autocorrelation_time),
+        },
+        coords={"chain": np.arange(chains), "draw": np.arange(count), "parameter": list(draws.names)},
+        attrs={
+            "walkers": draws.walkers,
+            "steps_run": draws.steps_run,
+            "steps_kept": draws.steps_kept,
+            "evaluations": draws.evaluations,
+            "seconds": draws.seconds,
+            "stuck": draws.stuck,
+        },
+    )
+
+
+def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha256: str, **more: Any) -> dict[str, Any]:
+    """Attributes of a result: software, seed, settings, hash of the data, and how the run ended."""
+    if isinstance(seed, np.random.SeedSequence):
+        seed_words = f"{seed.entropy}" + (f", spawn key {seed.spawn_key}" if seed.spawn_key else "")
+    else:
+        seed_words = str(seed)
+    return {
+        "inference_library": "tactile-bayes",
+        "inference_library_version": version("tactile-bayes"),
+        "sampler": f"emcee {version('emcee')}",
+        "seed": seed_words,
+        "settings": json.dumps(asdict(settings)),
+        "data_sha256": data_sha256,
+        "converged": int(draws.converged),
+        "message": draws.message,
+        **more,
+    }
+
+
+def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
+    """The posterior group of a result, or the dataset that is one already."""
+    if isinstance(result, xr.Dataset):
+        return result
+    if "posterior" not in result.children:
+        raise InferenceError(f"this tree has no group 'posterior', only {', '.join(result.children) or 'nothing'}")
+    return result["posterior"].to_dataset()
+
+
+def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
+    """Write a posterior to a NetCDF file, whole or not at all.
+
+    Parameters
+    ----------
+    result : xr.DataTree
+    path : path-like
+        Where to, with suffix .nc.
+    """
+    with write_atomically(path) as temporary:
+        result.to_netcdf(temporary, engine="h5netcdf")
+
+
+def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
+    """Read a posterior that `write_result` has written.
+
+    Raises
+    ------
+    InferenceError
+        If the file is none.
+    """
+    path = Path(path)
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            result = tree.load()
+    except FileNotFoundError:
+        raise InferenceError(f"there is no file {path}") from None
+    except (OSError, ValueError) as error:
+        raise InferenceError(f"{path} is no NetCDF file of a posterior: {error}") from error
+    posterior_draws(result)
+    return result
+
+
+def to_arviz(posterior: xr.DataTree) -> Any:
+    """A result in the form that the installed ArviZ works with.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        A result of this package.
+
+    Returns
+    -------
+    arviz.InferenceData or xr.DataTree
+        ArviZ 0.23 wants the former, from 1.0 on the latter.
+    """
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 announces its refactoring
+        import arviz
+
+    if hasattr(arviz, "InferenceData"):
+        return arviz.from_datatree(posterior)
+    return posterior
