@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ellipk, elliprd, elliprf
 
-__all__ = ["Arc", "ArcSlopes", "arc_and_slopes", "arc_to", "chord_angle", "lever", "slack", "slack_slope"]
+__all__ = ["Arc", "ArcSlopes", "arc_and_slopes", "arc_to", "chord_angle", "slack", "slack_slope", "slopes_by_chi"]
 
 Floats = NDArray[np.float64]
 
-_SHORT = 0.5
+_SHORT = 1.0
 """Below this amplitude C and S come from quadrature (their closed form cancels), above it from Carlson's integrals."""
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(9)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(14)
 
 
 class Arc(NamedTuple):
@@ -42,8 +42,6 @@ class Arc(NamedTuple):
     """S: chord across the direction at the contact."""
     turn: Floats
     """ψ − ψ1 in [0, π]."""
-    moment: Floats
-    """`lever` of the force."""
 
 
 class ArcSlopes(NamedTuple):
@@ -66,6 +64,15 @@ def arc_and_slopes(chi: Floats, m: Floats) -> tuple[Arc, ArcSlopes, ArcSlopes]:
     arc, by_chi, by_psi1 = _evaluate(chi, m, True)
     assert by_psi1 is not None
     return arc, by_chi, by_psi1
+
+
+def slopes_by_chi(chi: Floats, m: Floats) -> ArcSlopes:
+    """Derivatives by χ: the integrands."""
+    c = 2.0 * np.sqrt(m * (1.0 - m))
+    sin, w = np.sin(chi), np.sin(0.5 * chi) ** 2
+    d2 = 1.0 - m * sin * sin
+    d = np.sqrt(d2)
+    return ArcSlopes(1.0 / d, 2.0 * (c * w) ** 2 / (d2 * d), 2.0 * c * w * (1.0 - 2.0 * m * w) / (d2 * d), c * sin / d2)
 
 
 def _evaluate(chi: Floats, m: Floats, by_direction: bool) -> tuple[Arc, ArcSlopes, ArcSlopes | None]:
@@ -102,8 +109,8 @@ def _evaluate(chi: Floats, m: Floats, by_direction: bool) -> tuple[Arc, ArcSlope
         C[short] = (kernel * h).sum(-1) * c[short] ** 2
         S[short] = (kernel * thrust).sum(-1) * c[short]
 
-    arc = Arc(F, C, S, 2.0 * np.arctan2(c * w, flat), c * sin / d)
-    by_chi = ArcSlopes(1.0 / d, 2.0 * (c * w) ** 2 / d3, 2.0 * c * w * flat / d3, c * sin / d2)
+    arc = Arc(F, C, S, 2.0 * np.arctan2(c * w, flat))
+    by_chi = slopes_by_chi(chi, m)
     if not by_direction:
         return arc, by_chi, None
 
@@ -125,12 +132,6 @@ def _evaluate(chi: Floats, m: Floats, by_direction: bool) -> tuple[Arc, ArcSlope
         S_1[short] = (kernel * (-ps * thrust - 0.5 * cs * cs * (growth * thrust - 2.0 * h))).sum(-1)
     # (c w)² + (1 − 2 m w)² = Δ²; the turn by ψ1 is 2 [flat · c_1 − c · flat_1] w / Δ².
     return arc, by_chi, ArcSlopes(-0.5 * c * F_m, C_1, S_1, -2.0 * w * (p * flat + c * c * w) / d2)
-
-
-def lever(chi: Floats, m: Floats) -> Floats:
-    """√f times the lever arm of the force about the pivot: cos ψ1 sin χ / Δ."""
-    sin = np.sin(chi)
-    return 2.0 * np.sqrt(m * (1.0 - m) / (1.0 - m * sin * sin)) * sin
 
 
 def chord_angle(arc: Arc, slopes: ArcSlopes) -> tuple[Floats, Floats]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.arc import Arc, ArcSlopes, arc_to, chord_angle, slack, slack_slope
+from tactile_bayes.arc import Arc, ArcSlopes, arc_and_slopes, arc_to, chord_angle, slack, slack_slope
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.universal import tangential_arcs, tip_arcs
 
@@ -101,7 +101,7 @@ class _Touch(NamedTuple):
     """Arc length that it takes."""
 
 
-def _touch(x: Floats, y: Floats, alpha: Floats, delta: Floats) -> _Touch:
+def _touch(x: Floats, y: Floats, alpha: Floats, delta: Floats, wanted: NDArray[np.bool_] | bool = True) -> _Touch:
     """Tangential contact in forward sweeps: the chord's angle over the contour's tangent alone gives the amplitude."""
     sin, cos = np.sin(alpha), np.cos(alpha)
     along, across = x * cos + y * sin, y * cos - x * sin
@@ -146,6 +146,8 @@ def wrench_from_contact(
     friction_angle: ArrayLike = 0.0,
     *,
     side: ArrayLike = 1,
+    phase: ArrayLike | None = None,
+    derivatives: bool = True,
 ) -> Wrench:
     """What the base feels when the rod touches a contour at a given point: Step 1 for one state.
 
@@ -159,6 +161,10 @@ def wrench_from_contact(
         δ = arctan μ for a rod that slides with Coulomb's coefficient μ [rad].
     side : array_like of +1 or −1
         +1 for a contact of a forward sweep, −1 for one of a backward sweep, its mirror image.
+    phase : array_like of `TIP` or `TANGENTIAL`, optional
+        The phase, where it is known already; then only that one is computed, and not questioned.
+    derivatives : bool
+        Whether `by_slope` and `by_distance` are wanted; else they are NaN, and time is saved.
 
     Returns
     -------
@@ -180,36 +186,59 @@ def wrench_from_contact(
     x, alpha = (sign * x).ravel(), (sign * alpha).ravel()
     y, delta, sign = y.ravel(), delta.ravel(), sign.ravel()
 
-    touch = _touch(x, y, alpha, delta)
-    fields = {name: np.full(x.size, np.nan) for name in Wrench._fields}
-    phase = np.zeros(x.size, dtype=np.int8)
+    known = None if phase is None else np.broadcast_to(np.asarray(phase), shape).ravel()
     beta = alpha + delta
 
-    # Phase B: the direction at the contact is the contour's.
-    i, arc, by_chi, length = touch.where, touch.arc, touch.by_chi, touch.length
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turning = np.where(arc.turn > 0.0, by_chi.turn / chord_angle(arc, by_chi)[1], 3.0)
-    fields["tangential_arclength"][i] = length
-    b = length <= 1.0
-    j = i[b]
-    phase[j] = TANGENTIAL
-    fields["by_slope"][j] = 1.0 - turning[b]
-    fields["by_distance"][j] = 0.0
-    fields["contact_arclength"][j] = length[b]
-    fields["tip_angle"][j] = alpha[j]
-    fields["drive_angle"][j] = alpha[j] + arc.turn[b]
-    force, lever = np.zeros(x.size), np.zeros(x.size)
-    force[j], lever[j] = (arc.length[b] / length[b]) ** 2, arc.moment[b] * arc.length[b] / length[b]
-
-    # Phase A: the tip's distance and direction give amplitude and direction at the contact.
+    touch = _touch(x, y, alpha, delta, True if known is None else known == TANGENTIAL)
+    lies = touch.length <= 1.0 if known is None else np.ones(touch.where.size, dtype=bool)
     larger, smaller = np.maximum(np.abs(x), np.abs(y)), np.minimum(np.abs(x), np.abs(y))
     slack2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
+    tangential_arclength = np.full(x.size, np.nan)
+    tangential_arclength[touch.where] = touch.length
     with np.errstate(invalid="ignore"):
-        j = np.flatnonzero((fields["tangential_arclength"] > 1.0) & (slack2 >= 0.0))
-    u = x[j] * np.cos(beta[j]) + y[j] * np.sin(beta[j])
-    v = y[j] * np.cos(beta[j]) - x[j] * np.sin(beta[j])
-    tilt = np.maximum(np.arctan2(u, v), 0.0)
-    chi, tilt1, arc, by_chi, by_psi1 = tip_arcs(np.sqrt(slack2[j]), tilt)
+        ends = np.flatnonzero((tangential_arclength > 1.0 if known is None else known == TIP) & (slack2 >= 0.0))
+
+    found = np.zeros(x.size, dtype=np.int8)
+    found[touch.where[lies]], found[ends] = TANGENTIAL, TIP
+    columns = np.full((6, x.size), np.nan)
+    columns[:, touch.where[lies]] = _lying(touch, alpha[touch.where])[:, lies]
+    columns[:, ends] = _ending(x[ends], y[ends], beta[ends], np.sqrt(slack2[ends]), derivatives)
+    force, arclength, tip_angle, turn, by_slope, by_distance = columns
+
+    drive_angle = tip_angle + turn
+    mirrored = sign < 0
+    wrench = Wrench(
+        drive_angle=np.where(mirrored, np.pi - drive_angle, drive_angle),
+        holding_moment=sign * force * (x * np.cos(beta) + y * np.sin(beta)),
+        force_x=-sign * force * np.sin(beta),
+        force_y=force * np.cos(beta),
+        contact_arclength=arclength,
+        tip_angle=np.where(mirrored, np.pi - tip_angle, tip_angle),
+        phase=found,
+        by_slope=by_slope,
+        by_distance=sign * by_distance,
+        tangential_arclength=tangential_arclength,
+    )
+    return Wrench(**{name: column.reshape(shape) for name, column in wrench._asdict().items()})
+
+
+def _lying(touch: _Touch, alpha: Floats) -> Floats:
+    """Phase B: force, arc length, direction at the contact, turn, and derivatives of the drive angle."""
+    arc, by_chi, length = touch.arc, touch.by_chi, touch.length
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turning = np.where(arc.turn > 0.0, by_chi.turn / chord_angle(arc, by_chi)[1], 3.0)
+    return np.stack([(arc.length / length) ** 2, length, alpha, arc.turn, 1.0 - turning, np.zeros_like(length)])
+
+
+def _ending(x: Floats, y: Floats, beta: Floats, lack: Floats, derivatives: bool) -> Floats:
+    """Phase A, the same: distance and direction of the tip give amplitude and direction at the contact."""
+    u, v = x * np.cos(beta) + y * np.sin(beta), y * np.cos(beta) - x * np.sin(beta)
+    chi, tilt, arc = tip_arcs(lack, np.maximum(np.arctan2(u, v), 0.0))
+    out = np.full((6, lack.size), np.nan)
+    out[:4] = arc.length**2, np.ones_like(lack), beta + 0.5 * np.pi - tilt, arc.turn
+    if not derivatives:
+        return out
+    arc, by_chi, by_psi1 = arc_and_slopes(chi, np.sin(0.5 * tilt) ** 2)
     _, angle_x = chord_angle(arc, by_chi)
     angle_1 = 1.0 + chord_angle(arc, by_psi1)[1]
     value = slack(arc)
@@ -218,26 +247,9 @@ def wrench_from_contact(
         det = value_x * angle_1 - value_1 * angle_x
         by_chord = (value_x * (1.0 + by_psi1.turn) - value_1 * by_chi.turn) / det
         by_value = (angle_1 * by_chi.turn - angle_x * (1.0 + by_psi1.turn)) / det
-        at_rest = chi == 0.0
-        fields["by_slope"][j] = np.where(at_rest, np.nan, 1.0 - by_chord)
-        fields["by_distance"][j] = np.where(at_rest, -np.inf, -0.5 * by_value / value)
-    phase[j] = TIP
-    fields["contact_arclength"][j] = 1.0
-    fields["tip_angle"][j] = beta[j] + 0.5 * np.pi - tilt1
-    fields["drive_angle"][j] = fields["tip_angle"][j] + arc.turn
-    force[j], lever[j] = arc.length**2, arc.moment * arc.length
-
-    touching = phase != NONE
-    out = dict.fromkeys(("holding_moment", "force_x", "force_y"), np.full(x.size, np.nan))
-    out["holding_moment"] = np.where(touching, sign * lever, np.nan)
-    out["force_x"] = np.where(touching, -sign * force * np.sin(beta), np.nan)
-    out["force_y"] = np.where(touching, force * np.cos(beta), np.nan)
-    mirrored = sign < 0
-    for name in ("drive_angle", "tip_angle"):
-        out[name] = np.where(mirrored, np.pi - fields[name], fields[name])
-    out["by_distance"] = sign * fields["by_distance"]
-    merged = fields | out | {"phase": phase}
-    return Wrench(**{name: a.reshape(shape) for name, a in merged.items()})
+        out[4] = np.where(chi > 0.0, 1.0 - by_chord, np.nan)
+        out[5] = np.where(chi > 0.0, -0.5 * by_value / value, -np.inf)
+    return out
 
 
 def contact_from_wrench(
@@ -283,6 +295,7 @@ def contact_from_wrench(
     )
     _refuse_friction(delta)
     shape = phi0.shape
+    phi0, moment, fx, fy, delta, sign = (a.ravel() for a in (phi0, moment, fx, fy, delta, sign))
     mirrored = sign < 0
     phi0 = np.where(mirrored, np.pi - phi0, phi0)
     moment, fx = sign * moment, sign * fx
@@ -297,24 +310,30 @@ def contact_from_wrench(
         modulus = a * a + b * b
         complement = (a_cos - b) * (a_cos + b)
         usable = (force > 0.0) & (complement > 0.0) & (moment >= 0.0)
-    chi = np.where(usable, np.arctan2(b, a * np.sqrt(np.where(usable, complement, 1.0))), np.nan)
-    arc, _ = arc_to(chi.ravel(), np.where(usable, modulus, 0.5).ravel())
-    F, C, S, turn = (a.reshape(shape) for a in (arc.length, arc.shortfall, arc.offset, arc.turn))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        arclength = np.where(
-            moment > 0.0, F / np.sqrt(force), np.where(usable & (chi > 1.0), F / np.sqrt(force), np.nan)
-        )
-        shortfall, offset = arclength * (C / F), arclength * (S / F)
-    tip_angle = phi0 - turn
+        chi = np.where(usable, np.arctan2(b, a * np.sqrt(np.where(usable, complement, 1.0))), np.nan)
+        usable &= chi > 0.0  # a force without moment passes through the pivot of a straight rod: it may be anywhere
+        arc, _ = arc_to(np.where(usable, chi, np.nan), np.where(usable, modulus, 0.5))
+        arclength = arc.length / np.sqrt(force)
+        shortfall, offset = arclength * (arc.shortfall / arc.length), arclength * (arc.offset / arc.length)
+        turn = arc.turn
+    tip_angle = np.where(usable, phi0 - turn, np.nan)
     sin_t, cos_t = np.sin(tip_angle), np.cos(tip_angle)
     x = (arclength - shortfall) * cos_t - offset * sin_t
     y = (arclength - shortfall) * sin_t + offset * cos_t
-    slope = np.where(force > 0.0, beta - delta, np.nan)
-    return Contact(
+    # In a rod bent far round, m0 = f u keeps more digits; the rest of the contact lies along the force.
+    bent = chi > 1.0
+    if np.any(bent):
+        psi1 = (psi0 - turn)[bent]
+        u = moment[bent] / force[bent]
+        v = (arclength - shortfall)[bent] * np.sin(psi1) + offset[bent] * np.cos(psi1)
+        sin_b, cos_b = np.sin(beta[bent]), np.cos(beta[bent])
+        x[bent], y[bent] = u * cos_b - v * sin_b, u * sin_b + v * cos_b
+    contact = Contact(
         sign * x,
         y,
-        sign * slope,
+        sign * np.where(usable, beta - delta, np.nan),
         arclength,
         np.where(mirrored, np.pi - tip_angle, tip_angle),
         np.where(force > 0.0, modulus, np.nan),
     )
+    return Contact(*(column.reshape(shape) for column in contact))

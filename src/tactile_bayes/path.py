@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tactile_bayes import chebyshev
 from tactile_bayes.contours.base import Locus
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import Wrench, tangential_arclength, wrench_from_contact
+from tactile_bayes.elastica import TANGENTIAL, TIP, Wrench, tangential_arclength, wrench_from_contact
 from tactile_bayes.roots import falling_root
 
 __all__ = ["CHANNELS", "Paths", "Reach", "SnapOff", "States", "trace"]
@@ -215,7 +215,9 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
 
     # Over the way along the contour: drive angle and its first maximum.
     ways = np.broadcast_to(chebyshev.nodes(order), (segments.lane.size, order))
-    states = _states(seen, segments.lane[:, None], segments.take(np.s_[:, None]).along(ways)[0], friction_angle)
+    phase = np.where(segments.tip, TIP, TANGENTIAL)[:, None]
+    parameter, _ = segments.take(np.s_[:, None]).along(ways)
+    states = _states(seen, segments.lane[:, None], parameter, friction_angle, phase=phase, derivatives=False)
     angle = chebyshev.coefficients(states.wrench.drive_angle)
     keep, stop, kind = _first_maximum(segments, angle)
     loads = [chebyshev.coefficients(getattr(states.wrench, name))[:, keep] for name in CHANNELS]
@@ -266,9 +268,19 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     )
 
 
-def _states(seen: SeenContour, lane: Index, parameter: Floats, friction_angle: float) -> States:
+def _states(
+    seen: SeenContour,
+    lane: Index,
+    parameter: Floats,
+    friction_angle: float,
+    *,
+    phase: NDArray[Any] | None = None,
+    derivatives: bool = True,
+) -> States:
     locus = seen.locate(lane, parameter)
-    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle)
+    wrench = wrench_from_contact(
+        locus.x, locus.y, locus.slope_angle, friction_angle, phase=phase, derivatives=derivatives
+    )
     return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
 
 

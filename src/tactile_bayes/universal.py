@@ -15,16 +15,15 @@ from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
-from tactile_bayes.arc import Arc, ArcSlopes, arc_and_slopes, arc_to, chord_angle, lever, slack, slack_slope
+from tactile_bayes.arc import Arc, ArcSlopes, arc_and_slopes, arc_to, chord_angle, slack, slack_slope, slopes_by_chi
 from tactile_bayes.roots import falling_root
 
 __all__ = ["TangentialArcs", "TipArcs", "tangential_arcs", "tip_arcs"]
 
 Floats = NDArray[np.float64]
 
-_SETTLED = 1e-11
-"""Relative Newton step at which a first-order correction of the arc leaves nothing but rounding, and its derivatives
-can stay as they are."""
+_SETTLED = 1e-8
+"""Relative Newton step at which a first-order correction of the arc leaves nothing but rounding."""
 
 _MAX_STEPS = 40
 
@@ -50,8 +49,6 @@ class TipArcs(NamedTuple):
     tilt: Floats
     """ε1 = π/2 − ψ1."""
     arc: Arc
-    by_chi: ArcSlopes
-    by_psi1: ArcSlopes
 
 
 def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:
@@ -63,7 +60,7 @@ def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:
     level = np.minimum(angle, 0.5 * np.pi)
     guess = target * np.sqrt(chebyshev.evaluate(_tangential_table(), level / (0.5 * np.pi)))
     chi = np.where(m == 0.5, guess, np.minimum(np.sqrt(3.0 / np.sqrt(m * (1.0 - m))) * target, np.pi))
-    result = _Collected(angle.size, 10)
+    result = _Collected(angle.size, 5)
     active = np.arange(angle.size)
     for _ in range(_MAX_STEPS):
         x = chi[active]
@@ -74,13 +71,13 @@ def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:
             step = np.where(x > 0.0, (root - target[active]) * 2.0 * root / slope, 0.0)
         done = np.abs(step) <= _SETTLED * x
         x = x - step
-        result.store(active, done, (x, *_moved(arc, x, m[active], (by_chi, -step)), *by_chi))
+        result.store(active, done, (x, *_moved(arc, (by_chi, -step))))
         chi[active] = np.clip(x, 0.5 * chi[active], np.pi)
         active = active[~done]
         if not active.size:
             break
     amplitude, *rest = result.columns
-    return TangentialArcs(amplitude, Arc(*rest[:5]), ArcSlopes(*rest[5:]))
+    return TangentialArcs(amplitude, Arc(*rest), slopes_by_chi(amplitude, m))
 
 
 def tip_arcs(lack: Floats, tilt: Floats) -> TipArcs:
@@ -93,7 +90,7 @@ def tip_arcs(lack: Floats, tilt: Floats) -> TipArcs:
 
 
 def _polished_tips(lack: Floats, tilt: Floats, chi: Floats, tilt1: Floats) -> TipArcs:
-    result = _Collected(lack.size, 15)
+    result = _Collected(lack.size, 6)
     active = np.arange(lack.size)
     for _ in range(_MAX_STEPS):
         x, t = chi[active], tilt1[active]
@@ -108,15 +105,14 @@ def _polished_tips(lack: Floats, tilt: Floats, chi: Floats, tilt1: Floats) -> Ti
             dx = np.where(x > 0.0, (miss * (1.0 - angle_t) - value_t * miss_tilt) / det, 0.0)
             dt = np.where(x > 0.0, (value_x * miss_tilt + angle_x * miss) / det, 0.0)
         done = (np.abs(dx) <= _SETTLED * x) & (np.abs(dt) <= _SETTLED * t)
-        moved = _moved(arc, x - dx, np.sin(0.5 * (t - dt)) ** 2, (by_chi, -dx), (by_psi1, dt))
-        result.store(active, done, (x - dx, t - dt, *moved, *by_chi, *by_psi1))
+        result.store(active, done, (x - dx, t - dt, *_moved(arc, (by_chi, -dx), (by_psi1, dt))))
         chi[active] = np.clip(x - dx, 0.5 * x, np.minimum(1.5 * x, _CHI_MAX))
         tilt1[active] = np.clip(t - dt, 0.5 * t, 0.5 * (t + np.pi))
         active = active[~done]
         if not active.size:
             break
     amplitude, tilt_out, *rest = result.columns
-    return TipArcs(amplitude, tilt_out, Arc(*rest[:5]), ArcSlopes(*rest[5:9]), ArcSlopes(*rest[9:]))
+    return TipArcs(amplitude, tilt_out, Arc(*rest))
 
 
 class _Collected:
@@ -135,15 +131,15 @@ class _Collected:
             column[where] = value[done]
 
 
-def _moved(arc: Arc, chi: Floats, m: Floats, *steps: tuple[ArcSlopes, Floats]) -> Arc:
-    """An arc after a small step, whose amplitude and parameter are now χ and m."""
-    length, shortfall, offset, turn, _ = arc
+def _moved(arc: Arc, *steps: tuple[ArcSlopes, Floats]) -> Arc:
+    """An arc after a small step."""
+    length, shortfall, offset, turn = arc
     for slopes, step in steps:
         length = length + slopes.length * step
         shortfall = shortfall + slopes.shortfall * step
         offset = offset + slopes.offset * step
         turn = turn + slopes.turn * step
-    return Arc(length, shortfall, offset, turn, lever(chi, m))
+    return Arc(length, shortfall, offset, turn)
 
 
 @functools.cache

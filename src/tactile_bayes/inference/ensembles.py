@@ -17,8 +17,10 @@ not used.
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -259,6 +261,46 @@ class _CheckedTarget:
         return values
 
 
+class _Together:
+    """Evaluates what several ensembles ask for at the same time in one call: a vectorised target likes many points.
+
+    Every ensemble runs in a thread of its own and waits here until the others have asked as well; they make the same
+    number of requests a step. What an ensemble is answered does not depend on the others.
+    """
+
+    def __init__(self, target: LogProbability, ensembles: int) -> None:
+        self._target = target
+        self._asked: list[Floats] = [np.empty(0)] * ensembles
+        self._answers: list[Floats] = []
+        self._error: BaseException | None = None
+        self._meeting = threading.Barrier(ensembles, action=self._evaluate)
+
+    def target_of(self, ensemble: int) -> LogProbability:
+        def ask(points: Floats) -> Floats:
+            self._asked[ensemble] = points
+            self._meeting.wait()
+            if self._error is not None:
+                raise self._error
+            return self._answers[ensemble]
+
+        return ask
+
+    def _evaluate(self) -> None:
+        try:
+            values = self._target(np.concatenate(self._asked))
+            self._answers = np.split(values, np.cumsum([len(points) for points in self._asked])[:-1])
+        except BaseException as error:  # every ensemble raises it, in its own thread
+            self._error = error
+
+    def step(self, states: Iterator[Any]) -> Any:
+        """The next state of an ensemble; one that fails lets the others go."""
+        try:
+            return next(states)
+        except BaseException:
+            self._meeting.abort()
+            raise
+
+
 def _refuse_few_walkers(walkers: int, parameters: int) -> None:
     if walkers < 2 * parameters:
         raise ParameterError(
@@ -278,7 +320,7 @@ def _spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:
     return fresh.spawn(count)
 
 
-def _ensemble(start: Floats, values: Floats, target: _CheckedTarget, seed: np.random.SeedSequence) -> Iterator[Any]:
+def _ensemble(start: Floats, values: Floats, target: LogProbability, seed: np.random.SeedSequence) -> Iterator[Any]:
     """Endless states of one ensemble."""
     walkers, parameters = start.shape
     moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
@@ -296,7 +338,17 @@ def _ensemble(start: Floats, values: Floats, target: _CheckedTarget, seed: np.ra
 class _Block:
     """Consecutive steps of all ensembles; fewer than planned if time runs out or an interrupt comes."""
 
-    def __init__(self, ensembles: Sequence[Iterator[Any]], walkers: int, parameters: int, planned: int) -> None:
+    def __init__(
+        self,
+        pool: ThreadPoolExecutor,
+        together: _Together,
+        ensembles: Sequence[Iterator[Any]],
+        walkers: int,
+        parameters: int,
+        planned: int,
+    ) -> None:
+        self._pool = pool
+        self._together = together
         self._ensembles = ensembles
         self._samples = np.empty((len(ensembles), planned, walkers, parameters))
         self._values = np.empty((len(ensembles), planned, walkers))
@@ -306,8 +358,12 @@ class _Block:
         """Make the steps; the answer is empty or says what cut them short."""
         try:
             while self.steps < self._samples.shape[1]:
-                for k, states in enumerate(self._ensembles):
-                    state = next(states)
+                waiting = [self._pool.submit(self._together.step, states) for states in self._ensembles]
+                failures = [failure for failure in (one.exception() for one in waiting) if failure is not None]
+                for failure in sorted(failures, key=lambda f: isinstance(f, threading.BrokenBarrierError)):
+                    raise failure
+                for k, one in enumerate(waiting):
+                    state = one.result()
                     self._samples[k, self.steps], self._values[k, self.steps] = state.coords, state.log_prob
                 self.steps += 1
                 if time.monotonic() > deadline:
@@ -426,40 +482,42 @@ def sample(
             f"{outside} of {values.size} walkers start where the log-probability is −inf: "
             "start them inside the support, for instance with scatter_walkers"
         )
+    together = _Together(target, chains)
     ensembles = [
-        _ensemble(place, value, target, own)
-        for place, value, own in zip(points, values, _spawn(seed, chains), strict=True)
+        _ensemble(place, value, together.target_of(k), own)
+        for k, (place, value, own) in enumerate(zip(points, values, _spawn(seed, chains), strict=True))
     ]
 
     deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
     enough = max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers)
     kept, kept_values = np.empty((chains, 0, walkers, parameters)), np.empty((chains, 0, walkers))
     steps, ending = 0, ""
-    while not ending:
-        planned = max(settings.block_steps, math.ceil((_GROWTH - 1.0) * steps))
-        block = _Block(ensembles, walkers, parameters, min(planned, settings.max_steps - steps))
-        ending = block.run(deadline)
-        dropped = steps - kept.shape[1]
-        steps += block.steps
-        if not steps:
-            raise KeyboardInterrupt
-        later_half = slice(steps // 2 - dropped, None)
-        kept = np.concatenate([kept, block.samples], axis=1)[:, later_half]
-        kept_values = np.concatenate([kept_values, block.values], axis=1)[:, later_half]
-        try:
-            diagnosis = _Diagnosis(kept)
-        except KeyboardInterrupt:
-            ending, diagnosis = _INTERRUPTED, _Diagnosis(kept)
-        if ending != _INTERRUPTED and diagnosis.satisfies(settings.max_r_hat, enough):
-            ending = _CONVERGED
-        elif not ending and steps == settings.max_steps:
-            ending = _OUT_OF_STEPS
-        if progress is not None:
-            worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
+    with ThreadPoolExecutor(chains) as pool:
+        while not ending:
+            planned = max(settings.block_steps, math.ceil((_GROWTH - 1.0) * steps))
+            block = _Block(pool, together, ensembles, walkers, parameters, min(planned, settings.max_steps - steps))
+            ending = block.run(deadline)
+            dropped = steps - kept.shape[1]
+            steps += block.steps
+            if not steps:
+                raise KeyboardInterrupt
+            later_half = slice(steps // 2 - dropped, None)
+            kept = np.concatenate([kept, block.samples], axis=1)[:, later_half]
+            kept_values = np.concatenate([kept_values, block.values], axis=1)[:, later_half]
             try:
-                progress(Progress(steps, settings.max_steps, *worst, time.monotonic() - began))
+                diagnosis = _Diagnosis(kept)
             except KeyboardInterrupt:
-                ending = ending or _INTERRUPTED
+                ending, diagnosis = _INTERRUPTED, _Diagnosis(kept)
+            if ending != _INTERRUPTED and diagnosis.satisfies(settings.max_r_hat, enough):
+                ending = _CONVERGED
+            elif not ending and steps == settings.max_steps:
+                ending = _OUT_OF_STEPS
+            if progress is not None:
+                worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
+                try:
+                    progress(Progress(steps, settings.max_steps, *worst, time.monotonic() - began))
+                except KeyboardInterrupt:
+                    ending = ending or _INTERRUPTED
 
     moved = np.any(kept[:, 1:] != kept[:, :-1], axis=-1)  # (chain, step, walker)
     stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0

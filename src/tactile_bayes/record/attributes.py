@@ -1,0 +1,116 @@
+"""The attributes of a record: its units, its rod, the data sheet of its load cell, and remarks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, UNITS
+from tactile_bayes.record.table import Source
+from tactile_bayes.rod import Rod
+
+__all__ = ["checked_attributes", "completed_attributes", "rod_attributes", "same_rod", "stated_rod"]
+
+
+def rod_attributes(rod: Rod) -> dict[str, float]:
+    """A rod as attributes of a record; `stated_rod` is the inverse."""
+    return {
+        "rod_length": rod.length,
+        "rod_flexural_rigidity": rod.flexural_rigidity,
+        "rod_diameter": rod.diameter,
+    }
+
+
+def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
+    """The rod that the attributes of a record state, 1.0 for what a dimensionless record leaves out."""
+    units = attrs.get("units")
+    if not isinstance(units, str) or units not in UNITS:
+        found = "states no units" if units is None else f"has units {units!r}"
+        raise source.error(f"the record {found}: its attribute 'units' has to be 'SI' or 'dimensionless'")
+    if units == "dimensionless":
+        attrs = {**rod_attributes(Rod()), **attrs}
+    absent = [name for name in ("rod_length", "rod_flexural_rigidity") if name not in attrs]
+    if absent:
+        raise source.error(
+            f"the record is {units}, but {' and '.join(absent)} of its rod {'are' if absent[1:] else 'is'} not stated: "
+            "give rod=Rod(length=..., flexural_rigidity=...), on the command line --length and --flexural-rigidity, "
+            "or state them as attributes (in a CSV file by header lines '# rod_length: 0.1 [m]' and "
+            "'# rod_flexural_rigidity: 1.2e-05 [N m²]')"
+        )
+    length = _quantity("rod_length", attrs["rod_length"], source)
+    rigidity = _quantity("rod_flexural_rigidity", attrs["rod_flexural_rigidity"], source)
+    diameter = _quantity("rod_diameter", attrs.get("rod_diameter", 0.0), source)
+    try:
+        rod = Rod(length, rigidity, diameter)
+    except ParameterError as error:
+        raise source.error(str(error)) from error
+    if units == "dimensionless" and not rod.is_dimensionless:
+        raise source.error(
+            f"the record is dimensionless, but states rod_length {length!r} and rod_flexural_rigidity {rigidity!r}, "
+            "which are the units there, 1.0: if the columns are SI, say so in 'units'; else remove the two"
+        )
+    return rod
+
+
+def same_rod(one: Rod, other: Rod) -> bool:
+    """Whether two rods are equal up to the rounding of a few operations."""
+    pairs = zip(rod_attributes(one).values(), rod_attributes(other).values(), strict=True)
+    return all(math.isclose(*pair, rel_tol=1e-12) for pair in pairs)
+
+
+def completed_attributes(attrs: Mapping[str, Any], rod: Rod | None, source: Source) -> dict[str, Any]:
+    """The attributes with the units and the rod that are stated, given beside them, or else assumed."""
+    completed = dict(attrs)
+    if "units" not in completed:
+        of_the_rod = [name for name in attrs if name in rod_attributes(Rod())]
+        if of_the_rod:
+            raise source.error(
+                f"{of_the_rod[0]!r} is stated, but no units: state units 'SI' or 'dimensionless' "
+                "(in a CSV file by a header line '# units: SI')"
+            )
+        rod = rod or Rod()
+        completed["units"] = "dimensionless" if rod.is_dimensionless else "SI"
+    if rod is None:
+        return completed
+    completed = {**rod_attributes(rod), **completed}
+    stated = stated_rod(completed, source)
+    if not same_rod(stated, rod):
+        if completed["units"] == "dimensionless":
+            way_out = "read it without a rod, and convert it with to_si(record, rod)"
+        else:
+            way_out = "leave out the one that is wrong"
+        raise source.error(f"the {completed['units']} record states {stated}, but {rod} was given: {way_out}")
+    return completed
+
+
+def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, Any]:
+    """The attributes as strings and numbers, units and rod first, or the reason why they are none of a record."""
+    rod = stated_rod(attrs, source)
+    checked: dict[str, Any] = {"units": attrs["units"], **rod_attributes(rod)}
+    for name, value in attrs.items():
+        if name in checked:
+            continue
+        plain = value.item() if isinstance(value, np.generic | np.ndarray) and value.size == 1 else value
+        if name in ATTRIBUTE_UNITS:
+            plain = _quantity(name, plain, source)
+            if not (math.isfinite(plain) and plain >= 0):
+                raise source.error(f"attribute {name!r} is {plain!r}: give zero or a positive number")
+        is_storable = isinstance(plain, str | float) or (
+            isinstance(plain, int) and not isinstance(plain, bool) and -(2**63) <= plain < 2**63
+        )
+        if not is_storable:
+            raise source.error(f"attribute {name!r} is {value!r}: attributes of a record are strings or numbers")
+        checked[name] = plain
+    return checked
+
+
+def _quantity(name: str, value: Any, source: Source) -> float:
+    number = None if value is None else number_in(value)
+    if number is None:
+        raise source.error(f"attribute {name!r} is {value!r}: give a number [{ATTRIBUTE_UNITS[name]}]")
+    return number

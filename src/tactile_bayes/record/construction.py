@@ -1,0 +1,116 @@
+"""The construction of records, from columns and from tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.record.attributes import completed_attributes
+from tactile_bayes.record.cell import number_in
+from tactile_bayes.record.schema import CHANNELS
+from tactile_bayes.record.table import Cells, Source, Table
+from tactile_bayes.record.validation import checked_record
+from tactile_bayes.rod import Rod
+
+__all__ = ["completed_record", "make_record"]
+
+
+def make_record(
+    columns: Mapping[str, Any],
+    *,
+    rod: Rod | None = None,
+    attrs: Mapping[str, Any] | None = None,
+    missing: Collection[str] = (),
+) -> xr.Dataset:
+    """Record from a mapping of columns.
+
+    Parameters
+    ----------
+    columns : mapping of str to array, shape (n_samples,)
+        The columns of `MEASURED`, in the units of the record (angles in radians), and any further ones, numbers
+        or text; a single value stands for a whole column. base_x and base_y are 0 where they are absent. A
+        channel that the rig does not measure is a column of NaN, or named in `missing`. Attributes `units` and
+        `long_name` of a column that has them (a DataArray) are kept; true and false become 1 and 0.
+    rod : Rod, optional
+        The rod, whose length and stiffness say that the record is SI. Without it, or with the dimensionless
+        `Rod()`, the record is dimensionless: lengths in rod lengths L, moments in EI/L, forces in EI/L². Where
+        `attrs` state units and rod already, they hold.
+    attrs : mapping, optional
+        Attributes of the record, strings and numbers: `load_cell_force_noise` and `load_cell_moment_noise` are the
+        data sheet of the sensor in the record's units; others are kept as they are.
+    missing : collection of str, optional
+        Channels that the rig does not measure.
+
+    Returns
+    -------
+    xr.Dataset
+        Dimension "sample"; every variable with attributes `units` and `long_name`.
+
+    Raises
+    ------
+    RecordError
+        If the columns cannot be a record; see `validate`.
+    ParameterError
+        If `missing` names something that is not a channel.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import present_channels
+    >>> record = make_record(
+    ...     {"sweep": 0, "direction": "forward", "drive_angle": [1.2, 1.3], "holding_moment": [0.0, 0.4]},
+    ...     missing=("force_x", "force_y"),
+    ... )
+    >>> record.attrs["units"], present_channels(record)
+    ('dimensionless', ('holding_moment',))
+    """
+    cells = {str(name): (np.array(_unmasked(values)), getattr(values, "attrs", {})) for name, values in columns.items()}
+    source = Source()
+    lengths = [len(values) for values, _ in cells.values() if values.ndim == 1]
+    shape = (lengths[0] if lengths else 0,)
+    for name, (values, column_attrs) in cells.items():
+        if values.ndim == 0 and lengths:
+            cells[name] = (np.full(shape, values), column_attrs)
+        elif values.shape != shape:
+            expected = f"others have {shape}" if lengths else "(n_samples,) is wanted"
+            raise source.error(f"column {name!r} has shape {values.shape}, where {expected}: give one value per sample")
+    return completed_record(Table(cells, attrs or {}, source), rod, missing)
+
+
+def completed_record(table: Table, rod: Rod | None, missing: Collection[str]) -> xr.Dataset:
+    """The record that a table makes with the rod and the missing channels that were given beside it."""
+    return checked_record(
+        Table(
+            _with_missing(table, missing),
+            completed_attributes(table.attrs, rod, table.source),
+            table.source,
+        )
+    )
+
+
+def _with_missing(table: Table, missing: Collection[str]) -> dict[str, Cells]:
+    """The columns with an empty one for each channel that is declared missing."""
+    columns = dict(table.columns)
+    for name in (missing,) if isinstance(missing, str) else missing:
+        if name not in CHANNELS:
+            raise ParameterError(f"missing={missing!r}: {name!r} is no channel; the channels are {', '.join(CHANNELS)}")
+        if name not in columns:
+            columns[name] = (np.full(table.samples, np.nan), {})
+        elif not all(_is_empty(cell) for cell in columns[name][0].tolist()):
+            raise table.source.error(
+                f"column {name!r} has values, but is declared missing: leave it out of missing=, or empty the column"
+            )
+    return columns
+
+
+def _is_empty(cell: Any) -> bool:
+    number = number_in(cell)
+    return number is not None and math.isnan(number)
+
+
+def _unmasked(values: Any) -> Any:
+    return np.ma.filled(values.astype(float), np.nan) if isinstance(values, np.ma.MaskedArray) else values

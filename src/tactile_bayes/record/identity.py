@@ -1,0 +1,64 @@
+"""The identity of a record: a hash of what was measured."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.record.schema import COLUMNS, MEASURED
+from tactile_bayes.record.units import rod_of
+from tactile_bayes.record.validation import validate
+
+__all__ = ["record_hash"]
+
+
+def record_hash(record: xr.Dataset) -> str:
+    """SHA-256 of what was measured: names, values and units of the columns of `MEASURED`, and the rod.
+
+    Columns of truth and other further columns, the order of columns, and other attributes do not matter. A record
+    has the same hash before and after it was written to a file.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+
+    Raises
+    ------
+    RecordError
+        If `record` is not a record.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import make_record
+    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "force_y": [0.1], "force_x": [0.0]}
+    >>> plain = make_record(columns, missing=("holding_moment",))
+    >>> record_hash(plain) == record_hash(plain.assign(truth_force_y=plain["force_y"] + 0.01))
+    True
+    """
+    record = validate(record)
+    digest = hashlib.sha256()
+
+    def add(content: bytes) -> None:
+        digest.update(len(content).to_bytes(8, "little") + content)
+
+    rod = rod_of(record)
+    add(str(record.attrs["units"]).encode())
+    add(np.array([rod.length, rod.flexural_rigidity, rod.diameter], dtype="<f8").tobytes())
+    for name in MEASURED:
+        values = record[name].values
+        add(f"{name} [{record[name].attrs['units']}]".encode())
+        if COLUMNS[name].kind == "text":
+            add("\n".join(values.tolist()).encode())
+        elif COLUMNS[name].kind == "integer":
+            add(values.astype("<i8").tobytes())
+        else:  # one NaN for all, whatever its bits
+            add(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,47 @@
+"""The NetCDF form of a record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from tactile_bayes.record.table import Source, Table, table_of
+
+__all__ = ["read_netcdf", "write_netcdf"]
+
+
+def read_netcdf(path: Path) -> Table:
+    """Read a table."""
+    source = Source(str(path))
+    try:
+        with xr.open_dataset(
+            path,
+            engine="h5netcdf",
+            mask_and_scale=False,
+            decode_times=False,
+            decode_timedelta=False,
+            decode_coords=False,
+        ) as stored:
+            record = stored.load()
+    except FileNotFoundError:  # which is an OSError
+        raise
+    except (OSError, ValueError) as error:
+        raise source.error(f"this is no NetCDF file that can be read ({error}): write it again") from error
+    return table_of(record, source)
+
+
+def write_netcdf(record: xr.Dataset, path: Path) -> None:
+    """Write a record that has been validated."""
+    record = record.reset_coords([name for name in record.coords if name not in record.dims])
+    encoding: dict[Any, dict[str, Any]] = {}
+    for name, variable in record.variables.items():
+        if variable.dtype.kind == "U":  # as fixed-width characters, which every NetCDF library reads
+            dimension = f"{name}_length"
+            while dimension in record.variables:
+                dimension += "_"
+            encoding[name] = {"dtype": "S1", "char_dim_name": dimension}
+        else:
+            encoding[name] = {"_FillValue": None}
+    record.to_netcdf(path, engine="h5netcdf", encoding=encoding)

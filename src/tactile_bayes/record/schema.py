@@ -1,0 +1,142 @@
+"""The schema of a record: its columns, its attributes, and what they mean."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Literal
+
+__all__ = [
+    "ATTRIBUTE_UNITS",
+    "CHANNELS",
+    "COLUMNS",
+    "DIRECTIONS",
+    "MEASURED",
+    "REQUIRED",
+    "UNITS",
+    "Column",
+    "Kind",
+    "Scale",
+    "column_of",
+    "same_unit",
+]
+
+Kind = Literal["integer", "number", "text"]
+Scale = Literal["length_unit", "moment_unit", "force_unit"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a column of a record means.
+
+    Parameters
+    ----------
+    name : str
+        Name of the column.
+    kind : {"integer", "number", "text"}
+        What its cells are.
+    unit : str
+        Unit in an SI record; "1" for pure numbers and words.
+    scale : {"length_unit", "moment_unit", "force_unit"} or None
+        The property of `Rod` that a dimensionless value is multiplied with to be SI; None where both are the same.
+    long_name : str
+        What it is, in words.
+
+    Examples
+    --------
+    >>> COLUMNS["force_x"].unit, COLUMNS["force_x"].unit_in("dimensionless")
+    ('N', '1')
+    """
+
+    name: str
+    kind: Kind
+    unit: str
+    scale: Scale | None
+    long_name: str
+
+    def unit_in(self, units: str) -> str:
+        """Unit of the column in a record of the given units, "SI" or "dimensionless"."""
+        return "1" if units == "dimensionless" and self.scale else self.unit
+
+
+CHANNELS = ("holding_moment", "force_x", "force_y")
+"""What the load cell measures, in the order of every array with a channel axis."""
+
+MEASURED = ("sweep", "direction", "base_x", "base_y", "drive_angle", *CHANNELS)
+"""What a record is made of; everything else is a further column."""
+
+REQUIRED = ("sweep", "direction", "drive_angle", *CHANNELS)
+"""What a table must have to be a record (a channel may be empty); base_x and base_y are 0 where they are absent."""
+
+COLUMNS: Mapping[str, Column] = MappingProxyType(
+    {
+        column.name: column
+        for column in (
+            Column("sweep", "integer", "1", None, "number of the sweep"),
+            Column("direction", "text", "1", None, "sense of the drive"),
+            Column("base_x", "number", "m", "length_unit", "horizontal position of the pivot"),
+            Column("base_y", "number", "m", "length_unit", "vertical position of the pivot"),
+            Column("drive_angle", "number", "rad", None, "slope of the rod at the pivot"),
+            Column("holding_moment", "number", "N m", "moment_unit", "moment that the drive must hold"),
+            Column("force_x", "number", "N", "force_unit", "horizontal support reaction"),
+            Column("force_y", "number", "N", "force_unit", "vertical support reaction"),
+            Column("slope_angle", "number", "rad", None, "slope angle of the contour at the contact"),
+            Column("tip_angle", "number", "rad", None, "slope of the rod at the contact"),
+            Column("contact_x", "number", "m", "length_unit", "horizontal position of the contact"),
+            Column("contact_y", "number", "m", "length_unit", "vertical position of the contact"),
+            Column("contact_arclength", "number", "m", "length_unit", "arc length from pivot to contact"),
+            Column("contact_phase", "text", "1", None, "phase of the contact"),
+        )
+    }
+)
+"""Every column whose meaning is known; `truth_` before a name means the same quantity without error."""
+
+DIRECTIONS = ("forward", "backward")
+"""Senses of the drive: slopes that grow, and slopes that shrink."""
+
+UNITS = ("SI", "dimensionless")
+"""What the attribute `units` of a record can be."""
+
+ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "rod_length": "m",
+        "rod_flexural_rigidity": "N m²",
+        "rod_diameter": "m",
+        "load_cell_force_noise": "N",
+        "load_cell_moment_noise": "N m",
+    }
+)
+"""The attributes that are quantities, with their units in an SI record."""
+
+
+def column_of(name: str) -> Column | None:
+    """What a column of this name means, or None for a column that the schema does not know.
+
+    Parameters
+    ----------
+    name : str
+        Name of a column, with `truth_` before it or without.
+
+    Examples
+    --------
+    >>> column_of("truth_contact_x").scale
+    'length_unit'
+    >>> column_of("temperature") is None
+    True
+    """
+    known = COLUMNS.get(name.removeprefix("truth_"))
+    if known is None or known.name == name:
+        return known
+    return replace(known, name=name, long_name=f"true {known.long_name}")
+
+
+def same_unit(one: str, other: str) -> bool:
+    """Whether two units differ at most in the marks that people write differently, as N m², N·m^2 and Nm2 do."""
+    return _plain(one) == _plain(other)
+
+
+def _plain(unit: str) -> str:
+    return re.sub(r"[\s^·⋅*]", "", unicodedata.normalize("NFKC", unit))

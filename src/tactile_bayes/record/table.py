@@ -1,0 +1,86 @@
+"""A table that may become a record: columns and attributes as they were found, and where that was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import RecordError
+
+__all__ = ["Cells", "Source", "Table", "table_of"]
+
+Cells = tuple[NDArray[Any], Mapping[str, Any]]
+"""The values of a column, shape (n_samples,), and its attributes."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a table comes from, so that a refusal can point at it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, if there is one.
+    lines : sequence of int, optional
+        The line of the file that each sample begins in.
+    """
+
+    name: str = ""
+    lines: Sequence[int] | None = None
+
+    def row(self, sample: int) -> str:
+        """What a sample is called."""
+        return f"sample {sample}" if self.lines is None else f"line {self.lines[sample]}"
+
+    def error(self, what: str) -> RecordError:
+        """A refusal of the table."""
+        return RecordError(f"{self.name}: {what}" if self.name else what)
+
+    def line_error(self, line: int, what: str) -> RecordError:
+        """A refusal that points at a line of the file."""
+        return self.error(f"line {line}: {what}")
+
+    def cell_error(self, sample: int, column: str, what: str) -> RecordError:
+        """A refusal that points at a cell."""
+        return self.error(f"{self.row(sample)}, column {column!r}: {what}")
+
+
+@dataclass(frozen=True)
+class Table:
+    """What may become a record.
+
+    Parameters
+    ----------
+    columns : mapping of str to Cells
+        The columns, all of one length.
+    attrs : mapping
+        Attributes of the record.
+    source : Source
+        Where both come from.
+    """
+
+    columns: Mapping[str, Cells]
+    attrs: Mapping[str, Any]
+    source: Source
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return next((len(values) for values, _ in self.columns.values()), 0)
+
+
+def table_of(dataset: xr.Dataset, source: Source) -> Table:
+    """The table in a dataset, if all its variables have the dimension "sample" alone."""
+    for name, variable in dataset.variables.items():
+        if variable.dims != ("sample",):
+            raise source.error(
+                f"variable {str(name)!r} has dimensions {variable.dims}: a column of a record has the one dimension "
+                "'sample'; drop the variable, or stack it"
+            )
+    columns = {str(name): (np.asarray(variable.values), variable.attrs) for name, variable in dataset.variables.items()}
+    return Table(columns, dataset.attrs, source)

@@ -1,0 +1,130 @@
+"""The units of a record: its rod, and the conversion to and from dimensionless numbers."""
+
+from __future__ import annotations
+
+import operator
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.errors import RecordError
+from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod
+from tactile_bayes.record.schema import column_of
+from tactile_bayes.record.table import Source
+from tactile_bayes.record.validation import validate
+from tactile_bayes.rod import Rod
+
+__all__ = ["rod_of", "to_dimensionless", "to_si"]
+
+
+def rod_of(record: xr.Dataset) -> Rod:
+    """The rod that a record was measured with; `Rod()`, with a diameter in rod lengths, if it is dimensionless.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+
+    Raises
+    ------
+    RecordError
+        If the attributes of the record state no rod, or an impossible one.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import make_record
+    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [1e-4]}
+    >>> rod_of(make_record(columns, rod=Rod(0.1, 1.2e-5), missing=("force_x", "force_y")))
+    Rod(length=0.1, flexural_rigidity=1.2e-05, diameter=0.0)
+    """
+    return stated_rod(record.attrs, Source())
+
+
+def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
+    """The record in units of its rod: lengths L, moments EI/L, forces EI/L².
+
+    Equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945. The data sheet of the load cell is converted with
+    the columns. Further columns that the schema does not know are kept as they are.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record. If it is dimensionless it is returned unchanged.
+
+    Raises
+    ------
+    RecordError
+        If `record` is not a record.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import make_record
+    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [6e-5]}
+    >>> record = make_record(columns, rod=Rod(0.1, 1.2e-5), missing=("force_x", "force_y"))
+    >>> float(to_dimensionless(record)["holding_moment"][0])
+    0.5
+    """
+    if record.attrs.get("units") == "dimensionless":
+        return record
+    return _converted(record, rod_of(record), "dimensionless")
+
+
+def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
+    """The record in SI units, as this rod would have given it; the inverse of `to_dimensionless`.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A dimensionless record, or one that is SI already, with the same rod.
+    rod : Rod
+        Length [m] and flexural rigidity [N m²]; its diameter must be that of the record's rod.
+
+    Raises
+    ------
+    RecordError
+        If `record` is not a record, or was made with a rod of another diameter.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import make_record
+    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": [0.5]}
+    >>> record = to_si(make_record(columns, missing=("force_x", "force_y")), Rod(0.1, 1.2e-5))
+    >>> float(record["holding_moment"][0]), record["holding_moment"].attrs["units"]
+    (6e-05, 'N m')
+    """
+    stated = rod_of(record)
+    if record.attrs.get("units") == "SI":
+        if not same_rod(stated, rod):
+            raise RecordError(
+                f"the record is SI already, with {stated}; for what {rod} would have given, make it dimensionless first"
+            )
+        return record
+    in_lengths = _in_lengths(rod)
+    if not same_rod(stated, in_lengths):
+        raise RecordError(
+            f"the record was made with a rod of diameter {stated.diameter!r} (in rod lengths), but {rod} has "
+            f"{in_lengths.diameter!r}: give a rod of diameter {stated.diameter * rod.length_unit!r} m"
+        )
+    return _converted(record, rod, "SI")
+
+
+def _in_lengths(rod: Rod) -> Rod:
+    """The rod in its own units."""
+    return Rod(diameter=rod.diameter / rod.length_unit)
+
+
+def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
+    """The record in other units, with the rod that it then states."""
+    converted = validate(record)
+    convert = operator.mul if units == "SI" else operator.truediv
+    for name, variable in converted.variables.items():
+        column = column_of(str(name))
+        if column is not None and column.scale is not None:
+            with np.errstate(over="ignore"):  # refused below, with the sample that it happened in
+                variable.values = convert(variable.values, getattr(rod, column.scale))
+            variable.attrs["units"] = column.unit_in(units)
+    for name, scale in (("load_cell_force_noise", rod.force_unit), ("load_cell_moment_noise", rod.moment_unit)):
+        if name in converted.attrs:
+            converted.attrs[name] = convert(converted.attrs[name], scale)
+    converted.attrs |= {"units": units, **rod_attributes(rod if units == "SI" else _in_lengths(rod))}
+    return validate(converted)

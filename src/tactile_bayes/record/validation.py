@@ -1,0 +1,198 @@
+"""The validation of records: everything that is refused, with where it is and what to do."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Collection, Iterable, Mapping
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.record.attributes import checked_attributes
+from tactile_bayes.record.cell import integer_in, number_in
+from tactile_bayes.record.schema import CHANNELS, COLUMNS, MEASURED, REQUIRED, Kind, column_of, same_unit
+from tactile_bayes.record.sweep import refuse_impossible_sweeps
+from tactile_bayes.record.table import Cells, Source, Table, table_of
+
+__all__ = ["checked_record", "validate"]
+
+
+def validate(record: xr.Dataset) -> xr.Dataset:
+    """The record, completed, or a refusal that says what is wrong with it, where, and what to do.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A candidate, dimension "sample".
+
+    Returns
+    -------
+    xr.Dataset
+        The same record with columns in the order of the schema, absent bases as 0, and `units` and `long_name`
+        on every variable. The argument is not changed.
+
+    Raises
+    ------
+    RecordError
+        If a column is missing or misspelt; a cell of a measured column is text, NaN or infinite (a channel that
+        is NaN throughout is a missing channel, and allowed); every channel is missing; a direction is neither
+        "forward" nor "backward"; drive angles look like degrees (more than a turn, 2π); one sweep has two
+        directions or two pivots, or a drive angle that runs against its direction; units are unknown, or differ
+        from column to column; the rod is not stated; there are no samples.
+
+    Notes
+    -----
+    Encoders are noisy, so a sweep runs against its direction only if every step of its drive angle does, or if
+    the least-squares trend does by more than six of its own standard errors.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import make_record
+    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.3, 1.2], "holding_moment": [0.0, 0.4]}
+    >>> make_record(columns, missing=("force_x", "force_y"))
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.RecordError: sweep 0 is labelled 'forward', but its drive angle decreases, from 1.3 rad (sample 0) to 1.2 rad (sample 1): label it 'backward', or put its samples in the order in which they were measured
+    """  # noqa: E501
+    source = Source()
+    if not isinstance(record, xr.Dataset):
+        raise source.error(f"a record is an xarray.Dataset, not a {type(record).__name__}: build one with make_record")
+    checked = checked_record(table_of(record, source))
+    return checked.set_coords([name for name in record.coords if name in checked.data_vars])
+
+
+def checked_record(table: Table) -> xr.Dataset:
+    """The record that a table makes, or the reason why it makes none."""
+    columns, attrs, source = table.columns, table.attrs, table.source
+    for name in chain(columns, attrs):
+        if not _is_storable(name):
+            raise source.error(
+                f"the name {name!r} cannot be stored in every file: use printable characters, no '/', and not '.' alone"
+            )
+    attributes = checked_attributes(attrs, source)
+    _refuse_absent_columns(columns, source)
+    if table.samples == 0:
+        raise source.error("there are no samples: give at least one row below the column names")
+
+    at_origin: dict[str, Cells] = {name: (np.zeros(table.samples), {}) for name in ("base_x", "base_y")}
+    filled = at_origin | dict(columns)
+    order = [*MEASURED, *(name for name in columns if name not in MEASURED)]
+    values = {name: _parsed(name, filled[name][0], source) for name in order}
+    _refuse_gaps(values, source)
+    refuse_impossible_sweeps(values, source)
+    variables = {
+        name: ("sample", values[name], _checked_column_attributes(name, filled[name][1], attributes["units"], source))
+        for name in order
+    }
+    return xr.Dataset(variables, attrs=attributes)
+
+
+def _is_storable(name: Any) -> bool:
+    return (
+        isinstance(name, str)
+        and name.strip() == name
+        and name not in ("", ".")
+        and name.isprintable()
+        and "/" not in name
+    )
+
+
+def _checked_column_attributes(name: str, attrs: Mapping[str, Any], units: str, source: Source) -> dict[str, Any]:
+    column = column_of(name)
+    if column is None:
+        return {"units": "unknown", "long_name": name, **attrs}
+    expected = column.unit_in(units)
+    stated = str(attrs.get("units", expected))
+    if not same_unit(stated, expected):
+        raise source.error(
+            f"column {name!r} is in [{stated}], but the record is {units}: convert the column to [{expected}], or "
+            "state the units that the record is in, and for SI the rod"
+        )
+    return {"long_name": column.long_name, **attrs, "units": expected}
+
+
+def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
+    unknown = [name for name in columns if column_of(name) is None]
+    for name in MEASURED:
+        if name in columns:
+            continue
+        is_required = name in REQUIRED
+        similar = _nearest(name, unknown, cutoff=0.6 if is_required else 0.8)
+        if similar is not None:
+            what = f"there is no column {name!r}, but a column {similar!r}: did you mean {name!r}? Rename it"
+        elif is_required:
+            what = f"there is no column {name!r} (columns: {', '.join(columns) or 'none'}): add it"
+        else:
+            continue
+        if name in CHANNELS:
+            what += f", or declare the channel missing, with an empty column or missing=({name!r},)"
+        elif not is_required:
+            what += f", or add a column {name!r} (0 for a pivot in the origin)"
+        raise source.error(what)
+
+
+def _refuse_gaps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
+    missing = [name for name in CHANNELS if np.isnan(values[name]).all()]
+    if len(missing) == len(CHANNELS):
+        raise source.error(
+            f"every load channel is empty: a record needs measurements of at least one of {', '.join(CHANNELS)}"
+        )
+    for name in MEASURED:
+        if COLUMNS[name].kind != "number" or name in missing:
+            continue
+        bad = np.flatnonzero(~np.isfinite(values[name]))
+        if bad.size:
+            way_out = ", or empty the whole column if the channel is missing" if name in CHANNELS else ""
+            content = float(values[name][bad[0]])
+            what = "is missing (nan)" if math.isnan(content) else f"is {content!r}"
+            raise source.cell_error(
+                int(bad[0]), name, f"the value {what}: give a finite number, remove the row{way_out}"
+            )
+
+
+def _parsed(name: str, values: NDArray[Any], source: Source) -> NDArray[Any]:
+    """The cells of a column as int64, float64 or text."""
+    column = column_of(name)
+    if column is not None:
+        kind: Kind = column.kind
+    elif values.dtype.kind in "biu":
+        kind = "integer"
+    elif values.dtype.kind in "US" or any(isinstance(cell, str) for cell in values if values.dtype.kind == "O"):
+        kind = "text"
+    else:
+        kind = "number"
+    if values.dtype.kind == "S":
+        values = np.char.decode(values, "utf-8")
+    if values.dtype.kind in "mM":
+        raise source.cell_error(0, name, f"{values[0]!r} is a time: give seconds, as numbers, or text")
+
+    if kind == "number" and values.dtype.kind in "biuf":
+        return values.astype(np.float64)
+    if kind == "integer" and values.dtype.kind in "bi":
+        return values.astype(np.int64)
+    if kind == "text" and values.dtype.kind == "U":
+        return values
+    dtype, parse = {"integer": (np.int64, integer_in), "number": (np.float64, number_in), "text": (np.str_, _text)}[
+        kind
+    ]
+    cells = values.tolist()
+    parsed = [parse(cell) for cell in cells]
+    if None in parsed:
+        bad = parsed.index(None)
+        what = {"integer": "an integer", "number": "a number", "text": "text"}[kind]
+        raise source.cell_error(bad, name, f"{cells[bad]!r} is not {what}: correct it, or remove the row")
+    return np.array(parsed, dtype=dtype)
+
+
+def _text(cell: Any) -> str | None:
+    return cell if isinstance(cell, str) else None
+
+
+def _nearest(name: str, candidates: Iterable[str], cutoff: float) -> str | None:
+    by_lower_case = {candidate.lower(): candidate for candidate in candidates}
+    found = difflib.get_close_matches(name.lower(), by_lower_case, n=1, cutoff=cutoff)
+    return by_lower_case[found[0]] if found else None

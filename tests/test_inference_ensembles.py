@@ -1,0 +1,380 @@
+"""The emcee driver against targets whose answer is known."""
+
+from __future__ import annotations
+
+import emcee
+import numpy as np
+import pytest
+from arviz_stats.base.array import array_stats
+from scipy import stats
+from scipy.signal import lfilter
+
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference import ensembles
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
+
+SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=40)
+
+
+def gaussian(mean, covariance):
+    precision = np.linalg.inv(covariance)
+
+    def log_probability(x):
+        return -0.5 * np.einsum("ni,ij,nj->n", x - mean, precision, x - mean)
+
+    return log_probability
+
+
+def standard(x):
+    return -0.5 * (x**2).sum(axis=-1)
+
+
+def normal_start(parameters, settings, *, scale=2.0, seed=0):
+    shape = (settings.ensembles, settings.walkers_for(parameters), parameters)
+    return scale * np.random.default_rng(seed).normal(size=shape)
+
+
+def draw_from(log_probability, parameters, *, settings=None, seed=1, scale=2.0, **options) -> Draws:
+    settings = SamplerSettings() if settings is None else settings
+    start = normal_start(parameters, settings, scale=scale)
+    names = [f"x{i}" for i in range(parameters)]
+    return sample(log_probability, start, names=names, seed=seed, settings=settings, **options)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.parametrize("parameters", [2, 5])
+def test_mean_and_sd_of_a_gaussian(parameters, scale):
+    """Mean within 4 standard errors sd/√ESS, variance within 4 · var · √(2/ESS): false alarm 6e-5 a number.
+
+    The squares mix no slower than the values, so the ESS of the values bounds the error of the variance.
+    """
+    rng = np.random.default_rng(parameters)
+    root = rng.normal(size=(parameters, parameters)) + 2.0 * np.eye(parameters)
+    covariance, mean = scale**2 * (root @ root.T), scale * rng.normal(size=parameters)
+    draws = draw_from(gaussian(mean, covariance), parameters, scale=3.0 * scale)
+    assert draws.converged, draws.message
+    values = draws.samples.reshape(-1, parameters)
+    sd = np.sqrt(np.diag(covariance))
+    ess = np.minimum(draws.ess_bulk, draws.ess_tail)
+    assert np.all(np.abs(values.mean(axis=0) - mean) < 4.0 * sd / np.sqrt(ess))
+    assert np.all(np.abs((values - mean).var(axis=0) / sd**2 - 1.0) < 4.0 * np.sqrt(2.0 / ess))
+
+
+def test_moments_of_a_truncated_gaussian():
+    """A hard wall: moments of scipy's truncated normal within 4 standard errors; false alarm 3e-4."""
+    low, high = np.array([0.0, -0.5]), np.array([np.inf, 0.25])
+    truth = stats.truncnorm(low, high)
+
+    def log_probability(x):
+        return np.where(np.all((x > low) & (x < high), axis=-1), standard(x), -np.inf)
+
+    def prior(rng, n):
+        return np.column_stack([rng.uniform(-1.0, 4.0, n), rng.uniform(-1.0, 1.0, n)])
+
+    start = scatter_walkers(log_probability, prior, parameters=2, seed=3)
+    draws = sample(log_probability, start, names=["a", "b"], seed=4)
+    assert draws.converged, draws.message
+    assert np.all(np.isfinite(draws.log_probability))
+    values = draws.samples.reshape(-1, 2)
+    mean, sd = truth.mean(), truth.std()
+    ess = np.minimum(draws.ess_bulk, draws.ess_tail)
+    assert np.all(np.abs(values.mean(axis=0) - mean) < 4.0 * sd / np.sqrt(ess))
+    cases = zip(low, high, mean, strict=True)
+    fourth = np.array([stats.truncnorm(a, b).expect(lambda x, m=m: (x - m) ** 4) for a, b, m in cases])
+    assert np.all(np.abs(((values - mean) ** 2).mean(axis=0) - sd**2) < 4.0 * np.sqrt((fourth - sd**4) / ess))
+
+
+def test_same_seed_same_draws():
+    first, again, other = (draw_from(standard, 2, settings=SMALL, seed=seed) for seed in (5, 5, 6))
+    np.testing.assert_array_equal(first.samples, again.samples)
+    np.testing.assert_array_equal(first.log_probability, again.log_probability)
+    assert not np.any(first.samples[:, -1] == other.samples[:, -1])
+    sequence = np.random.SeedSequence(5)
+    for _ in range(2):  # asking a sequence twice gives the same children
+        np.testing.assert_array_equal(draw_from(standard, 2, settings=SMALL, seed=sequence).samples, first.samples)
+
+
+def test_ensembles_are_independent_of_each_other_and_of_numpys_global_state():
+    settings = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=20)
+    start = normal_start(2, settings)
+    start[1] = start[0]
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    draws = sample(standard, start, names=["a", "b"], seed=1, settings=settings)
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+    assert not np.array_equal(draws.samples[0], draws.samples[1])
+
+
+def test_walker_major_layout_gives_the_right_effective_sample_size():
+    """Walkers with a known autocorrelation ρ^t: τ = (1 + ρ)/(1 − ρ), effective sample size N/τ.
+
+    Sokal's error of an estimated τ with window M is τ √(2 (2M + 1)/N); Geyer's window is below 5 τ. Four of these, plus
+    the 2 τ/n that the seams between walkers take away, bound the difference. Laid out step by step, the same draws look
+    nearly independent for as long as the number of walkers exceeds the window.
+    """
+    rho, chains, steps, walkers = 0.8, 4, 2000, 32
+    tau = (1.0 + rho) / (1.0 - rho)
+    noise = np.random.default_rng(7).normal(size=(chains, steps + 200, walkers, 1))
+    samples = lfilter([1.0], [1.0, -rho], noise, axis=1)[:, 200:]
+    draws = chains * steps * walkers
+    laid_out = ensembles._walker_major(samples)
+    np.testing.assert_array_equal(laid_out[1, :steps, 0], samples[1, :, 0, 0])
+    np.testing.assert_array_equal(laid_out[2, -steps:, 0], samples[2, :, -1, 0])
+    ess = array_stats.ess(laid_out, chain_axis=0, draw_axis=1)[0]
+    error = 4.0 * np.sqrt(2.0 * (10.0 * tau + 1.0) / draws) + 2.0 * tau / steps
+    assert ess == pytest.approx(draws / tau, rel=error)
+    assert ensembles._autocorrelation_time(samples)[0] == pytest.approx(tau, rel=error)
+    step_major = array_stats.ess(samples.reshape(chains, -1, 1), chain_axis=0, draw_axis=1)[0]
+    assert step_major > 0.5 * tau * ess
+
+
+def test_arviz_and_emcee_agree_on_a_real_run():
+    """Over 100 autocorrelation times the two estimates agree within Sokal's error and emcee's bias of a few τ/n."""
+    settings = SamplerSettings(walkers=16, block_steps=2000, max_steps=2000, min_ess=1e9)
+    draws = draw_from(standard, 2, settings=settings)
+    tau = draws.autocorrelation_time
+    count = draws.samples.shape[0] * draws.samples.shape[1]
+    assert draws.by_walker().shape == (4, 16, 1000, 2)
+    np.testing.assert_array_equal(draws.by_walker()[1, 2], draws.samples[1, 2 * 1000 : 3 * 1000])
+    np.testing.assert_allclose(draws.log_probability, standard(draws.samples), rtol=1e-12)
+    error = 4.0 * np.sqrt(2.0 * (10.0 * tau + 1.0) / count) + 5.0 * tau / draws.steps_kept
+    assert np.all(np.abs(draws.ess_bulk * tau / count - 1.0) < error)
+    step_major = draws.by_walker().transpose(0, 2, 1, 3).reshape(4, -1, 2)
+    assert np.all(array_stats.ess(step_major, chain_axis=0, draw_axis=1) > 3.0 * draws.ess_bulk)
+
+
+def test_a_run_out_of_steps_says_so():
+    seen: list[Progress] = []
+    draws = draw_from(standard, 2, settings=SMALL, progress=seen.append)
+    assert not draws.converged
+    assert "not converged" in draws.message
+    assert any(name in draws.message for name in draws.names)
+    assert (draws.steps_run, draws.steps_kept, draws.walkers) == (40, 20, 8)
+    assert draws.evaluations == 2 * 8 * (1 + 40)
+    assert [p.steps for p in seen] == [20, 40]
+    assert all(p.max_steps == 40 and p.r_hat > 0.0 and p.ess > 0.0 and p.seconds >= 0.0 for p in seen)
+    assert np.all((draws.acceptance > 0.0) & (draws.acceptance < 1.0))
+
+
+def test_a_run_out_of_time_says_so():
+    draws = draw_from(standard, 2, settings=SamplerSettings(max_seconds=1e-9))
+    assert not draws.converged
+    assert "time" in draws.message
+    assert draws.steps_run == 1
+
+
+def test_separated_modes_are_not_declared_converged():
+    def log_probability(x):
+        return np.logaddexp(-0.5 * (x[:, 0] + 50.0) ** 2, -0.5 * (x[:, 0] - 50.0) ** 2)
+
+    settings = SamplerSettings(ensembles=4, walkers=16, block_steps=100, max_steps=300)
+    start = normal_start(1, settings, scale=1.0) + np.array([-50.0, 50.0, 50.0, -50.0])[:, None, None]
+    draws = sample(log_probability, start, names=["x"], seed=1, settings=settings)
+    assert not draws.converged
+    assert draws.r_hat[0] > 1.5
+
+
+def test_a_common_drift_is_not_declared_converged():
+    """All ensembles still on their way to the target, side by side: only early against late steps can tell."""
+    settings = SamplerSettings(ensembles=4, walkers=16, block_steps=40, max_steps=40, min_ess=1.0)
+    start = normal_start(2, settings, scale=1e-3) + 100.0
+    draws = sample(standard, start, names=["a", "b"], seed=1, settings=settings)
+    assert not draws.converged
+    assert np.all(draws.r_hat > 1.05)
+
+
+def test_the_mean_walker_has_to_give_five_effective_draws():
+    settings = SamplerSettings(ensembles=2, walkers=64, block_steps=10, max_steps=4000, min_ess=1.0, max_r_hat=10.0)
+    draws = draw_from(standard, 2, settings=settings)
+    assert draws.converged
+    assert np.all(np.minimum(draws.ess_bulk, draws.ess_tail) >= 5 * 2 * 64)
+
+
+def test_stuck_walkers_are_reported():
+    def log_probability(x):
+        far = np.abs(x[:, 0] - 1e6) < 1e-8
+        return np.where(far, 1e3, standard(x))
+
+    settings = SamplerSettings(ensembles=2, walkers=8, block_steps=100, max_steps=100)
+    start = normal_start(2, settings)
+    start[0, 3, 0] = 1e6
+    draws = sample(log_probability, start, names=["a", "b"], seed=1, settings=settings)
+    assert draws.stuck == 1
+    assert "1 of 16 walkers" in draws.message
+    assert np.all(np.isinf(draws.autocorrelation_time))
+
+
+@pytest.mark.parametrize("calls", [10, 60])
+def test_an_interrupt_leaves_what_has_been_drawn(calls):
+    """The draws are those of a run that was planned to end after as many steps."""
+    count = 0
+
+    def log_probability(x):
+        nonlocal count
+        count += 1
+        if count == calls:
+            raise KeyboardInterrupt
+        return standard(x)
+
+    draws = draw_from(log_probability, 2, settings=SMALL)
+    assert not draws.converged
+    assert "interrupted" in draws.message
+    steps = draws.steps_run
+    assert 1 <= steps < 40
+    assert draws.samples.shape == (2, 8 * draws.steps_kept, 2)
+    planned = SamplerSettings(ensembles=2, walkers=8, block_steps=steps, max_steps=steps)
+    np.testing.assert_array_equal(draws.samples, draw_from(standard, 2, settings=planned).samples)
+
+
+def test_an_interrupt_from_the_progress_callable_leaves_what_has_been_drawn():
+    def stop(_):
+        raise KeyboardInterrupt
+
+    draws = draw_from(standard, 2, settings=SMALL, progress=stop)
+    assert draws.steps_run == 20
+    assert not draws.converged
+    assert "interrupted" in draws.message
+
+
+def test_an_interrupt_of_the_diagnosis_leaves_what_has_been_drawn(monkeypatch):
+    interrupted = False
+
+    def rhat(*arguments, **options):
+        nonlocal interrupted
+        if not interrupted:
+            interrupted = True
+            raise KeyboardInterrupt
+        return np.array([1.0, 1.0])
+
+    monkeypatch.setattr(ensembles.array_stats, "rhat", rhat)
+    draws = draw_from(standard, 2, settings=SMALL)
+    assert draws.steps_run == 20
+    assert not draws.converged
+    assert "interrupted" in draws.message
+
+
+def test_an_interrupt_before_the_first_step_is_passed_on():
+    count = 0
+
+    def log_probability(x):
+        nonlocal count
+        count += 1
+        if count > 2:
+            raise KeyboardInterrupt
+        return standard(x)
+
+    with pytest.raises(KeyboardInterrupt):
+        draw_from(log_probability, 2, settings=SMALL)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_log_probability_that_is_no_number_is_refused_with_the_point(bad, capsys):
+    def log_probability(x):
+        return np.where(x[:, 1] > 1.0, bad, standard(x))
+
+    settings = SamplerSettings(ensembles=2, walkers=8)
+    start = np.clip(normal_start(2, settings, scale=0.4), -0.9, 0.9)
+    with pytest.raises(InferenceError, match=r"x0 = \S+, x1 = 1\."):
+        sample(log_probability, start, names=["x0", "x1"], seed=1, settings=settings)
+    printed = capsys.readouterr()
+    assert printed.out == printed.err == ""
+
+
+def test_a_log_probability_of_the_wrong_shape_is_refused():
+    with pytest.raises(InferenceError, match="shape"):
+        draw_from(lambda x: standard(x)[:, None], 2, settings=SMALL)
+
+
+def test_bad_starts_are_refused():
+    settings = SamplerSettings(ensembles=2, walkers=8)
+    names = ["a", "b"]
+    start = normal_start(2, settings)
+
+    def half(x):
+        return np.where(x[:, 0] > 0.0, standard(x), -np.inf)
+
+    outside = int(np.count_nonzero(start[..., 0] <= 0.0))
+    with pytest.raises(InferenceError, match=rf"{outside} of 16 walkers .* scatter_walkers"):
+        sample(half, start, names=names, seed=1, settings=settings)
+    with pytest.raises(InferenceError, match="not finite"):
+        sample(standard, np.where(start > 0.0, start, np.nan), names=names, seed=1, settings=settings)
+    plane = start.copy()
+    plane[1, :, 1] = 2.0 * plane[1, :, 0]
+    with pytest.raises(InferenceError, match="ensemble 1"):
+        sample(standard, plane, names=names, seed=1, settings=settings)
+    for shape in [(2, 8, 3), (3, 8, 2), (2, 6, 2), (16, 2)]:
+        with pytest.raises(ParameterError, match="start has"):
+            sample(standard, np.zeros(shape), names=names, seed=1, settings=settings)
+    free = SamplerSettings(ensembles=2)
+    with pytest.raises(ParameterError, match="even"):
+        sample(standard, normal_start(2, free)[:, :7], names=names, seed=1, settings=free)
+    with pytest.raises(ParameterError, match="at least 6"):
+        sample(standard, np.zeros((2, 4, 3)), names=["a", "b", "c"], seed=1, settings=free)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, None, True])
+def test_bad_seeds_are_refused(seed):
+    with pytest.raises(ParameterError, match="seed"):
+        draw_from(standard, 2, settings=SMALL, seed=seed)
+
+
+def test_names_have_to_differ():
+    with pytest.raises(ParameterError, match="name of its own"):
+        sample(standard, normal_start(2, SMALL), names=["a", "a"], seed=1, settings=SMALL)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "word"),
+    [
+        ("ensembles", 1, "independent"),
+        ("ensembles", 2.0, "whole number"),
+        ("walkers", 7, "even"),
+        ("walkers", 2, "at least 4"),
+        ("block_steps", 0, "at least 1"),
+        ("max_steps", 0, "at least 1"),
+        ("max_r_hat", 1.0, "1.01"),
+        ("max_r_hat", np.nan, "1.01"),
+        ("min_ess", 0.0, "positive"),
+        ("min_ess", np.inf, "positive"),
+        ("max_seconds", 0.0, "positive"),
+    ],
+)
+def test_bad_settings_are_refused(setting, value, word):
+    with pytest.raises(ParameterError, match=word):
+        SamplerSettings(**{setting: value})
+
+
+def test_walkers_of_a_target():
+    assert SamplerSettings().walkers_for(2) == 32
+    assert SamplerSettings().walkers_for(15) == 90
+    assert SamplerSettings(walkers=20).walkers_for(10) == 20
+    with pytest.raises(ParameterError, match="at least 22"):
+        SamplerSettings(walkers=20).walkers_for(11)
+
+
+def test_scattered_walkers_lie_inside_and_differ():
+    def log_probability(x):
+        return np.where(np.abs(x[:, 0] - 2.0) < 0.2, 0.0, -np.inf)
+
+    def wide(rng, n):
+        return rng.normal(size=(n, 2))
+
+    settings = SamplerSettings(ensembles=3, walkers=10)
+    start = scatter_walkers(log_probability, wide, parameters=2, seed=1, settings=settings)
+    assert start.shape == (3, 10, 2)
+    assert np.all(np.abs(start[..., 0] - 2.0) < 0.2)
+    assert np.unique(start).size == start.size
+    np.testing.assert_array_equal(
+        start, scatter_walkers(log_probability, wide, parameters=2, seed=1, settings=settings)
+    )
+    with pytest.raises(InferenceError, match="0 of 1000 random starting points"):
+        scatter_walkers(lambda x: np.full(len(x), -np.inf), wide, parameters=2, seed=1, settings=settings)
+
+
+def test_a_random_state_that_emcee_swallows_is_noticed(monkeypatch):
+    monkeypatch.setattr(
+        emcee.EnsembleSampler,
+        "random_state",
+        property(lambda self: ("MT19937", None, 0, 0, 0.0), lambda self, state: None),
+    )
+    with pytest.raises(InferenceError, match="random state"):
+        draw_from(standard, 2, settings=SMALL)

@@ -1,0 +1,369 @@
+"""Figures: what they take, return, draw and leave alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+
+mpl.use("Agg")
+
+from matplotlib import colors
+from matplotlib import pyplot as plt
+
+from tactile_bayes import plotting
+from tactile_bayes.contours import Circle, Parabola, paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, make_record
+from tactile_bayes.rod import Rod
+from tactile_bayes.scanning import scan
+
+ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)
+STEP = np.radians(4.0)
+PHASES = ("tip", "tangential")
+
+
+@pytest.fixture(autouse=True)
+def _settings_are_left_alone():
+    before = dict(mpl.rcParams)
+    yield
+    plt.close("all")
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return scan(paper_profile("II", q=0.5), drive_step=STEP)
+
+
+@pytest.fixture(scope="module")
+def si():
+    return scan(Parabola(5.0, q=0.05), drive_step=STEP, rod=ROD)
+
+
+@pytest.fixture(scope="module")
+def noisy(plain):
+    return LoadCell(force_noise=0.05, moment_noise=0.02).measure(plain.record, seed=1)
+
+
+@pytest.fixture(scope="module")
+def contacts(plain):
+    """Contacts as Step 2 gives them, one of them with a status that is not to be drawn."""
+    record = plain.record
+    phase = record["truth_contact_phase"].values
+    status = np.where(phase == "none", "no contact", "ok").astype(object)
+    status[np.flatnonzero(phase == "tip")[0]] = "beyond the tip"
+    columns = {name: record[f"truth_{name}"] for name in ("contact_x", "contact_y", "contact_phase")}
+    return xr.Dataset(columns).assign(status=("sample", status))
+
+
+@pytest.fixture(scope="module")
+def band():
+    x = np.linspace(-1.0, 1.0, 201)
+    y, width = 0.5 * x**2 + 0.5, 0.01 + 0.03 * np.exp(-100.0 * x**2)
+    columns = {"lower": ("x", y - width), "upper": ("x", y + width), "median": ("x", y)}
+    return xr.Dataset(columns, coords={"x": x}, attrs={"probability": 0.95})
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    rng = np.random.default_rng(1)
+    draws = ("chain", "draw")
+    columns = {
+        "a": (draws, rng.normal(0.5, 0.002, (4, 3000))),
+        "x_c": (draws, rng.normal(0.0, 0.001, (4, 3000))),
+        "flexural_rigidity": (draws, rng.normal(1.2e-5, 6e-7, (4, 3000)), {"units": "N m²"}),
+        "log_radius": ((*draws, "knot"), rng.normal(size=(4, 3000, 2))),
+    }
+    return xr.DataTree.from_dict({"posterior": xr.Dataset(columns)})
+
+
+def panels(rows, columns=1):
+    """Axes of a figure that pyplot does not know."""
+    figure = mpl.figure.Figure()
+    return figure.subplots(rows, columns, squeeze=False)
+
+
+def labels(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def lines_of(ax, phase):
+    """Lines with data in the colour of a phase."""
+    colour = colors.to_hex(plotting.PALETTE[phase])
+    return [line for line in ax.lines if colors.to_hex(line.get_color()) == colour and len(line.get_xdata())]
+
+
+def test_importing_the_module_does_not_load_matplotlib():
+    code = "import sys, tactile_bayes.plotting; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_every_function_draws_where_it_is_told_and_nowhere_else(plain, noisy, contacts, band, posterior):
+    three = panels(3)[:, 0]
+    assert list(plotting.observables(plain.record, events=plain.events, axes=three)) == list(three)
+    predicted = xr.Dataset({f"{name}_{end}": noisy[name] for name in CHANNELS for end in ("lower", "upper")})
+    three = panels(3)[:, 0]
+    assert list(plotting.predictive(noisy, predicted, axes=list(three))) == list(three)
+    ax = panels(1).item()
+    assert plotting.rods(plain, ax=ax) is ax
+    ax = panels(1).item()
+    assert plotting.contour([-1.0, 1.0], truth=plain.contour, contacts=contacts, band=band, base=(0, 0), ax=ax) is ax
+    grid = panels(5, 2)
+    assert (plotting.trace(posterior, axes=grid) == grid).all()
+    grid = panels(5, 5)
+    assert (plotting.pairs(posterior, axes=grid) == grid).all()
+    assert plt.get_fignums() == []
+
+
+def test_every_function_makes_one_figure_of_its_own(plain, posterior):
+    plotting.observables(plain.record)
+    plotting.rods(plain)
+    plotting.contour([-1.0, 1.0], truth=plain.contour)
+    plotting.trace(posterior)
+    plotting.pairs(posterior)
+    assert len(plt.get_fignums()) == 5
+    for number in plt.get_fignums():
+        plt.figure(number).canvas.draw()
+
+
+@pytest.mark.parametrize("unit", ["plain", "si"])
+def test_observables_are_labelled_with_units(unit, request):
+    result = request.getfixturevalue(unit)
+    axes = plotting.observables(result.record, events=result.events)
+    expected = {"plain": ("$EI$/$L$", "$EI$/$L^2$", "$EI$/$L^2$"), "si": ("µN m", "mN", "mN")}[unit]
+    for ax, name in zip(axes, expected, strict=True):
+        assert ax.get_ylabel().endswith(f"[{name}]")
+    assert axes[-1].get_xlabel() == r"drive angle $\varphi_0$ [°]"
+    axes[0].figure.canvas.draw()
+    ticks = {text.get_text() for text in axes[0].get_yticklabels()}
+    assert ("−250" if unit == "si" else "−2.5") in ticks
+
+
+def test_lines_of_a_scan_run_from_event_to_event(plain):
+    axes = plotting.observables(plain.record, events=plain.events)
+    for ax, name in zip(axes, CHANNELS, strict=True):
+        forward = plain.events["forward"]
+        tip, tangential = ([line for line in lines_of(ax, p) if line.get_linestyle() == "-"] for p in PHASES)
+        (change,) = forward.transitions
+        for line, first, last in ((tip[0], forward.first_contact, change), (tangential[0], change, forward.snap_off)):
+            x, y = line.get_data()
+            np.testing.assert_allclose(x[[0, -1]], np.degrees([first.drive_angle, last.drive_angle]), rtol=1e-12)
+            np.testing.assert_allclose(y[[0, -1]], [getattr(first, name), getattr(last, name)], atol=1e-12)
+    assert labels(axes[0])[:4] == ["forward", "backward", "tip contact", "tangential contact"]
+    assert set(labels(axes[0])[4:]) == {"first contact", "phase change", "snap-off"}
+
+
+def test_noise_is_drawn_as_points_over_the_truth(noisy, plain):
+    axes = plotting.observables(noisy, events=plain.events)
+    for ax, name in zip(axes, CHANNELS, strict=True):
+        points = lines_of(ax, "sample")
+        assert [line.get_marker() for line in points] == ["o", "^"]
+        for line, number in zip(points, (0, 1), strict=True):
+            assert line.get_linestyle() == "None"
+            np.testing.assert_array_equal(line.get_ydata(), noisy[name].values[noisy["sweep"].values == number])
+        assert lines_of(ax, "tip")
+    assert "true tip contact" in labels(axes[0])
+
+
+def test_record_of_a_rig_has_points_only():
+    columns = {"sweep": 0, "direction": "backward", "drive_angle": [1.3, 1.2, 1.1], "holding_moment": [0.0, -0.4, -0.5]}
+    record = make_record(columns, missing=("force_x", "force_y"))
+    axes = plotting.observables(record)
+    assert labels(axes[0]) == ["measured backward"]
+    for ax in axes[1:]:
+        assert [text.get_text() for text in ax.texts] == ["not measured"]
+        assert ax.get_ylabel()
+
+
+def test_records_without_holding_moment_keep_their_legend(noisy):
+    record = noisy.copy()
+    record["holding_moment"] = record["holding_moment"] * np.nan
+    axes = plotting.observables(record)
+    assert axes[0].texts[0].get_text() == "not measured"
+    assert "measured forward" in labels(axes[0])
+
+
+def test_single_sweep_has_a_single_style(si):
+    record = si.record.isel(sample=si.record["direction"].values == "forward")
+    assert labels(plotting.observables(record, events=si.events)[0])[0] == "forward"
+    assert "backward" not in labels(plotting.observables(record)[0])
+
+
+def test_wrong_number_of_panels_is_refused(plain):
+    with pytest.raises(ParameterError, match="give three"):
+        plotting.observables(plain.record, axes=panels(2)[:, 0])
+
+
+def test_predicted_interval_is_filled_where_there_is_one(noisy):
+    predicted = xr.Dataset({"force_x_lower": noisy["force_x"] - 0.1, "force_x_upper": noisy["force_x"] + 0.1})
+    axes = plotting.predictive(noisy, predicted)
+    assert [len(ax.collections) for ax in axes] == [0, 2, 0]
+    assert "predicted" in labels(axes[0])
+    with pytest.raises(ParameterError, match="every sample"):
+        plotting.predictive(noisy, predicted.isel(sample=slice(3)))
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+@pytest.mark.parametrize("unit", ["plain", "si"])
+def test_rods_are_coloured_by_phase_and_end_at_their_contacts(unit, direction, request):
+    result = request.getfixturevalue(unit)
+    ax = plotting.rods(result, direction=direction, count=9)
+    length = 0.1 if unit == "si" else 1.0
+    drawn = {phase: [line for line in lines_of(ax, phase) if len(line.get_xdata()) > 50] for phase in PHASES}
+    assert len(drawn["tip"]) + len(drawn["tangential"]) == 9
+    for line in drawn["tip"]:
+        x, y = line.get_data()
+        np.testing.assert_allclose(y[-1], result.contour.height(x[-1]), atol=1e-9 * length)
+    for line in [*drawn["tip"], *drawn["tangential"]]:
+        x, y = line.get_data()
+        # The rod's clearance is nowhere negative.
+        assert (y <= result.contour.height(x) + 1e-9 * length).all()
+        assert np.hypot(np.diff(x), np.diff(y)).sum() == pytest.approx(length, rel=1e-3)
+    assert ax.get_aspect() == 1.0
+    assert ax.get_xlabel() == ("$x$ [mm]" if unit == "si" else "$x$ [$L$]")
+    assert {"phase change", "snap-off", "first contact", "pivot", "contour"} <= set(labels(ax))
+
+
+def test_rods_of_a_noisy_record_are_the_true_ones(plain, noisy):
+    """A scan whose record has been through a load cell."""
+    ax = plotting.rods(type(plain)(noisy, plain.events, plain.contour), count=5)
+    expected = plotting.rods(plain, count=5)
+    np.testing.assert_array_equal(lines_of(ax, "tip")[0].get_data(), lines_of(expected, "tip")[0].get_data())
+
+
+def test_rods_of_an_off_centre_pivot_start_there():
+    result = scan(Circle(1.0, q=0.4), base=(0.2, -0.1), direction="backward", drive_step=STEP)
+    ax = plotting.rods(result, direction="backward", count=3)
+    rods = [line for phase in PHASES for line in lines_of(ax, phase) if len(line.get_xdata()) > 50]
+    assert len(rods) == 3
+    for line in rods:
+        np.testing.assert_allclose(line.get_xydata()[0], (0.2, -0.1), atol=1e-12)
+
+
+def test_rods_refuse_what_is_not_there(plain):
+    result = scan(plain.contour, direction="backward", drive_step=STEP)
+    with pytest.raises(ParameterError, match="no forward sweep: choose from backward"):
+        plotting.rods(result)
+    with pytest.raises(ParameterError, match="at least one rod"):
+        plotting.rods(plain, count=0)
+
+
+def test_contour_draws_the_contacts_that_are_ok_and_in_range(contacts, band, plain):
+    ax = plotting.contour((0.0, 0.8), truth=plain.contour, contacts=contacts, band=band, gap=(-0.05, 0.05), base=(0, 0))
+    drawn = np.concatenate([line.get_xdata() for p in PHASES for line in lines_of(ax, p) if line.get_alpha()])
+    x = contacts["contact_x"].values
+    expected = x[(contacts["status"].values == "ok") & (x >= 0.0) & (x <= 0.8)]
+    np.testing.assert_array_equal(np.sort(drawn), np.sort(expected))
+    assert expected.size > 5
+    assert [text.get_text() for text in ax.texts] == ["gap"]
+    assert set(labels(ax)) == {
+        "95 % band",
+        "median",
+        "true contour",
+        "tip contact",
+        "tangential contact",
+        "pivot",
+    }
+    assert ax.get_aspect() == 1.0
+    low, high = ax.get_xlim()
+    assert low == pytest.approx(-0.024)
+    assert high == pytest.approx(0.824)
+
+
+def test_contacts_without_phase_or_status_are_drawn_all(contacts):
+    ax = plotting.contour((-1.0, 1.0), contacts=contacts[["contact_x", "contact_y"]])
+    assert labels(ax) == ["contact"]
+
+
+def test_contour_says_whether_there_is_a_gap_or_an_overlap():
+    assert plotting.contour((-1.0, 1.0), gap=(0.1, -0.1)).texts[0].get_text() == "overlap"
+
+
+def test_contour_takes_units_from_what_it_is_given(contacts, band):
+    for name in ("contact_x", "contact_y"):
+        contacts = contacts.assign({name: (0.1 * contacts[name]).assign_attrs(units="m")})
+    assert plotting.contour((-0.1, 0.1), contacts=contacts).get_xlabel() == "$x$ [mm]"
+    in_metres = band.assign(lower=band["lower"].assign_attrs(units="m"))
+    assert plotting.contour((-1.0, 1.0), band=in_metres).get_ylabel() == "$y$ [m]"
+    assert plotting.contour((-1.0, 1.0), band=band).get_ylabel() == "$y$ [$L$]"
+
+
+def test_true_contour_ends_where_it_ends():
+    ax = plotting.contour((-2.0, 2.0), truth=Circle(1.0, q=0.3))
+    x, y = ax.lines[0].get_data()
+    assert (x.min(), x.max()) == (-1.0, 1.0)
+    assert np.isfinite(y).all()
+
+
+@pytest.mark.parametrize("x", [0.5, [0.5, 0.5], [0.0, np.nan]])
+def test_contour_refuses_what_is_no_range(x):
+    with pytest.raises(ParameterError, match="span the range"):
+        plotting.contour(x)
+
+
+def test_trace_thins_and_shows_every_chain(posterior):
+    grid = plotting.trace(posterior)
+    assert grid.shape == (5, 2)
+    for left, right in grid:
+        assert len(left.lines) == len(right.patches) == 4
+        assert all(1000 <= len(line.get_xdata()) <= 2000 for line in left.lines)
+    assert [ax.get_xlabel() for ax in grid[:, 1]] == [
+        "$a$",
+        r"$x_{\mathrm{c}}$",
+        "flexural rigidity [$10^{-6}$ N m²]",
+        "log radius[0]",
+        "log radius[1]",
+    ]
+
+
+def test_densities_of_a_trace_are_densities(posterior):
+    (_, right), *_ = plotting.trace(posterior, names=["a"])
+    for patch in right.patches:
+        values, edges, _ = patch.get_data()
+        assert (values * np.diff(edges)).sum() == pytest.approx(1.0)
+
+
+def test_pairs_shows_truth_and_regions(posterior):
+    grid = plotting.pairs(posterior["posterior"].to_dataset(), names=["a", "x_c"], truth={"a": 0.6})
+    assert grid.shape == (2, 2)
+    assert not grid[0, 1].axison
+    assert [line.get_xdata()[0] for line in grid[0, 0].lines] == [0.6]
+    assert grid[1, 0].get_xlim()[1] > 0.6
+    assert grid[1, 0].get_xlabel() == "$a$"
+
+
+def test_regions_of_highest_density_hold_what_they_say():
+    """Analytic: a Gaussian's region of probability p ends where its density is 1 − p of the greatest."""
+    x = np.linspace(-6.0, 6.0, 401)
+    density = np.exp(-0.5 * (x[:, None] ** 2 + x**2))
+    np.testing.assert_allclose(plotting._highest_density(density, (0.95, 0.5)), [0.05, 0.5], rtol=1e-2)
+
+
+def test_levels_differ_when_all_draws_are_in_one_cell():
+    low, high = plotting._highest_density(np.diag([0.0, 1.0]), (0.95, 0.5))
+    assert low < high
+
+
+def test_odd_posteriors_are_drawn():
+    rng = np.random.default_rng(2)
+    draws = rng.exponential(size=(2, 40))
+    draws[0, 0] = np.nan
+    columns = {"fixed": (("chain", "draw"), np.full((2, 40), 2.0)), "q": (("chain", "draw"), draws)}
+    for function in (plotting.trace, plotting.pairs):
+        function(xr.Dataset(columns))[0, 0].figure.canvas.draw()
+
+
+def test_unknown_names_are_refused(posterior):
+    for function in (plotting.trace, plotting.pairs):
+        with pytest.raises(ParameterError, match="no b: it has a, x_c"):
+            function(posterior, names=["b"])
+        with pytest.raises(ParameterError, match="is wanted"):
+            function(posterior, names=["a"], axes=panels(2, 2))
+    with pytest.raises(ParameterError, match="truth names b"):
+        plotting.pairs(posterior, truth={"b": 0.5})

@@ -1,0 +1,283 @@
+"""The files of a record: CSV and NetCDF."""
+
+from __future__ import annotations
+
+import os
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis.extra import numpy as hnp
+
+from helpers.record_tables import WIRE, columns, refused
+from tactile_bayes.record import (
+    CHANNELS,
+    column_of,
+    make_record,
+    present_channels,
+    read_record,
+    record_hash,
+    rod_of,
+    write_record,
+)
+from tactile_bayes.rod import Rod
+
+HEADER = "sweep,direction,drive_angle,holding_moment,force_x,force_y"
+ROW = "0,forward,1.25,0.5,0.125,0.25"
+
+
+def write_text(path, *lines):
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+words = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=12)
+names = st.text(st.characters(exclude_categories=("Cs", "Cc")), min_size=1, max_size=8).filter(
+    lambda name: name.strip() == name and name.isprintable() and "/" not in name and name not in (".", "sample")
+)
+
+
+@st.composite
+def records(draw):
+    """Records with extreme numbers, odd words and names, missing channels, in SI or without dimension."""
+    table = columns(
+        base_x=np.full(6, draw(finite)),
+        drive_angle=np.array(columns()["drive_angle"]) * draw(st.floats(0.1, 1.0)),
+        truth_contact_x=draw(hnp.arrays(float, 6, elements=st.floats(allow_infinity=True, allow_nan=False))),
+        truth_contact_y=np.where(np.arange(6) % 2, np.nan, 0.1),
+        note=draw(st.lists(words, min_size=6, max_size=6)),
+        count=draw(hnp.arrays(np.int64, 6)),
+        whole=np.arange(6.0),
+    )
+    missing = draw(st.sets(st.sampled_from(CHANNELS), max_size=2))
+    for name in CHANNELS:
+        table[name] = np.full(6, np.nan) if name in missing else draw(hnp.arrays(float, 6, elements=finite))
+    for name, (unit, long_name) in draw(st.dictionaries(names, st.tuples(words, words), max_size=3)).items():
+        if name not in table and column_of(name) is None:
+            table[name] = xr.DataArray(np.arange(6.0), dims="sample", attrs={"units": unit, "long_name": long_name})
+    attrs = draw(st.dictionaries(names, words | st.floats(allow_nan=False) | st.integers(-(2**63), 2**63 - 1)))
+    attrs = {name: value for name, value in attrs.items() if name != "units" and not name.startswith(("rod_", "load_"))}
+    return make_record(table, rod=draw(st.sampled_from([None, WIRE, Rod(0.1, 1e-300)])), attrs=attrs)
+
+
+def awkward_record():
+    """One of the worst that `records` may draw."""
+    tiny, huge = 5e-324, 1.7976931348623157e308
+    time = xr.DataArray(np.arange(6.0), dims="sample", attrs={"units": '] "s', "long_name": "12"})
+    table = columns(
+        holding_moment=[tiny, -tiny, huge, -huge, -0.0, 0.1 + 0.2],
+        force_x=[np.nan] * 6,
+        truth_contact_x=[np.nan, np.inf, -np.inf, -0.0, tiny, 1 / 3],
+        count=np.array([-(2**63), 2**63 - 1, 0, 1, -1, 2]),
+        note=["", " a ", "1,5", '"', "\r\n", "ß€😀"],
+        digits=["1", "02", "nan", "", "-inf", "1e3"],
+        note_length=np.arange(6.0),
+        **{'key: "x" [m], #': time},
+    )
+    attrs = {"a: b": "1.0", "empty": "", "padded": " a,", "lines": "a\r\nb\u2028c", "run": 2**63 - 1, "limit": np.inf}
+    return make_record(table, rod=WIRE, attrs=attrs)
+
+
+def assert_nothing_is_lost(record, path):
+    write_record(record, path)
+    back = read_record(path)
+    assert back.identical(record)
+    assert {name: back[name].dtype.kind for name in back} == {name: record[name].dtype.kind for name in record}
+    assert {name: type(value) for name, value in back.attrs.items()} == {
+        name: type(value) for name, value in record.attrs.items()
+    }
+    for name in record:  # bits, so that the sign of zero counts
+        if record[name].dtype.kind == "f":
+            present = ~np.isnan(record[name].values)
+            assert back[name].values[present].tobytes() == record[name].values[present].tobytes()
+    assert record_hash(back) == record_hash(record)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@example(record=awkward_record())
+@given(record=records())
+def test_a_csv_file_loses_nothing(tmp_path, record):
+    assert_nothing_is_lost(record, tmp_path / "record.csv")
+
+
+# A NetCDF file takes 10 ms per column to write, and as long to read: few examples, but each with much in it.
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@example(record=awkward_record())
+@given(record=records())
+def test_a_netcdf_file_loses_nothing(tmp_path, record):
+    assert_nothing_is_lost(record, tmp_path / "record.nc")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_coordinates_are_written_as_columns(tmp_path, suffix):
+    record = make_record(columns(time=np.arange(6.0)))
+    write_record(record.set_coords("time"), tmp_path / f"record{suffix}")
+    assert read_record(tmp_path / f"record{suffix}").identical(record)
+
+
+def test_netcdf_holds_text_as_characters_and_no_objects(tmp_path):
+    write_record(make_record(columns()), tmp_path / "record.nc")
+    with xr.open_dataset(tmp_path / "record.nc", engine="h5netcdf", decode_cf=False) as stored:
+        assert stored["direction"].dtype == "S1"
+        assert all(variable.dtype != object for variable in stored.variables.values())
+
+
+def test_a_csv_file_is_read_with_the_units_in_its_header(tmp_path):
+    path = write_text(
+        tmp_path / "lab.csv",
+        "# tactile_bayes record, format 1",
+        "# units: SI",
+        "# rod_length: 0.2 [m],,,,",
+        "# rod_flexural_rigidity: 2.4e-3 [N·m^2]",
+        "# anything else that people write",
+        "# load_cell_force_noise: 0.01 [N]",
+        "# operator: somebody [trained]",
+        "# column temperature: number [degC] air",
+        "",
+        f"{HEADER}, temperature,count,ratio,note",
+        f"{ROW},20,1,1.0,a",
+        "",
+        f"{ROW},,2,2.0,3",
+    )
+    record = read_record(path)
+    assert rod_of(record) == Rod(0.2, 2.4e-3)
+    assert record.attrs["load_cell_force_noise"] == 0.01
+    assert record.attrs["operator"] == "somebody [trained]"
+    assert record["temperature"].attrs == {"units": "degC", "long_name": "air"}
+    np.testing.assert_array_equal(record["temperature"], [20, np.nan])
+    assert [record[name].dtype.kind for name in ("count", "ratio", "note")] == ["i", "f", "U"]
+
+
+def test_a_file_without_header_is_assumed_to_be_dimensionless(tmp_path):
+    path = write_text(tmp_path / "plain.csv", HEADER, ROW)
+    record = read_record(path)
+    assert (record.attrs["units"], record.attrs["units_source"]) == ("dimensionless", "assumed")
+    assert "units_source" not in read_record(path, rod=Rod()).attrs
+
+
+def test_a_file_without_header_is_si_with_a_rod(tmp_path):
+    record = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW), rod=WIRE)
+    assert record.attrs["units"] == "SI"
+    assert rod_of(record) == WIRE
+    assert "units_source" not in record.attrs
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
+    path = tmp_path / f"record{suffix}"
+    write_record(make_record(columns(), rod=WIRE), path)
+    assert rod_of(read_record(path, rod=WIRE)) == WIRE
+    with refused(f"{path}: the SI record states {WIRE}, but {Rod(0.1, 1e-5)} was given"):
+        read_record(path, rod=Rod(0.1, 1e-5))
+    write_record(make_record(columns()), path)
+    with refused(f"but {WIRE} was given: read it without a rod, and convert it with to_si(record, rod)"):
+        read_record(path, rod=WIRE)
+
+
+def test_si_without_a_rod_is_refused_or_completed(tmp_path):
+    path = write_text(tmp_path / "lab.csv", "# units: SI", "# rod_length: 0.2 [m]", HEADER, ROW)
+    with refused(
+        f"{path}: the record is SI, but rod_flexural_rigidity of its rod is not stated: give rod=Rod(length=..., "
+        "flexural_rigidity=...), on the command line --length and --flexural-rigidity"
+    ):
+        read_record(path)
+    assert rod_of(read_record(path, rod=WIRE)) == WIRE
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
+    path = tmp_path / f"record{suffix}"
+    if suffix == ".csv":
+        write_text(path, "sweep,direction,drive_angle,holding_moment", "0,forward,1.25,0.5")
+    else:
+        make_record(columns()).drop_vars(["force_x", "force_y"]).to_netcdf(path, engine="h5netcdf")
+    with refused("missing=('force_x',)"):
+        read_record(path, missing=("force_y",))
+    assert present_channels(read_record(path, missing=("force_x", "force_y"))) == ("holding_moment",)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([HEADER, ROW, "", ROW.replace("0.125", "oops")], "line 4, column 'force_x': 'oops' is not a number"),
+        (["# note", HEADER, ROW, ROW.replace("0.125", "")], "line 4, column 'force_x': the value is missing (nan)"),
+        ([HEADER + ",note", ROW + ',"two\nlines"', ROW.replace("0.5", "x") + ","], "line 4, column 'holding_moment'"),
+        ([HEADER, ROW, ROW.replace("forward", "Forward")], "line 3, column 'direction': 'Forward' is no direction"),
+        ([HEADER, ROW.replace("1.25", "71.6")], "line 2, column 'drive_angle': 71.6 is more than a turn"),
+        ([HEADER, ROW, ROW.replace("1.25", "1.0")], "from 1.25 rad (line 2) to 1.0 rad (line 3)"),
+        ([HEADER, "0,forward,1,25,0,5,0,125"], "line 2: there are 8 cells in 6 columns"),
+        ([HEADER.replace(",", ";"), ROW.replace(",", ";")], "line 1: the columns are not separated by commas"),
+        (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it"),
+        ([HEADER + ",force_x", ROW + ",1"], "line 1: there are two columns 'force_x'"),
+        (["# tactile_bayes record, format 2", HEADER, ROW], "line 1: the file has format 2"),
+        (["# units: SI", "# units: SI", HEADER, ROW], "line 2: 'units' is stated a second time"),
+        (["# units: SI", "# rod_length: 200 [mm]", HEADER, ROW], "line 2: rod_length is in [mm]: convert it to [m]"),
+        (["# units: SI", "# rod_length: long", HEADER, ROW], "line 2: rod_length is 'long': give a number [m]"),
+        (
+            ["# units: dimensionless", "# load_cell_force_noise: 0.1 [N]", HEADER, ROW],
+            "line 2: load_cell_force_noise is in [N]: convert it to [1]",
+        ),
+        (["# column time: clock [s]", HEADER, ROW], "line 1: 'clock' is no kind of column"),
+        (["# column n: integer [1]", HEADER + ",n", ROW + ",1.5"], "line 3, column 'n': '1.5' is no integer"),
+        (["# column drive_angle: number [deg]", HEADER, ROW], "column 'drive_angle' is in [deg]"),
+        (["# units: SI"], "there is no line of column names: add one, sweep,direction,"),
+        ([HEADER], "there are no samples"),
+        ([HEADER, ROW + '"' + "x" * 200_000], "line 2: the line cannot be read"),
+    ],
+)
+def test_what_is_wrong_in_a_csv_file_is_refused_with_its_line(tmp_path, lines, message):
+    path = write_text(tmp_path / "bad.csv", *lines)
+    with refused(message) as caught:
+        read_record(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_files_that_are_something_else_are_refused(tmp_path):
+    (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
+    with refused("this is no NetCDF file that can be read"):
+        read_record(tmp_path / "a.nc")
+    (tmp_path / "a.csv").write_bytes(HEADER.encode() + b"\n\xff\xfe")
+    with refused("the file is not UTF-8 text"):
+        read_record(tmp_path / "a.csv")
+    for path in ("a.txt", "a"):
+        with refused("a record is a .csv or a .nc file, not"):
+            read_record(tmp_path / path)
+        with refused("a record is a .csv or a .nc file, not"):
+            write_record(make_record(columns()), tmp_path / path)
+    xr.Dataset({"image": ("pixel", [1.0])}).to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
+    with refused("variable 'image' has dimensions ('pixel',)"):
+        read_record(tmp_path / "b.nc")
+    for path in ("absent.csv", "absent.nc"):
+        with pytest.raises(FileNotFoundError):
+            read_record(tmp_path / path)
+
+
+def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
+    path = tmp_path / "excel.csv"
+    path.write_bytes(b"\xef\xbb\xbf" + f"{HEADER}\r\n{ROW}\r\n".encode())
+    assert read_record(path)["force_y"].values.tolist() == [0.25]
+
+
+def test_an_invalid_record_is_not_written(tmp_path):
+    with refused("there is no column 'force_x'"):
+        write_record(make_record(columns()).drop_vars("force_x"), tmp_path / "a.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_writing_that_fails_leaves_the_old_file(tmp_path, suffix, monkeypatch):
+    path = tmp_path / f"record{suffix}"
+    write_record(make_record(columns()), path)
+    old = path.read_bytes()
+
+    def full_disk(descriptor):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(OSError, match="no space left"):
+        write_record(make_record(columns(), rod=WIRE), path)
+    assert path.read_bytes() == old
+    assert list(tmp_path.iterdir()) == [path]
