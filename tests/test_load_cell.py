@@ -153,10 +153,17 @@ def test_what_is_no_record_is_refused():
 
 # --- Likelihood -------------------------------------------------------------------------------------------------
 
-# The sum of n log-densities is right to n roundings of its largest terms.
 numbers = st.floats(-100, 100)
+factors = st.floats(0.01, 100)
 
 
+def log_densities(measured, predicted, noise_scale):
+    """Every sample and channel by itself."""
+    deviations = np.array(list(CELL.standard_deviations.values())) * noise_scale
+    return stats.norm.logpdf(measured, predicted, deviations[..., None, :])
+
+
+# The sum of n log-densities is right to n roundings of its largest terms.
 @given(
     st.integers(1, 8).flatmap(
         lambda n: st.tuples(
@@ -164,18 +171,23 @@ numbers = st.floats(-100, 100)
         )
     ),
     st.sets(st.sampled_from([0, 1, 2])),
-    hnp.arrays(float, (2, 1), elements=st.floats(0.01, 100)),
+    st.sampled_from([(), (1,), (3,), (4, 1), (4, 3), (2, 1, 1), (2, 1, 3), (2, 4, 3)]).flatmap(
+        lambda shape: hnp.arrays(float, shape, elements=factors)
+    ),
 )
 def test_the_log_likelihood_is_the_sum_of_normal_log_densities(arrays, missing, noise_scale):
     measured, predicted = arrays
     present = [index for index in range(3) if index not in missing]
     measured[:, list(missing)] = np.nan
-    deviations = np.array(list(CELL.standard_deviations.values())) * noise_scale[..., None, None]
-    densities = stats.norm.logpdf(measured, predicted, deviations)[..., present]
+    densities = log_densities(measured, predicted, noise_scale)[..., present]
     result = CELL.log_likelihood(measured, predicted, noise_scale=noise_scale)
     assert result.shape == (2, 4)
     tolerance = 1e-14 * (np.abs(densities).sum(axis=(-2, -1)) + 24 * np.log(100) + 1)
     assert (np.abs(result - densities.sum(axis=(-2, -1))) <= tolerance).all()
+    pointwise = CELL.log_likelihood(measured, predicted, noise_scale=noise_scale, pointwise=True)
+    assert pointwise.shape == (2, 4, len(measured))
+    assert (np.abs(pointwise - densities.sum(axis=-1)) <= tolerance[..., None]).all()
+    assert (np.abs(pointwise.sum(axis=-1) - result) <= 2 * tolerance).all()
 
 
 def test_one_prediction_or_a_batch_give_the_same():
@@ -187,14 +199,46 @@ def test_one_prediction_or_a_batch_give_the_same():
     np.testing.assert_allclose(batch, single, rtol=1e-14)
     scales = np.array([0.5, 1.0, 2.0, 4.0])
     one_by_one = [CELL.log_likelihood(measured, predicted[0], noise_scale=scale) for scale in scales]
-    np.testing.assert_allclose(CELL.log_likelihood(measured, predicted[0], noise_scale=scales), one_by_one, rtol=1e-14)
+    result = CELL.log_likelihood(measured, predicted[0], noise_scale=scales[:, None])
+    np.testing.assert_allclose(result, one_by_one, rtol=1e-14)
+
+
+def test_one_prediction_takes_many_factors_for_each_channel():
+    rng = np.random.default_rng(7)
+    measured, predicted = rng.normal(size=(2, 9, 3))
+    scales = rng.uniform(0.5, 2.0, (4, 3))
+    expected = log_densities(measured, predicted, scales).sum(axis=-1)
+    pointwise = CELL.log_likelihood(measured, predicted, noise_scale=scales, pointwise=True)
+    np.testing.assert_allclose(pointwise, expected, rtol=1e-13)
+    total = CELL.log_likelihood(measured, predicted, noise_scale=scales)
+    np.testing.assert_allclose(total, expected.sum(axis=-1), rtol=1e-13)
+
+
+@pytest.mark.parametrize("pointwise", [False, True])
+@pytest.mark.parametrize("missing", [[0], [1], [0, 2]])
+def test_the_factor_of_a_missing_channel_does_not_matter(missing, pointwise):
+    rng = np.random.default_rng(8)
+    measured, predicted = rng.normal(size=(9, 3)), rng.normal(size=(4, 9, 3))
+    measured[:, missing] = np.nan
+    scales = rng.uniform(0.5, 2.0, (4, 3))
+    result = CELL.log_likelihood(measured, predicted, noise_scale=scales, pointwise=pointwise)
+    others = scales.copy()
+    others[:, missing] = 7.0
+    again = CELL.log_likelihood(measured, predicted, noise_scale=others, pointwise=pointwise)
+    np.testing.assert_array_equal(again, result)
+    present = [index for index in range(3) if index not in missing]
+    expected = log_densities(measured, predicted, scales)[..., present].sum(axis=-1)
+    np.testing.assert_allclose(result, expected if pointwise else expected.sum(axis=-1), rtol=1e-13)
 
 
 def test_the_arguments_are_not_changed():
     measured, predicted = np.ones((4, 3)), np.zeros((2, 4, 3))
-    CELL.log_likelihood(measured, predicted)
+    scales = np.full((2, 3), 2.0)
+    for pointwise in (False, True):
+        CELL.log_likelihood(measured, predicted, noise_scale=scales, pointwise=pointwise)
     assert (measured == 1).all()
     assert (predicted == 0).all()
+    assert (scales == 2).all()
 
 
 def test_a_prediction_without_a_value_has_none_either():
@@ -202,11 +246,16 @@ def test_a_prediction_without_a_value_has_none_either():
     predicted[1, 2, 0] = np.nan
     result = CELL.log_likelihood(np.ones((4, 3)), predicted)
     assert np.isfinite(result).tolist() == [True, False]
+    pointwise = CELL.log_likelihood(np.ones((4, 3)), predicted, pointwise=True)
+    assert np.argwhere(np.isnan(pointwise)).tolist() == [[1, 2]]
 
 
 def test_nothing_measured_says_nothing():
     assert CELL.log_likelihood(np.full((4, 3), np.nan), np.zeros((2, 4, 3))).tolist() == [0, 0]
     assert LoadCell().log_likelihood(np.empty((0, 3)), np.empty((0, 3))) == 0
+    pointwise = CELL.log_likelihood(np.full((4, 3), np.nan), np.zeros((2, 4, 3)), noise_scale=[2, 3, 4], pointwise=True)
+    assert pointwise.tolist() == [[0] * 4] * 2
+    assert LoadCell().log_likelihood(np.empty((0, 3)), np.empty((0, 3)), pointwise=True).shape == (0,)
 
 
 def test_the_units_shift_the_log_likelihood_by_their_jacobian():
@@ -247,7 +296,20 @@ def test_a_channel_with_holes_is_refused():
 @pytest.mark.parametrize("noise_scale", [0.0, -1.0, np.nan])
 def test_an_impossible_noise_scale_is_refused(noise_scale):
     with pytest.raises(ParameterError, match=r"a noise_scale is .*: give positive factors"):
-        CELL.log_likelihood(np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=[1.0, noise_scale])
+        CELL.log_likelihood(np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=[[1.0], [noise_scale]])
+    with pytest.raises(ParameterError, match=r"a noise_scale is .*: give positive factors"):
+        CELL.log_likelihood(np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=[1.0, noise_scale, 1.0])
+
+
+@pytest.mark.parametrize("pointwise", [False, True])
+@pytest.mark.parametrize("missing", [[], [1]])
+@pytest.mark.parametrize("shape", [(2,), (4,), (0,), (4, 3), (2, 4), (2, 4, 3)])
+def test_noise_scales_that_do_not_fit_are_refused(shape, missing, pointwise):
+    measured = np.zeros((4, 3))
+    measured[:, missing] = np.nan
+    message = r"noise_scale has shape \(.*\) and predicted \(2, 4, 3\): give factors that broadcast to \(2, 3\)"
+    with pytest.raises(ParameterError, match=message):
+        CELL.log_likelihood(measured, np.zeros((2, 4, 3)), noise_scale=np.ones(shape), pointwise=pointwise)
 
 
 @pytest.mark.parametrize(("measured", "predicted"), [((4, 2), (4, 2)), ((4, 3), (5, 3)), ((3,), (3,))])

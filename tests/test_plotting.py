@@ -19,6 +19,7 @@ from tactile_bayes import plotting
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.plotting import posteriors
 from tactile_bayes.record import CHANNELS, make_record
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
@@ -342,11 +343,11 @@ def test_regions_of_highest_density_hold_what_they_say():
     """Analytic: a Gaussian's region of probability p ends where its density is 1 − p of the greatest."""
     x = np.linspace(-6.0, 6.0, 401)
     density = np.exp(-0.5 * (x[:, None] ** 2 + x**2))
-    np.testing.assert_allclose(plotting._highest_density(density, (0.95, 0.5)), [0.05, 0.5], rtol=1e-2)
+    np.testing.assert_allclose(posteriors._highest_density(density, (0.95, 0.5)), [0.05, 0.5], rtol=1e-2)
 
 
 def test_levels_differ_when_all_draws_are_in_one_cell():
-    low, high = plotting._highest_density(np.diag([0.0, 1.0]), (0.95, 0.5))
+    low, high = posteriors._highest_density(np.diag([0.0, 1.0]), (0.95, 0.5))
     assert low < high
 
 

@@ -24,6 +24,7 @@ _HOMES = {
     "Rod": "rod",
     "contour_band": "uncertainty.band",
     "equilibria": "scanning",
+    "gap": "uncertainty.gap",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
     "read_record": "record",
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from tactile_bayes.scanning import equilibria as equilibria
     from tactile_bayes.scanning import scan as scan
     from tactile_bayes.uncertainty.band import contour_band as contour_band
+    from tactile_bayes.uncertainty.gap import gap as gap
 
 
 def __getattr__(name: str) -> Any:

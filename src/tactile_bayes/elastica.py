@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arc import Arc, ArcSlopes, arc_and_slopes, arc_to, chord_angle, slack, slack_slope
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.universal import tangential_arcs, tip_arcs
+from tactile_bayes.universal import tangential_arcs, tangential_numbers, tip_arcs, tip_numbers
 
 __all__ = [
     "MAX_FRICTION_ANGLE",
@@ -26,8 +26,11 @@ __all__ = [
     "TANGENTIAL",
     "TIP",
     "Contact",
+    "QuickWrench",
     "Wrench",
     "contact_from_wrench",
+    "quick_tangential_arclength",
+    "quick_wrench",
     "tangential_arclength",
     "wrench_from_contact",
 ]
@@ -147,7 +150,6 @@ def wrench_from_contact(
     *,
     side: ArrayLike = 1,
     phase: ArrayLike | None = None,
-    derivatives: bool = True,
 ) -> Wrench:
     """What the base feels when the rod touches a contour at a given point: Step 1 for one state.
 
@@ -163,8 +165,6 @@ def wrench_from_contact(
         +1 for a contact of a forward sweep, −1 for one of a backward sweep, its mirror image.
     phase : array_like of `TIP` or `TANGENTIAL`, optional
         The phase, where it is known already; then only that one is computed, and not questioned.
-    derivatives : bool
-        Whether `by_slope` and `by_distance` are wanted; else they are NaN, and time is saved.
 
     Returns
     -------
@@ -202,7 +202,7 @@ def wrench_from_contact(
     found[touch.where[lies]], found[ends] = TANGENTIAL, TIP
     columns = np.full((6, x.size), np.nan)
     columns[:, touch.where[lies]] = _lying(touch, alpha[touch.where])[:, lies]
-    columns[:, ends] = _ending(x[ends], y[ends], beta[ends], np.sqrt(slack2[ends]), derivatives)
+    columns[:, ends] = _ending(x[ends], y[ends], beta[ends], np.sqrt(slack2[ends]))
     force, arclength, tip_angle, turn, by_slope, by_distance = columns
 
     drive_angle = tip_angle + turn
@@ -230,14 +230,12 @@ def _lying(touch: _Touch, alpha: Floats) -> Floats:
     return np.stack([(arc.length / length) ** 2, length, alpha, arc.turn, 1.0 - turning, np.zeros_like(length)])
 
 
-def _ending(x: Floats, y: Floats, beta: Floats, lack: Floats, derivatives: bool) -> Floats:
+def _ending(x: Floats, y: Floats, beta: Floats, lack: Floats) -> Floats:
     """Phase A, the same: distance and direction of the tip give amplitude and direction at the contact."""
     u, v = x * np.cos(beta) + y * np.sin(beta), y * np.cos(beta) - x * np.sin(beta)
     chi, tilt, arc = tip_arcs(lack, np.maximum(np.arctan2(u, v), 0.0))
     out = np.full((6, lack.size), np.nan)
     out[:4] = arc.length**2, np.ones_like(lack), beta + 0.5 * np.pi - tilt, arc.turn
-    if not derivatives:
-        return out
     arc, by_chi, by_psi1 = arc_and_slopes(chi, np.sin(0.5 * tilt) ** 2)
     _, angle_x = chord_angle(arc, by_chi)
     angle_1 = 1.0 + chord_angle(arc, by_psi1)[1]
@@ -250,6 +248,59 @@ def _ending(x: Floats, y: Floats, beta: Floats, lack: Floats, derivatives: bool)
         out[4] = np.where(chi > 0.0, 1.0 - by_chord, np.nan)
         out[5] = np.where(chi > 0.0, -0.5 * by_value / value, -np.inf)
     return out
+
+
+class QuickWrench(NamedTuple):
+    """The part of `Wrench` that a likelihood needs."""
+
+    drive_angle: Floats
+    holding_moment: Floats
+    force_x: Floats
+    force_y: Floats
+
+
+def quick_wrench(contact_x: Floats, contact_y: Floats, slope_angle: Floats, tip: NDArray[np.bool_]) -> QuickWrench:
+    """`wrench_from_contact` for frictionless forward contacts of known phase, from tables, to about 1e-9.
+
+    NaN where the rod cannot make the contact.
+
+    Examples
+    --------
+    >>> quick_wrench(np.array([0.2]), np.array([0.6]), np.array([0.1]), np.array([True])).drive_angle.round(6)
+    array([2.901776])
+    """
+    shape = contact_x.shape
+    x, y, alpha = contact_x.ravel(), contact_y.ravel(), slope_angle.ravel()
+    tip = np.broadcast_to(tip, shape).ravel()
+    sin, cos = np.sin(alpha), np.cos(alpha)
+    along, across = x * cos + y * sin, y * cos - x * sin
+    force, drive_angle = np.full(x.size, np.nan), np.full(x.size, np.nan)
+    distance2 = x * x + y * y
+    within = (across >= 0.0) & (along >= -1e-12)
+    lies, ends = np.flatnonzero(within & ~tip), np.flatnonzero(within & tip & (distance2 <= 1.0))
+    lying = tangential_numbers(np.arctan2(across[lies], along[lies]))
+    force[lies] = lying.force / distance2[lies]
+    drive_angle[lies] = alpha[lies] + lying.turn
+    tilt = np.maximum(np.arctan2(along[ends], across[ends]), 0.0)
+    ending = tip_numbers(np.sqrt(1.0 - distance2[ends]), tilt)
+    force[ends] = ending.force
+    drive_angle[ends] = alpha[ends] + 0.5 * np.pi - ending.tilt + ending.turn
+    columns = drive_angle, force * along, -force * sin, force * cos
+    return QuickWrench(*(column.reshape(shape) for column in columns))
+
+
+def quick_tangential_arclength(contact_x: Floats, contact_y: Floats, slope_angle: Floats) -> Floats:
+    """`tangential_arclength` without friction, from a table, to about 1e-9.
+
+    Examples
+    --------
+    >>> quick_tangential_arclength(np.array(0.2), np.array(0.6), np.array(0.1)).round(6)
+    np.float64(1.053211)
+    """
+    sin, cos = np.sin(slope_angle), np.cos(slope_angle)
+    along, across = contact_x * cos + contact_y * sin, contact_y * cos - contact_x * sin
+    numbers = tangential_numbers(np.arctan2(np.maximum(across, 0.0), along))
+    return np.hypot(contact_x, contact_y) * numbers.stretch
 
 
 def contact_from_wrench(

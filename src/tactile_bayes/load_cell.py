@@ -208,12 +208,18 @@ class LoadCell:
         scale = np.asarray(noise_scale, dtype=np.float64)
         if not (scale > 0).all():
             raise ParameterError(f"a noise_scale is {float(np.min(scale))!r}: give positive factors")
+        try:
+            np.broadcast_shapes(scale.shape, (*predicted.shape[:-2], len(CHANNELS)))
+        except ValueError:
+            raise ParameterError(
+                f"noise_scale has shape {scale.shape} and predicted {predicted.shape}: give factors that broadcast to "
+                f"{(*predicted.shape[:-2], len(CHANNELS))}, the last axis for the channels {', '.join(CHANNELS)}"
+            ) from None
         present = self._present(measured)
         deviations = np.array([self.standard_deviations[CHANNELS[index]] for index in present])
+        deviations = deviations * np.broadcast_to(scale, (*scale.shape[:-1], len(CHANNELS)))[..., present]
         if present.size < len(CHANNELS):
-            measured, predicted = measured[:, present], predicted[..., present]
-            scale = np.broadcast_to(scale, (*scale.shape[:-1], len(CHANNELS)))[..., present]
-        deviations = np.broadcast_to(deviations * scale, (*np.shape(scale)[:-1], present.size))
+            measured, predicted = measured[:, present], np.take(predicted, present, axis=-1)
         # Samples and channels as one axis, and a product for the sum: an axis of three is several times slower.
         squares = predicted.reshape(*predicted.shape[:-2], measured.size) - measured.ravel()
         squares *= squares

@@ -35,6 +35,11 @@ _LAST_STEP = 1e-6
 """Newton step on an interpolant, as a share of the segment, whose square is below the interpolation's error."""
 
 
+_BRIEF = 1e-6
+"""Stretch of tip contact after its onset, in the contour's parameter, that is so short that the slope of the drive angle
+would be lost in rounding; it rises there."""
+
+
 class Reach(IntEnum):
     """Whether a rod finds its contour."""
 
@@ -395,7 +400,7 @@ def _segments(
         start[owner] + cut * span,
         start[owner] + following * span,
         tip,
-        tip_first[lane] & _first_of_lane(lane),
+        tip & tip_first[lane] & _first_of_lane(lane),
     )
 
 
@@ -428,6 +433,8 @@ def _first_maximum(segments: _Segments, angle: Floats) -> tuple[Index, Floats, N
     slope = chebyshev.derivative(angle)
     grid = np.linspace(0.0, 1.0, 2 * angle.shape[0] + 1)
     falls = chebyshev.tabulate(slope, grid) <= 0.0
+    falls[_first_of_lane(segments.lane), 0] = False  # it always rises from first contact
+    falls[segments.rooted & ~_last_of_lane(segments.lane) & (segments.begin - segments.end < _BRIEF)] = False
     any_fall, cell = falls.any(axis=1), falls.argmax(axis=1)
     fold = any_fall & (cell > 0)
     before: Index = np.cumsum(any_fall) - any_fall

@@ -11,14 +11,22 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
 from tactile_bayes.arc import Arc, ArcSlopes, arc_and_slopes, arc_to, chord_angle, slack, slack_slope, slopes_by_chi
 from tactile_bayes.roots import falling_root
 
-__all__ = ["TangentialArcs", "TipArcs", "tangential_arcs", "tip_arcs"]
+__all__ = [
+    "TangentialArcs",
+    "TangentialNumbers",
+    "TipArcs",
+    "TipNumbers",
+    "tangential_arcs",
+    "tangential_numbers",
+    "tip_arcs",
+    "tip_numbers",
+]
 
 Floats = NDArray[np.float64]
 
@@ -51,6 +59,44 @@ class TipArcs(NamedTuple):
     arc: Arc
 
 
+class TangentialNumbers(NamedTuple):
+    """What the chord's angle says about a frictionless tangential contact."""
+
+    force: Floats
+    """Force times the squared length of the chord."""
+    turn: Floats
+    """Turn of the rod from the contact to the pivot."""
+    stretch: Floats
+    """Arc length over chord."""
+
+
+class TipNumbers(NamedTuple):
+    """What the chord says about a tip contact."""
+
+    force: Floats
+    turn: Floats
+    tilt: Floats
+    """ε1 = π/2 − ψ1."""
+
+
+def tangential_numbers(angle: Floats) -> TangentialNumbers:
+    """Frictionless tangential contact straight from the table, to 1e-9: chords at `angle` ∈ [0, π/2] to the contour."""
+    table = _tangential_numbers_table()
+    basis = chebyshev.polynomials(table.shape[0], np.minimum(angle, 0.5 * np.pi) / (0.5 * np.pi))
+    force, turn, stretch = np.moveaxis(basis @ table, -1, 0)
+    return TangentialNumbers(force * angle, turn * angle, stretch)
+
+
+def tip_numbers(lack: Floats, tilt: Floats) -> TipNumbers:
+    """Frictionless tip contact straight from the table, to 1e-9; arguments as for `tip_arcs`, one-dimensional."""
+    radius, table = _tip_numbers_table()
+    angle, share, by_angle, by_share = _polar(lack, tilt, radius, table.shape[0], table.shape[2])
+    values = np.einsum(
+        "nks,ns->kn", (by_angle @ table.reshape(table.shape[0], -1)).reshape(-1, 3, table.shape[2]), by_share
+    )
+    return TipNumbers(values[0] * angle, values[1] * angle, values[2] * share)
+
+
 def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:
     """Arcs with amplitude χ ∈ [0, π] whose chord stands at `angle` ≥ 0 over the direction at the contact.
 
@@ -58,7 +104,8 @@ def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:
     """
     target = np.sqrt(angle)
     level = np.minimum(angle, 0.5 * np.pi)
-    guess = target * np.sqrt(chebyshev.evaluate(_tangential_table(), level / (0.5 * np.pi)))
+    table = _tangential_table()
+    guess = target * np.sqrt(chebyshev.polynomials(table.size, level / (0.5 * np.pi)) @ table)
     chi = np.where(m == 0.5, guess, np.minimum(np.sqrt(3.0 / np.sqrt(m * (1.0 - m))) * target, np.pi))
     result = _Collected(angle.size, 5)
     active = np.arange(angle.size)
@@ -164,8 +211,24 @@ class _TipTable(NamedTuple):
 
 
 @functools.cache
-def _tip_table() -> _TipTable:
-    angles, radii = 40, 32  # enough for 1e-12 without friction: one Newton step then leaves rounding alone
+def _tangential_numbers_table() -> Floats:
+    """Coefficients, shape (order, 3), of `TangentialNumbers` with what makes them vanish divided out."""
+    angle = chebyshev.nodes(28) * 0.5 * np.pi
+    _, arc, _ = tangential_arcs(angle, np.full(angle.size, 0.5))
+    chord = np.hypot(arc.length - arc.shortfall, arc.offset)
+    return chebyshev.coefficients(np.stack([chord**2 / angle, arc.turn / angle, arc.length / chord]))
+
+
+class _TipTable(NamedTuple):
+    """Chebyshev coefficients over polar coordinates in (tilt, lack): angle, and share of the greatest radius."""
+
+    radius: Floats
+    chi2: Floats
+    tilt: Floats
+
+
+def _tip_grid(angles: int, radii: int) -> tuple[Floats, Floats, Floats, TipArcs]:
+    """Angles, greatest radii and shares of a grid, and the arcs on it, shape (angles · radii,)."""
     angle = chebyshev.nodes(angles) * 0.5 * np.pi
     m = np.full(angles, np.sin(0.5 * _TILT_MAX) ** 2)
 
@@ -186,21 +249,43 @@ def _tip_table() -> _TipTable:
     lack, tilt = (np.outer(trig(angle) * radius, share).ravel() for trig in (np.sin, np.cos))
     # To first order in ε1 the amplitude depends on the angle alone, and the edge's serves as a first guess.
     start = np.repeat(edge, radii), np.outer(np.full(angles, _TILT_MAX), share).ravel()
-    found = _polished_tips(lack, tilt, *start)
-    chi2, tilt1 = (a.reshape(angles, radii) for a in (found.amplitude**2, found.tilt))
+    return angle, radius, share, _polished_tips(lack, tilt, *start)
 
-    def fit(values: Floats) -> Floats:
-        return chebyshev.coefficients(chebyshev.coefficients(values))
 
-    return _TipTable(chebyshev.coefficients(radius), fit(chi2 / angle[:, None]), fit(tilt1 / share))
+@functools.cache
+def _tip_table() -> _TipTable:
+    # Enough for 1e-12 without friction: one Newton step then leaves rounding alone.
+    angle, radius, share, arcs = _tip_grid(40, 32)
+    chi2, tilt = (a.reshape(angle.size, share.size) for a in (arcs.amplitude**2, arcs.tilt))
+    return _TipTable(chebyshev.coefficients(radius), _fit(chi2 / angle[:, None]), _fit(tilt / share))
+
+
+@functools.cache
+def _tip_numbers_table() -> tuple[Floats, Floats]:
+    """Coefficients of the greatest radius, and, shape (angles, 3, radii), of `TipNumbers` less their zeros."""
+    angle, radius, share, arcs = _tip_grid(28, 22)
+    force, turn, tilt = (a.reshape(angle.size, share.size) for a in (arcs.arc.length**2, arcs.arc.turn, arcs.tilt))
+    fits = [_fit(force / angle[:, None]), _fit(turn / angle[:, None]), _fit(tilt / share)]
+    return chebyshev.coefficients(radius), np.ascontiguousarray(np.stack(fits, axis=1))
+
+
+def _fit(values: Floats) -> Floats:
+    """Coefficients of a function on a grid of nodes."""
+    return chebyshev.coefficients(chebyshev.coefficients(values))
+
+
+def _polar(
+    lack: Floats, tilt: Floats, radius: Floats, angles: int, radii: int
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Angle and share of the greatest radius, and Chebyshev polynomials of both."""
+    angle = np.arctan2(lack, tilt)
+    by_angle = chebyshev.polynomials(angles, angle / (0.5 * np.pi))
+    share = np.minimum(np.hypot(lack, tilt) / (by_angle @ radius), 1.0)
+    return angle, share, by_angle, chebyshev.polynomials(radii, share)
 
 
 def _tip_guess(lack: Floats, tilt: Floats) -> tuple[Floats, Floats]:
     table = _tip_table()
-    angle = np.arctan2(lack, tilt)
-    place = angle / (0.5 * np.pi)
-    share = np.minimum(np.hypot(lack, tilt) / chebyshev.evaluate(table.radius, place), 1.0)
-    by_angle = chebvander(2.0 * place - 1.0, table.chi2.shape[0] - 1)
-    by_share = chebvander(2.0 * share - 1.0, table.chi2.shape[1] - 1)
+    angle, share, by_angle, by_share = _polar(lack, tilt, table.radius, *table.chi2.shape)
     chi2, tilt1 = (((by_angle @ c) * by_share).sum(axis=1) for c in (table.chi2, table.tilt))
     return np.sqrt(angle * chi2), tilt1 * share

@@ -37,8 +37,8 @@ Floats = NDArray[np.float64]
 LogProbability = Callable[[Floats], Floats]
 Seed = int | np.random.SeedSequence
 
-_GROWTH = 1.5
-"""Steps at one diagnosis over steps at the one before: all diagnoses together then cost three times the last."""
+_GROWTH = 1.25
+"""Steps at one diagnosis over steps at the one before: all diagnoses together then cost five times the last."""
 
 _DRAWS_PER_WALKER = 5
 """Effective draws that the mean walker must have given: what is discarded then outlasts five autocorrelation times."""
@@ -67,7 +67,7 @@ class SamplerSettings:
         faster with more of them, but every one of them has to forget its start.
     block_steps : int
         Steps before the first look at the diagnostics, and the least between later ones, which come when the number of
-        steps has grown by half.
+        steps has grown by a quarter.
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
@@ -90,7 +90,7 @@ class SamplerSettings:
 
     ensembles: int = 4
     walkers: int | None = None
-    block_steps: int = 200
+    block_steps: int = 50
     max_r_hat: float = 1.01
     min_ess: float = 1000.0
     max_steps: int = 20_000
@@ -426,7 +426,7 @@ def sample(
 ) -> Draws:
     """Draw from a posterior with independent ensembles of differential-evolution walkers.
 
-    The ensembles run in step. After `block_steps` steps, and whenever the number of steps has grown by half, the second
+    The ensembles run in step. After `block_steps` steps, and whenever their number has grown by a quarter, the second
     half of the steps so far is judged: rank-normalised R̂ across ensembles, each cut in early and late steps, and
     effective sample size in bulk and tails (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every
     parameter satisfies the settings, and every walker has on average given five effective draws.

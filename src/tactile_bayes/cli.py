@@ -1,0 +1,194 @@
+"""The command line: parse, call, print."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from tactile_bayes.inference.ensembles import Progress
+    from tactile_bayes.run import Run
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    help="Contours from what a flexible rod's base feels: contact points, posteriors, bands.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Out = Annotated[Path, typer.Option(help="Folder for results; made if it is not there.")]
+Seed = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
+
+
+def main() -> None:
+    """Entry point: refusals are one line on stderr and exit code 2, an interrupt is exit code 130."""
+    from tactile_bayes.errors import TactileBayesError
+
+    try:
+        app()
+    except TactileBayesError as error:
+        print(f"tactile-bayes: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("tactile-bayes: interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+@app.callback()
+def _options(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)] = False,
+) -> None:
+    if version:
+        from tactile_bayes import __version__
+
+        print(__version__)
+        raise typer.Exit
+
+
+@app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")
+def infer(
+    record: Annotated[Path, typer.Argument(help="Record, .csv or .nc.")],
+    out: Out,
+    family: Annotated[str, typer.Option(help="What shape the contour has: parabola or circle.")] = "parabola",
+    length: Annotated[float | None, typer.Option(help="Rod length [m], for SI files that do not state it.")] = None,
+    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], likewise.")] = None,
+    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0,
+    force_noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; inferred if not given.")
+    ] = None,
+    moment_noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; inferred if not given.")
+    ] = None,
+    missing: Annotated[list[str] | None, typer.Option(help="Channel without a column: force_x and so on.")] = None,
+    friction: Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0)] = 0.0,
+    probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
+    max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
+    seed: Seed = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Infer the contour from a measured record: contact points, posterior, band and figures."""
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.inference.ensembles import SamplerSettings
+    from tactile_bayes.load_cell import LoadCell
+    from tactile_bayes.record import read_record
+    from tactile_bayes.rod import Rod
+    from tactile_bayes.run import analyse
+
+    if (length is None) != (flexural_rigidity is None):
+        raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
+    rod = None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
+    cell = None
+    if force_noise is not None or moment_noise is not None:
+        cell = LoadCell(force_noise=force_noise or 0.0, moment_noise=moment_noise or 0.0)
+    measured = read_record(record, rod=rod, missing=missing or ())
+    with _progress(quiet) as progress:
+        run = analyse(
+            measured,
+            out,
+            family=family,
+            load_cell=cell,
+            friction=friction,
+            probability=probability,
+            seed=seed,
+            settings=SamplerSettings(max_steps=max_steps),
+            progress=progress,
+        )
+    _print_run(run, {})
+
+
+@app.command(epilog="Example: tactile-bayes demo --out results/demo")
+def demo(
+    out: Out = Path("results/demo"),
+    seed: Seed = 1,
+    quiet: Quiet = False,
+) -> None:
+    """A steel wire sweeps along a parabola; its noisy record is turned into a contour with a band."""
+    from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
+    from tactile_bayes.record import read_record
+    from tactile_bayes.run import analyse
+
+    path = measure_demo(out, seed=seed)
+    if not quiet:
+        print(
+            f"A wire of {ROD.length * 1e3:g} mm and {ROD.diameter * 1e3:g} mm diameter has swept forward and backward "
+            f"along a parabola; a load cell\nwith {LOAD_CELL.force_noise * 1e3:g} mN and "
+            f"{LOAD_CELL.moment_noise * 1e3:g} mN m of noise has recorded {path}.\nFrom here on this file is all there "
+            f"is; the same job on your own: tactile-bayes infer RECORD --out RUN\n",
+            flush=True,
+        )
+    with _progress(quiet) as progress:
+        run = analyse(read_record(path), out, family="parabola", seed=seed, truth=CONTOUR, progress=progress)
+    _print_run(run, {"record": path}, TRUTH)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[Progress], object] | None]:
+    """A bar that fills with the effective sample size."""
+    if quiet:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("looking for a start, then sampling", total=1000.0)
+
+        def show(progress: Progress) -> None:
+            words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
+            bar.update(task, completed=min(progress.ess, 1000.0), description=words)
+
+        yield show
+
+
+def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None = None) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from tactile_bayes.run import summary
+
+    numbers = summary(run.posterior, run.band.attrs["probability"])
+    share = f"{run.band.attrs['probability']:.0%}"
+    table = Table(box=None, pad_edge=False)
+    heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
+    for head in heads:
+        table.add_column(head, justify="left" if head in ("quantity", "unit") else "right")
+    for name in numbers.quantity.values:
+        row: Any = numbers.sel(quantity=name)
+        digits = _digits(float(row["upper"] - row["lower"]))
+        shown = [f"{float(row[column]):.{digits}f}" for column in ("median", "lower", "upper")]
+        true = [f"{truth[name]:.{digits}f}" if name in truth else ""] if truth else []
+        ess = min(float(row["ess_bulk"]), float(row["ess_tail"]))
+        checks = ["", ""] if ess != ess else [f"{float(row['r_hat']):.3f}", f"{ess:.0f}"]
+        unit = "" if str(row["unit"].values) == "1" else str(row["unit"].values)
+        table.add_row(str(name), *true, *shown, unit, *checks)
+    console = Console()
+    console.print(table)
+    attrs = run.posterior.attrs
+    console.print(("" if attrs["converged"] else "NOT CONVERGED. ") + attrs["message"], highlight=False, soft_wrap=True)
+    if run.contacts is None:
+        console.print("No contact points: Step 2 needs all three load channels.")
+    console.print()
+    for what, path in {**files, **run.files}.items():
+        console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)
+
+
+def _digits(width: float) -> int:
+    """Decimals that show an interval of this width to two figures."""
+    import math
+
+    return max(0, min(12, 1 - math.floor(math.log10(width)))) if width > 0.0 else 6
+
+
+if __name__ == "__main__":
+    main()

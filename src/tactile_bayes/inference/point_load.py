@@ -1,0 +1,603 @@
+"""A rod clamped in a sensor and pushed at a known point: where its clamp is, how soft it sits, how the sensor reads.
+
+A thin probe is a contour that has shrunk to a point: the rod touches it tangentially, the force is normal to the rod,
+and the position is known. Seen from the clamp, let the point lie at distance r, at an angle ϑ from the direction of the
+clamp. The moment κ0 = M0/(EI) [1/mm] turns the sensor's suspension by c κ0, so that the rod leaves it δ = ϑ − c κ0
+short of the chord. In tangential contact without friction (ψ1 = 0, m = 1/2) the elastica is one curve up to scale, cut
+off at an amplitude χ, and χ fixes both the angle δ between chord and base and the product κ0 r:
+
+    δ(χ) = turn(χ) − chord angle(χ),     κ0 r = √f r · lever(χ)     ⟹     κ0 r = g(δ),    g(δ) = 3 δ − … odd
+    δ + (c/r) g(δ) = ϑ
+
+The rod's length does not enter, as long as it reaches, and its stiffness only scales what the sensor reads. g rises to
+2.41 at δ = 1.21 rad and turns back at δ = 1.74 rad; up to 1.5 rad it is concave, and Newton's method from ϑ/(1 + 3c/r)
+comes to the root from below. The equilibrium is stable while 1 + (c/r) g'(δ) > 0. The linear beam for comparison is
+
+    κ0 = 3 w / (a² + 3 c a),      a = r cos ϑ, w = r sin ϑ,
+
+from w = F a³/(3 EI) + c (F a/EI) a. The sensor reads a cubic in κ0, with independent normal noise:
+
+    reading = b0 + b1 κ0 + b2 κ0² + b3 κ0³ + ε.
+
+Given the geometry and the noise the reading is linear in the b's, so that they are integrated out exactly (their prior
+is normal) and drawn afterwards: five parameters are sampled, nine reported.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+
+from tactile_bayes.elastica import wrench_from_contact
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers
+from tactile_bayes.inference.result import provenance, sample_stats
+
+__all__ = ["Prior", "base_curvature", "default_priors", "infer_point_load", "predictive_p_value"]
+
+Floats = NDArray[np.float64]
+
+_GEOMETRY = ("clamp_axial", "clamp_lateral", "clamp_angle", "compliance")
+_UNITS = {"clamp_axial": "mm", "clamp_lateral": "mm", "clamp_angle": "rad", "compliance": "mm"}
+_POWERS = 4
+_VAGUE = 100.0
+"""Prior sd of a sensor coefficient, in full scales of the reading per power of 3/reach."""
+
+_MAX_TURN = 1.5
+"""Largest angle δ between chord and base [rad] that is modelled."""
+
+_MAX_STEPS = 30
+
+_SETTLED = 1e-8
+"""Newton step after which what is left, about its square, would be lost in rounding."""
+
+_GUESSES = 400
+"""Draws of the prior among which the search for a start begins."""
+
+_REFINED = 4
+"""How many of the best of them are refined."""
+
+_ROUGH = 0.01
+"""Noise over range of the readings that the search begins with."""
+
+_INFLATION = 2.0
+"""Scatter of the walkers' starts over the sd of the normal approximation."""
+
+_DROP = 10.0
+"""Log-probability per parameter that a start may lie below the centre: farther down a poor mode might hold it."""
+
+_SETTINGS = SamplerSettings(walkers=64)
+"""Most of an evaluation does not depend on the number of points, so many walkers are cheap."""
+
+
+class Prior(Protocol):
+    """What is used of a frozen distribution of scipy.stats."""
+
+    def logpdf(self, x: Any, /) -> Any: ...
+    def ppf(self, q: Any, /) -> Any: ...
+    def rvs(self, *, size: Any, random_state: Any) -> Any: ...
+    def support(self) -> Any: ...
+
+
+@cache
+def _moment_by_turn() -> CubicSpline:
+    """g(δ) and g'(δ), from tangential contact at distance 0.3 with the contour's slope as parameter."""
+    chord = np.linspace(0.0, 1.0, 1501)[1:]
+    wrench = wrench_from_contact(0.3 * np.cos(chord), 0.3 * np.sin(chord), 0.0)
+    turn, moment = wrench.drive_angle - chord, 0.3 * wrench.holding_moment
+    within = np.append(turn[:-1] <= _MAX_TURN, False)
+    last = int(np.argmin(within)) + 1  # one knot beyond the end
+    turn, moment = turn[:last], moment[:last]
+    turn, moment = np.concatenate([-turn[::-1], [0.0], turn]), np.concatenate([-moment[::-1], [0.0], moment])
+    return CubicSpline(turn, np.column_stack([moment, CubicSpline(turn, moment)(turn, 1)]))
+
+
+def base_curvature(
+    along: ArrayLike, across: ArrayLike, compliance: ArrayLike = 0.0, *, small_deflection: bool = False
+) -> Floats:
+    """Curvature κ0 = M0/(EI) at the base of a clamped rod that a thin probe has pushed to a point.
+
+    Parameters
+    ----------
+    along, across : array_like
+        The point in the frame of the clamp: along the direction in which the clamp points, and to its left [mm, or any
+        other length].
+    compliance : array_like
+        Turn of the suspension per base curvature, c = EI · angle per moment: the length of rod that would turn as much
+        [the same length].
+    small_deflection : bool
+        Take the linear beam instead of the large-deflection rod.
+
+    Returns
+    -------
+    ndarray
+        Base curvature [one over the length], positive where the rod is bent to the left; NaN where there is no stable
+        equilibrium, or the chord turns more than 1.5 rad away from the base.
+
+    Examples
+    --------
+    A tip of a beam of length 40 that is pushed aside by 0.4 and by 20, against 3 w / a²:
+
+    >>> base_curvature(40.0, [0.4, 20.0]).round(6)
+    array([0.00075 , 0.029521])
+    >>> base_curvature(40.0, [0.4, 20.0], small_deflection=True).round(6)
+    array([0.00075, 0.0375 ])
+    """
+    a, w, c = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (along, across, compliance)))
+    if small_deflection:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where((a > 0.0) & (c >= 0.0), 3.0 * w / (a * a + 3.0 * c * a), np.nan)
+    moment_by_turn = _moment_by_turn()
+    r = np.hypot(a, w)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        softness = np.where((r > 0.0) & (c >= 0.0), c / r, np.nan)
+        total = np.arctan2(w, a)
+        turn = total / (1.0 + 3.0 * softness)
+        for _ in range(_MAX_STEPS):
+            turn = np.clip(turn, -_MAX_TURN, _MAX_TURN)
+            moment, slope = np.moveaxis(moment_by_turn(turn), -1, 0)
+            stiffness = 1.0 + softness * slope
+            step = (total - turn - softness * moment) / stiffness
+            turn = turn + step
+            if not np.any(np.abs(step) > _SETTLED):
+                break
+        stable = (np.abs(step) <= _SETTLED) & (np.abs(turn) <= _MAX_TURN) & (stiffness > 0.0)
+        return np.where(stable, (moment + slope * step) / r, np.nan)
+
+
+def _reach(axial: Floats, lateral: Floats) -> float:
+    return float(np.hypot(axial, lateral).max())
+
+
+def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -> dict[str, Prior]:
+    """Priors that follow from where the probe goes, and from the sensor's full scale.
+
+    With reach R, the distance of the farthest probe point from the origin of the coordinates:
+
+    ===================  =====================================  ====================================================
+    parameter            prior                                  meaning
+    ===================  =====================================  ====================================================
+    ``clamp_axial``      normal(0, R/4) [mm]                    the origin is where the clamp is believed to be
+    ``clamp_lateral``    normal(0, R/4) [mm]
+    ``clamp_angle``      normal(0, 0.2) [rad]                   `axial` runs roughly along the undeflected rod
+    ``compliance``       half-normal(R/4) [mm]                  the suspension is stiffer than the rod
+    ``noise_sd``         log-uniform, 1e-6 to 1 full scale      nothing known but that there is some noise
+    ===================  =====================================  ====================================================
+
+    Parameters
+    ----------
+    axial, lateral : array_like
+        Probe points [mm].
+    full_scale : float
+        A reading that the sensor hardly exceeds [units of the reading].
+
+    Returns
+    -------
+    dict
+        Frozen distributions of scipy.stats by name.
+
+    Examples
+    --------
+    >>> priors = default_priors([10.0, 40.0], [5.0, 30.0], full_scale=1000.0)
+    >>> priors["clamp_axial"].std()
+    np.float64(12.5)
+    """
+    scale = _reach(np.asarray(axial, dtype=float), np.asarray(lateral, dtype=float)) / 4.0
+    return {
+        "clamp_axial": stats.norm(0.0, scale),
+        "clamp_lateral": stats.norm(0.0, scale),
+        "clamp_angle": stats.norm(0.0, 0.2),
+        "compliance": stats.halfnorm(0.0, scale),
+        "noise_sd": stats.loguniform(1e-6 * full_scale, full_scale),
+    }
+
+
+@dataclass(frozen=True)
+class _Model:
+    """Readings given geometry and noise, the sensor's coefficients integrated out."""
+
+    axial: Floats
+    lateral: Floats
+    reading: Floats
+    unit_curvature: float
+    """3/reach: the sensor's powers are counted in it."""
+    coefficient_sd: float
+    priors: Mapping[str, Prior]
+    known: Mapping[str, float]
+    small_deflection: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.priors)
+
+    def column(self, points: Floats, name: str) -> Floats:
+        """One parameter of (n, parameters), known or not."""
+        if name in self.known:
+            return np.full(len(points), self.known[name])
+        return points[:, self.names.index(name)]
+
+    def curvature(self, points: Floats) -> Floats:
+        """Base curvature (n, probe point) [1/mm]."""
+        x, y, angle, compliance = (self.column(points, name)[:, None] for name in _GEOMETRY)
+        dx, dy = self.axial - x, self.lateral - y
+        along, across = dx * np.cos(angle) + dy * np.sin(angle), dy * np.cos(angle) - dx * np.sin(angle)
+        return base_curvature(along, across, compliance, small_deflection=self.small_deflection)
+
+    def powers(self, curvature: Floats) -> Floats:
+        """(n, probe point) → (n, probe point, power)."""
+        return (curvature / self.unit_curvature)[..., None] ** np.arange(_POWERS)
+
+    def coefficients(self, curvature: Floats, noise_sd: Floats) -> tuple[Floats, Floats, Floats]:
+        """Posterior mean of the sensor's coefficients, R of its precision RᵀR/σ², and the least sum of squares.
+
+        Least squares with the prior as four more observations of zero, by QR: no digits are lost in normal equations.
+        """
+        powers = self.powers(curvature)
+        ridge = (noise_sd / self.coefficient_sd)[:, None, None] * np.eye(_POWERS)
+        q, r = np.linalg.qr(np.concatenate([powers, ridge], axis=1))
+        mean = np.linalg.solve(r, np.einsum("nij,i->nj", q[:, : self.reading.size], self.reading)[..., None])[..., 0]
+        left = self.reading - np.einsum("nij,nj->ni", powers, mean)
+        squares = (left**2).sum(-1) + (noise_sd / self.coefficient_sd) ** 2 * (mean**2).sum(-1)
+        return mean, r, squares
+
+    def log_probability(self, points: Floats) -> Floats:
+        """Log of prior times marginal likelihood, (n, parameters) → (n,).
+
+        The readings are normal with covariance σ² I + S² B Bᵀ, B the powers of the curvature and S the coefficients'
+        prior sd; with λ = σ²/S² its determinant is σ^(2n) λ^(−4) det(BᵀB + λ I).
+        """
+        values = np.zeros(len(points))
+        for i, prior in enumerate(self.priors.values()):
+            values = values + prior.logpdf(points[:, i])
+        noise = self.column(points, "noise_sd")
+        values = np.where(noise > 0.0, values, -np.inf)
+        inside = np.flatnonzero(np.isfinite(values))
+        curvature = self.curvature(points[inside])
+        possible = np.all(np.isfinite(curvature), axis=1)
+        values[inside[~possible]] = -np.inf
+        inside, noise = inside[possible], noise[inside[possible]]
+        if inside.size:
+            _, r, squares = self.coefficients(curvature[possible], noise)
+            log_determinant = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(-1)
+            spread = self.reading.size * np.log(noise) - _POWERS * np.log(noise / self.coefficient_sd) + log_determinant
+            constant = 0.5 * self.reading.size * math.log(2.0 * math.pi)
+            values[inside] += -0.5 * squares / noise**2 - spread - constant
+        return values
+
+    def misfit(self, points: Floats, noise_sd: float) -> Floats:
+        """Residuals over the noise, the sensor fitted, followed by the distances from the priors' centres."""
+        curvature = self.curvature(points)
+        impossible = ~np.all(np.isfinite(curvature), axis=1)
+        curvature = np.where(impossible[:, None], self.unit_curvature, curvature)
+        mean, _, _ = self.coefficients(curvature, np.full(len(points), noise_sd))
+        left = (self.reading - np.einsum("nij,nj->ni", self.powers(curvature), mean)) / noise_sd
+        left[impossible] = 10.0 * np.abs(self.reading).max() / noise_sd
+        pull = (points - self.centre) / self.spread
+        return np.concatenate([left, pull[:, self.geometry]], axis=1)
+
+    @cached_property
+    def geometry(self) -> list[int]:
+        """Which of the parameters say where the rod is, and how it is held."""
+        return [i for i, name in enumerate(self.names) if name != "noise_sd"]
+
+    @cached_property
+    def centre(self) -> Floats:
+        """Prior medians."""
+        return np.array([float(prior.ppf(0.5)) for prior in self.priors.values()])
+
+    @cached_property
+    def spread(self) -> Floats:
+        """Half the width of the priors' central 68 %: the sd where they are normal."""
+        return np.array([0.5 * float(prior.ppf(0.84) - prior.ppf(0.16)) for prior in self.priors.values()])
+
+
+def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[Floats, Floats]:
+    """Centre and covariance of the free parameters by least squares, from the best of many draws of the prior."""
+    rng = np.random.default_rng(seed)
+    guesses = np.column_stack([prior.rvs(size=_GUESSES, random_state=rng) for prior in model.priors.values()])
+    noise = _ROUGH * float(np.ptp(model.reading))
+    best = guesses[np.argsort((model.misfit(guesses, noise) ** 2).sum(-1))[:_REFINED]]
+    centre, covariance = model.centre.copy(), np.zeros((model.centre.size, model.centre.size))
+    geometry = model.geometry
+    if geometry:
+        supports = [model.priors[model.names[i]].support() for i in geometry]
+        low, high = (np.array([float(ends[k]) for ends in supports]) for k in (0, 1))
+
+        def residuals(z: Floats, noise_sd: float) -> Floats:
+            point = centre.copy()
+            point[geometry] = z
+            return model.misfit(point[None], noise_sd)[0]
+
+        def refine(z: Floats, noise_sd: float) -> Any:
+            return least_squares(residuals, z, bounds=(low, high), x_scale=model.spread[geometry], args=(noise_sd,))
+
+        fit = min((refine(guess[geometry], noise) for guess in best), key=lambda found: float(found.cost))
+        for _ in range(3):  # the noise weighs the data against the priors
+            noise *= _rms(fit.fun[: model.reading.size], _POWERS + len(geometry))
+            fit = refine(fit.x, noise)
+        slopes = np.asarray(fit.jac)
+        centre[geometry] = fit.x
+        covariance[np.ix_(geometry, geometry)] = np.linalg.inv(slopes.T @ slopes)
+    left = model.misfit(centre[None], noise)[0][: model.reading.size]
+    noise *= _rms(left, _POWERS + len(geometry))
+    if "noise_sd" in model.names:
+        i = model.names.index("noise_sd")
+        least, most = (float(end) for end in model.priors["noise_sd"].support())
+        centre[i] = min(max(noise, 1.01 * least), 0.99 * most)
+        covariance[i, i] = centre[i] ** 2 / (2.0 * model.reading.size)
+    return centre, covariance
+
+
+def _rms(residuals: Floats, fitted: int) -> float:
+    """Root mean square of residuals over the noise, not quite zero where the fit is perfect."""
+    return max(float(np.sqrt((residuals**2).sum() / (residuals.size - fitted))), 1e-9)
+
+
+def _checked(axial: ArrayLike, lateral: ArrayLike, reading: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    columns = {"axial": axial, "lateral": lateral, "reading": reading}
+    arrays = {name: np.array(values, dtype=float) for name, values in columns.items()}
+    sizes = {array.shape for array in arrays.values()}
+    if len(sizes) != 1 or arrays["reading"].ndim != 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ParameterError(f"probe points and readings have shapes {shapes}: give three lists of the same length")
+    for name, array in arrays.items():
+        if not np.all(np.isfinite(array)):
+            raise ParameterError(
+                f"{name}[{int(np.argmin(np.isfinite(array)))}] is not a finite number: leave that row out"
+            )
+    if arrays["reading"].size < 10:
+        raise ParameterError(f"{arrays['reading'].size} readings for nine unknowns: give at least 10")
+    if np.ptp(arrays["reading"]) == 0.0:
+        raise ParameterError("all readings are the same: the sensor does not answer to the probe")
+    return arrays["axial"], arrays["lateral"], arrays["reading"]
+
+
+def _split_priors(
+    priors: Mapping[str, Prior | float] | None, defaults: Mapping[str, Prior]
+) -> tuple[dict[str, Prior], dict[str, float]]:
+    """Priors of what is unknown, and values of what is known."""
+    given = dict(priors or {})
+    unheard = sorted(set(given) - set(defaults))
+    if unheard:
+        raise ParameterError(f"no such parameter: {', '.join(unheard)}; there are {', '.join(defaults)}")
+    known: dict[str, float] = {}
+    unknown: dict[str, Prior] = {}
+    for name, default in defaults.items():
+        prior = given.get(name, default)
+        if isinstance(prior, int | float | np.number):
+            known[name] = float(prior)
+        else:
+            unknown[name] = prior
+    for name in ("compliance", "noise_sd"):
+        if name in known and not (math.isfinite(known[name]) and known[name] >= 0.0):
+            raise ParameterError(f"{name} is {known[name]!r}: it cannot be negative")
+    if known.get("noise_sd") == 0.0:
+        raise ParameterError("noise_sd is 0: give the scatter of repeated readings, or a prior")
+    if not unknown:
+        raise ParameterError("every parameter is given as known: leave at least one to be inferred")
+    return unknown, known
+
+
+def infer_point_load(
+    axial: ArrayLike,
+    lateral: ArrayLike,
+    reading: ArrayLike,
+    *,
+    seed: Seed,
+    priors: Mapping[str, Prior | float] | None = None,
+    full_scale: float | None = None,
+    small_deflection: bool = False,
+    settings: SamplerSettings | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> xr.DataTree:
+    """Infer clamp, suspension and sensor curve of a rod from readings at known probe points.
+
+    The model and its equations are in the module's text. `axial` should run roughly along the undeflected rod and be
+    counted roughly from its clamp; else give priors.
+
+    Parameters
+    ----------
+    axial, lateral : array_like, shape (n,)
+        Probe points [mm].
+    reading : array_like, shape (n,)
+        What the sensor read there [its own unit], n at least 10.
+    seed : int or numpy.random.SeedSequence
+        The same seed gives the same posterior.
+    priors : mapping, optional
+        Frozen distributions of scipy.stats that replace those of `default_priors`; a number instead of a distribution
+        says that the parameter is known (``{"compliance": 0.0}``: a rigid clamp). The prior of each coefficient of the
+        sensor is normal with mean 0 and sd 100 full scales per power of 3/R, R the reach of the probe: vague.
+    full_scale : float, optional
+        A reading that the sensor hardly exceeds; sets the scale of the priors of sensor and noise. By default the power
+        of ten above the largest reading, the one thing for which the priors look at the data.
+    small_deflection : bool
+        Take the linear beam instead of the large-deflection rod, for comparison.
+    settings : SamplerSettings, optional
+        By default 64 walkers, and else the defaults.
+    progress : callable, optional
+        Is given a `Progress` after each look at the diagnostics.
+
+    Returns
+    -------
+    xarray.DataTree
+        In ArviZ's layout, dims chain and draw: ``posterior`` (``clamp_axial``, ``clamp_lateral`` [mm], ``clamp_angle``
+        [rad], ``compliance`` [mm], ``sensor_coefficient`` over ``power`` [reading · mm^power], ``noise_sd``; what is
+        known is left out), ``posterior_predictive`` (``reading``, and ``expected_reading`` without noise),
+        ``log_likelihood``, ``sample_stats``, ``observed_data``, ``constant_data``. The attributes of the root tell
+        version, seed, settings, whether and how the sampler converged, and a hash of the data.
+
+    Raises
+    ------
+    ParameterError
+        If the data do not fit together or a prior is for an unknown name.
+    InferenceError
+        If no geometry that the priors allow lets the rod reach all the points.
+
+    Examples
+    --------
+    >>> along, across = np.meshgrid([10.0, 20.0, 30.0], [0.1, 0.2, 0.3, 0.4])
+    >>> axial, lateral = along.ravel(), (along * across).ravel()
+    >>> noise = np.random.default_rng(1).normal(scale=0.5, size=axial.size)
+    >>> reading = 1e4 * base_curvature(axial + 2.0, lateral, 3.0) + noise
+    >>> tree = infer_point_load(axial, lateral, reading, seed=1, settings=SamplerSettings(max_steps=200))
+    >>> tree.posterior.clamp_axial.dims, list(tree.posterior_predictive)
+    (('chain', 'draw'), ['reading', 'expected_reading'])
+    """
+    axial, lateral, reading = _checked(axial, lateral, reading)
+    if full_scale is None:
+        full_scale = 10.0 ** math.ceil(math.log10(np.abs(reading).max()))
+    elif not (math.isfinite(full_scale) and full_scale > 0.0):
+        raise ParameterError(f"full_scale is {full_scale!r}: give a positive reading")
+    settings = _SETTINGS if settings is None else settings
+    unknown, known = _split_priors(priors, default_priors(axial, lateral, full_scale=full_scale))
+    unit = 3.0 / _reach(axial, lateral)
+    model = _Model(axial, lateral, reading, unit, _VAGUE * full_scale, unknown, known, small_deflection)
+
+    root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    fresh = np.random.SeedSequence(root.entropy, spawn_key=root.spawn_key, pool_size=root.pool_size)
+    for_guess, for_walkers, for_predictions = fresh.spawn(3)
+    centre, covariance = _normal_approximation(model, for_guess)
+    top = float(model.log_probability(centre[None])[0])
+    if not math.isfinite(top):
+        raise InferenceError(
+            "no clamp that the priors allow lets the rod reach all probe points: measure `axial` roughly from the "
+            "clamp along the undeflected rod, or widen the priors"
+        )
+    values, vectors = np.linalg.eigh(covariance)
+    spread = _INFLATION * vectors * np.sqrt(np.maximum(values, 0.0))
+
+    def around_centre(rng: np.random.Generator, count: int) -> Floats:
+        return centre + rng.normal(size=(count, centre.size)) @ spread.T
+
+    def not_far_down(points: Floats) -> Floats:
+        drop = top - model.log_probability(points)
+        return np.where(drop < _DROP * centre.size, 0.0, -np.inf)
+
+    start = scatter_walkers(not_far_down, around_centre, parameters=centre.size, seed=for_walkers, settings=settings)
+    draws = sample(
+        model.log_probability, start, names=model.names, seed=for_walkers, settings=settings, progress=progress
+    )
+    tree = _tree(model, draws, np.random.default_rng(for_predictions))
+    tree.attrs = provenance(
+        draws,
+        seed=seed,
+        settings=settings,
+        data_sha256=hashlib.sha256(np.stack([axial, lateral, reading]).astype("<f8").tobytes()).hexdigest(),
+        model="linear beam" if small_deflection else "large-deflection rod",
+        known=json.dumps(known),
+        full_scale=full_scale,
+    )
+    return tree
+
+
+def _tree(model: _Model, draws: Draws, rng: np.random.Generator) -> xr.DataTree:
+    """The draws with coefficients, predictions and pointwise likelihood, in ArviZ's layout."""
+    by_power = model.unit_curvature ** np.arange(_POWERS)
+    coefficients, expected, noises = [], [], []
+    for points in draws.samples:  # one chain at a time bounds the memory
+        noise = model.column(points, "noise_sd")
+        curvature = model.curvature(points)
+        mean, r, _ = model.coefficients(curvature, noise)
+        scatter = np.linalg.solve(r, rng.normal(size=mean.shape)[..., None])[..., 0]
+        coefficient = mean + noise[:, None] * scatter
+        coefficients.append(coefficient / by_power)
+        expected.append(np.einsum("nij,nj->ni", model.powers(curvature), coefficient))
+        noises.append(noise)
+    mean_reading, noise_sd = np.array(expected), np.array(noises)[..., None]
+    left = (model.reading - mean_reading) / noise_sd
+    over_draws, over_points = ("chain", "draw"), ("chain", "draw", "point")
+    coordinates = {
+        "chain": np.arange(draws.samples.shape[0]),
+        "draw": np.arange(draws.samples.shape[1]),
+        "point": np.arange(model.reading.size),
+    }
+
+    def data(variables: Mapping[str, Any], *dims: str) -> xr.Dataset:
+        return xr.Dataset(variables, coords={dim: coordinates[dim] for dim in dims})
+
+    posterior: dict[str, Any] = {
+        name: (over_draws, draws.samples[..., i], {"units": _UNITS[name]} if name in _UNITS else {})
+        for i, name in enumerate(draws.names)
+    }
+    posterior["sensor_coefficient"] = ((*over_draws, "power"), np.array(coefficients), {"units": "reading mm^power"})
+    predicted = mean_reading + noise_sd * rng.normal(size=mean_reading.shape)
+    log_likelihood = -0.5 * left**2 - np.log(noise_sd) - 0.5 * math.log(2.0 * math.pi)
+    groups = {
+        "posterior": data(posterior, "chain", "draw").assign_coords(power=np.arange(_POWERS)),
+        "posterior_predictive": data(
+            {"reading": (over_points, predicted), "expected_reading": (over_points, mean_reading)},
+            *over_points,
+        ),
+        "log_likelihood": data({"reading": (over_points, log_likelihood)}, *over_points),
+        "sample_stats": sample_stats(draws),
+        "observed_data": data({"reading": ("point", model.reading)}, "point"),
+        "constant_data": data(
+            {
+                "axial": ("point", model.axial, {"units": "mm"}),
+                "lateral": ("point", model.lateral, {"units": "mm"}),
+            },
+            "point",
+        ),
+    }
+    return xr.DataTree.from_dict(groups)
+
+
+def _sum_of_squares(residuals: Floats) -> Floats:
+    return np.asarray((residuals**2).sum(axis=-1))
+
+
+def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = _sum_of_squares) -> float:
+    """How often data from the posterior are at least as discrepant as the real ones.
+
+    For each draw the residuals over the noise, of the real readings and of predicted ones, are put through a
+    discrepancy (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). The value is seldom extreme if the model holds:
+    it lies closer to one half than a uniform number does.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        From `infer_point_load`, with the noise inferred.
+    discrepancy : callable
+        Takes residuals (…, n) in the order of the data, returns (…); large is bad. By default the sum of squares.
+
+    Returns
+    -------
+    float
+        Share of the draws in which the prediction is at least as discrepant.
+
+    Examples
+    --------
+    >>> readings = np.zeros((1, 3, 2))
+    >>> noise = xr.Dataset({"noise_sd": (("chain", "draw"), np.ones((1, 3)))})
+    >>> predictive = {"expected_reading": readings, "reading": readings + np.array([0.5, 1.0, 2.0])[:, None]}
+    >>> dims = ("chain", "draw", "point")
+    >>> tree = xr.DataTree.from_dict({
+    ...     "posterior": noise,
+    ...     "posterior_predictive": xr.Dataset({name: (dims, a) for name, a in predictive.items()}),
+    ...     "observed_data": xr.Dataset({"reading": ("point", [0.9, 0.9])}),
+    ... })
+    >>> round(predictive_p_value(tree), 3)
+    0.667
+    """
+    posterior = tree["posterior"].to_dataset()
+    if "noise_sd" in posterior:
+        noise = posterior["noise_sd"].values[..., None]
+    else:
+        noise = np.asarray(json.loads(tree.attrs["known"])["noise_sd"])
+    predictive = tree["posterior_predictive"].to_dataset()
+    expected = predictive["expected_reading"].values
+    observed = tree["observed_data"].to_dataset()["reading"].values
+    real, predicted = (discrepancy((values - expected) / noise) for values in (observed, predictive["reading"].values))
+    return float(np.mean(predicted >= real))

@@ -1,0 +1,255 @@
+"""Figures of a record: observables over the drive angle, and their posterior predictive interval."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.axes import (
+    LABELS,
+    PALETTE,
+    PHASES,
+    AxesArray,
+    Floats,
+    channel_panels,
+    handles_once,
+    legend_entry,
+    set_unit,
+)
+from tactile_bayes.record import CHANNELS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tactile_bayes.scanning import Event, SweepEvents
+
+__all__ = ["observables", "predictive"]
+
+_LINES = {"forward": "-", "backward": "--"}
+_SAMPLES = {"forward": "o", "backward": "^"}
+
+
+def observables(
+    record: xr.Dataset, *, events: Mapping[str, SweepEvents] | None = None, axes: Sequence[Axes] | None = None
+) -> AxesArray:
+    """Holding moment and support reaction over the drive angle, like Figures 3 to 6 of Merker et al. 2018.
+
+    Doi 10.1155/2018/1613945. A record without noise, as `scan` gives it, is drawn as lines coloured by contact phase;
+    any other as points, with its truth, where it has one, as thin lines.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+    events : mapping of str to SweepEvents, optional
+        By direction, as a scan has them; first contact, phase changes and snap-off are marked.
+    axes : sequence of 3 Axes, optional
+        One for each of holding_moment, force_x and force_y.
+
+    Returns
+    -------
+    ndarray of Axes, shape (3,)
+        Drive angles are in degrees.
+
+    Raises
+    ------
+    ParameterError
+        If there are not three axes.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> result = scan(paper_profile("II", q=0.5))
+    >>> axes = observables(result.record, events=result.events)
+    >>> axes[-1].get_xlabel()
+    'drive angle $\\\\varphi_0$ [°]'
+    """
+    panels, own = channel_panels(axes)
+    _draw_observables(panels, record, events, with_truth=True)
+    _finish_panels(panels, own)
+    return panels
+
+
+def predictive(
+    record: xr.Dataset, predicted: xr.Dataset, *, axes: Sequence[Axes] | None = None, label: str = "predicted"
+) -> AxesArray:
+    """Measured observables over their posterior predictive interval.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+    predicted : xr.Dataset
+        Over "sample" as the record: for a channel, say force_x, the interval is force_x_lower to force_x_upper, in the
+        units of the record. Channels without an interval are drawn without.
+    axes : sequence of 3 Axes, optional
+        One for each of holding_moment, force_x and force_y.
+    label : str
+        What the interval is called in the legend.
+
+    Returns
+    -------
+    ndarray of Axes, shape (3,)
+        Drive angles are in degrees.
+
+    Raises
+    ------
+    ParameterError
+        If there are not three axes, or `predicted` has not the samples of the record.
+    """
+    if predicted.sizes.get("sample") != record.sizes["sample"]:
+        raise ParameterError(
+            f"predicted has {predicted.sizes.get('sample', 'no')} samples and the record {record.sizes['sample']}: "
+            "give the prediction for every sample of this record"
+        )
+    panels, own = channel_panels(axes)
+    _draw_observables(panels, record, None, with_truth=False)
+    for panel, channel in zip(panels, CHANNELS, strict=True):
+        if f"{channel}_lower" not in predicted or np.isnan(record[channel].values).all():
+            continue
+        for number in np.unique(record["sweep"].values):
+            of_sweep = record["sweep"].values == number
+            angle = _degrees(record["drive_angle"].values[of_sweep])
+            order = np.argsort(angle, kind="stable")
+            lower, upper = (predicted[f"{channel}_{end}"].values[of_sweep][order] for end in ("lower", "upper"))
+            style = {"color": PALETTE["band"], "linewidth": 0.5, "zorder": 0.5, "label": label}
+            panel.fill_between(angle[order], lower, upper, **style)
+    _finish_panels(panels, own)
+    return panels
+
+
+def _finish_panels(panels: AxesArray, own: bool) -> None:
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
+
+    bottom = panels[-1]
+    bottom.set_xlabel(f"{LABELS['drive_angle']} [°]")
+    span = np.ptp(bottom.get_xlim())
+    if 60.0 < span < 400.0:
+        bottom.xaxis.set_major_locator(MultipleLocator(15.0 if span < 150.0 else 30.0))
+    for panel in panels:
+        if len(panel.get_yticks()):
+            panel.yaxis.set_major_locator(MaxNLocator(4))
+    if own:
+        bottom.figure.align_ylabels(list(panels))
+        for panel in panels[:-1]:
+            panel.tick_params(labelbottom=False)
+    found = {label: handle for panel in panels for handle, label in zip(*handles_once(panel), strict=True)}
+    labelled = {label: found[label] for label in sorted(found, key=_legend_order)}
+    if labelled:
+        panels[0].legend(
+            list(labelled.values()),
+            list(labelled),
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            ncols=min(4, len(labelled)),
+            fontsize="small",
+            frameon=False,
+        )
+
+
+def _legend_order(label: str) -> int:
+    """Directions, then phases, then the rest in the order of the sweep."""
+    words = ("forward", "backward", "tip contact", "tangential contact", "truth", "first", "change", "snap")
+    return next((i for i, word in enumerate(words) if word in label), len(words))
+
+
+def _draw_observables(
+    panels: AxesArray, record: xr.Dataset, events: Mapping[str, SweepEvents] | None, *, with_truth: bool
+) -> None:
+    for panel, channel in zip(panels, CHANNELS, strict=True):
+        if np.isnan(record[channel].values).all():
+            _not_measured(panel, channel)
+            continue
+        panel.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
+        for sweep in _sweeps(record):
+            direction = str(sweep["direction"].values[0])
+            of_sweep = events.get(direction) if events is not None else None
+            if _is_exact(sweep, channel):
+                _draw_line(panel, sweep, channel, channel, of_sweep, linewidth=1.6)
+                legend_entry(panel, direction, color="0.35", linestyle=_LINES[direction], linewidth=1.6)
+            else:
+                style = {"marker": _SAMPLES[direction], "markersize": 2.6, "color": PALETTE["sample"]}
+                style |= {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 0.6}
+                panel.plot(_degrees(sweep["drive_angle"].values), sweep[channel].values, **style)
+                legend_entry(panel, f"measured {direction}", **style)
+                if with_truth and f"truth_{channel}" in sweep:
+                    _draw_line(panel, sweep, f"truth_{channel}", channel, of_sweep, linewidth=1.0)
+            if of_sweep is not None:
+                _draw_events(panel, of_sweep, channel)
+        values = record[channel].values
+        set_unit(panel.yaxis, f"{LABELS[channel]}\n", channel, record[channel].attrs, values)
+
+
+def _sweeps(record: xr.Dataset) -> Iterator[xr.Dataset]:
+    for number in np.unique(record["sweep"].values):
+        yield record.isel(sample=np.flatnonzero(record["sweep"].values == number))
+
+
+def _is_exact(sweep: xr.Dataset, channel: str) -> bool:
+    """Whether a channel is that of a scan, or of a load cell without noise."""
+    if "truth_contact_phase" not in sweep:
+        return False
+    truth = f"truth_{channel}"
+    return truth not in sweep or bool(np.array_equal(sweep[truth].values, sweep[channel].values))
+
+
+def _draw_line(
+    ax: Axes, sweep: xr.Dataset, column: str, channel: str, events: SweepEvents | None, *, linewidth: float
+) -> None:
+    """A channel without noise, coloured by phase, and complete up to the events."""
+    angle_column = "truth_drive_angle" if "truth_drive_angle" in sweep else "drive_angle"
+    angle, value = sweep[angle_column].values, sweep[column].values
+    direction = str(sweep["direction"].values[0])
+    style: dict[str, Any] = {"linestyle": _LINES[direction], "linewidth": linewidth, "zorder": 2.5}
+    phase = sweep["truth_contact_phase"].values.astype(object) if "truth_contact_phase" in sweep else None
+    if phase is None:
+        ax.plot(_degrees(angle), value, color=PALETTE["change"], **style)
+        legend_entry(ax, "truth", color=PALETTE["change"], linewidth=linewidth)
+        return
+    if events is not None:
+        marked = [events.first_contact, *events.transitions, events.snap_off]
+        following = [event.kind.split(" → ")[-1] for event in marked[:-1]]
+        angle = np.append(angle, [event.drive_angle for event in marked])
+        value = np.append(value, [getattr(event, channel) for event in marked])
+        phase = np.append(phase, [*following, following[-1]])
+        order = np.argsort(angle if direction == "forward" else -angle, kind="stable")
+        angle, value, phase = angle[order], value[order], phase[order]
+    starts = np.flatnonzero(np.append(True, phase[1:] != phase[:-1]))
+    for start, stop in zip(starts, np.append(starts[1:], phase.size), strict=True):
+        # A run goes on to the first state of the next one, unless the rod has let go in between.
+        joined = stop < phase.size and (phase[stop] != "none")
+        run = slice(start, stop + 1 if joined else stop)
+        name = str(phase[start])
+        ax.plot(_degrees(angle[run]), value[run], color=PALETTE[name], **style)
+        if name in PHASES:
+            prefix = "true " if column != channel else ""
+            legend_entry(ax, prefix + PHASES[name], color=PALETTE[name], linewidth=linewidth)
+
+
+def _draw_events(ax: Axes, events: SweepEvents, channel: str) -> None:
+    styles: list[tuple[tuple[Event, ...], str, dict[str, Any]]] = [
+        ((events.first_contact,), "first contact", {"marker": "o", "markerfacecolor": "white", "markersize": 4.5}),
+        (events.transitions, "phase change", {"marker": "D", "markersize": 4.0}),
+        ((events.snap_off,), "snap-off", {"marker": "X", "markersize": 7.0, "markeredgecolor": "white"}),
+    ]
+    for marked, label, style in styles:
+        if marked:
+            angles = _degrees([event.drive_angle for event in marked])
+            values = [getattr(event, channel) for event in marked]
+            ax.plot(angles, values, color=PALETTE["change"], linestyle="none", zorder=4, label=label, **style)
+
+
+def _not_measured(ax: Axes, channel: str) -> None:
+    ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", va="center", color=PALETTE["none"])
+    ax.set_yticks([])
+    ax.set_ylabel(f"{LABELS[channel]}\n")
+
+
+def _degrees(angle: ArrayLike) -> Floats:
+    return np.degrees(np.asarray(angle, dtype=float))

@@ -1,0 +1,224 @@
+"""A run: everything that is made of one record, in one folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.files import write_atomically
+from tactile_bayes.inference.contour import contours_of, infer_contour
+from tactile_bayes.inference.ensembles import Progress, SamplerSettings
+from tactile_bayes.inference.result import posterior_draws, write_result
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import reconstruct, with_rod
+from tactile_bayes.record import CHANNELS, present_channels, rod_of, validate
+from tactile_bayes.rod import Rod
+from tactile_bayes.scanning import scan
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.gap import gap
+
+__all__ = ["Run", "analyse", "summary"]
+
+DIRECTIONS: tuple[Literal["forward"], Literal["backward"]] = ("forward", "backward")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What `analyse` made.
+
+    Attributes
+    ----------
+    posterior : xr.DataTree
+    contacts : xr.Dataset or None
+        Contact points of Step 2; None where a load channel is missing.
+    band : xr.Dataset
+    files : mapping of str to Path
+        By what they hold.
+    """
+
+    posterior: xr.DataTree
+    contacts: xr.Dataset | None
+    band: xr.Dataset
+    files: Mapping[str, Path]
+
+
+def analyse(
+    measured: xr.Dataset,
+    out: str | os.PathLike[str],
+    *,
+    family: str = "parabola",
+    load_cell: LoadCell | None = None,
+    rod: Rod | None = None,
+    friction: float = 0.0,
+    probability: float = 0.95,
+    seed: int = 1,
+    settings: SamplerSettings | None = None,
+    truth: Any = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> Run:
+    """Contact points, contour posterior, band and figures of a record, written to a folder.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A record.
+    out : path-like
+        Folder for posterior.nc, contacts.csv, band.csv, summary.csv and the figures; made if it is not there. Files of
+        these names in it are replaced.
+    family, load_cell, rod, friction, seed, settings, progress
+        As `infer_contour` takes them.
+    probability : float
+        Of the band and of the intervals in the summary.
+    truth : Contour, optional
+        Drawn into the figures.
+
+    Returns
+    -------
+    Run
+    """
+    measured = with_rod(validate(measured), rod)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    result = infer_contour(
+        measured,
+        family=family,
+        load_cell=load_cell,
+        seed=seed,
+        friction=friction,
+        settings=settings,
+        progress=progress,
+    )
+    files = {"posterior": folder / "posterior.nc"}
+    write_result(result, files["posterior"])
+
+    contacts = None
+    if set(present_channels(measured)) == set(CHANNELS):
+        contacts = reconstruct(measured, load_cell=load_cell, friction=friction)
+        files["contacts"] = folder / "contacts.csv"
+        _write_table(contacts.to_dataframe(), files["contacts"])
+    band = contour_band(result, _reach(result), probability)
+    files["band"] = folder / "band.csv"
+    _write_table(band.to_dataframe(), files["band"])
+    files["summary"] = folder / "summary.csv"
+    _write_table(summary(result, probability).to_dataframe(), files["summary"])
+    files |= _draw(measured, result, contacts, band, folder, truth=truth, friction=friction)
+    return Run(result, contacts, band, files)
+
+
+def summary(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
+    """Median, central interval, R̂ and effective sample size of every parameter, and the gap where there is one.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    probability : float
+        Of the central interval.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "quantity": median, lower, upper, r_hat, ess_bulk, ess_tail, unit.
+    """
+    draws, stats = posterior_draws(posterior), posterior["sample_stats"].to_dataset()
+    levels = [0.5 * (1.0 - probability), 0.5, 0.5 * (1.0 + probability)]
+    rows: list[tuple[Any, ...]] = []
+    for name in stats.parameter.values:
+        lower, median, upper = np.quantile(draws[name], levels)
+        diagnostics = (float(stats[d].sel(parameter=name)) for d in ("r_hat", "ess_bulk", "ess_tail"))
+        rows.append((name, median, lower, upper, *diagnostics, draws[name].attrs["units"]))
+    if set(posterior["events"].stroke.values) == {"forward", "backward"}:
+        width = gap(posterior, probability)["width"]
+        values = (float(width.sel(bound=b)) for b in ("median", "lower", "upper"))
+        rows.append(("gap width", *values, np.nan, np.nan, np.nan, width.attrs["units"]))
+    quantity, *columns = zip(*rows, strict=True)
+    names = ("median", "lower", "upper", "r_hat", "ess_bulk", "ess_tail", "unit")
+    return xr.Dataset(
+        {name: ("quantity", list(column)) for name, column in zip(names, columns, strict=True)},
+        coords={"quantity": list(quantity)},
+        attrs={"probability": probability},
+    )
+
+
+def _reach(result: xr.DataTree) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Where the rod touched, and a little on."""
+    events = result["events"].to_dataset()
+    x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
+    lo, hi = np.quantile(x, [0.05, 0.95])
+    return np.linspace(lo, hi, 201)
+
+
+def _write_table(table: Any, path: Path) -> None:
+    with write_atomically(path) as temporary:
+        table.to_csv(temporary)
+
+
+def _draw(
+    measured: xr.Dataset,
+    result: xr.DataTree,
+    contacts: xr.Dataset | None,
+    band: xr.Dataset,
+    folder: Path,
+    *,
+    truth: Any,
+    friction: float,
+) -> dict[str, Path]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from tactile_bayes import plotting
+
+    files: dict[str, Path] = {}
+
+    def save(name: str, figure: Any) -> None:
+        files[name] = folder / f"{name.replace(' ', '_')}.png"
+        FigureCanvasAgg(figure)
+        with write_atomically(files[name]) as temporary:
+            figure.savefig(temporary, dpi=200, format="png")
+
+    def panels(rows: int, columns: int, width: float, height: float, **options: Any) -> tuple[Any, Any]:
+        figure = Figure(figsize=(width, height), layout="constrained")
+        return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+    draws = posterior_draws(result)
+    middle = contours_of(draws.median(("chain", "draw")), result.attrs["family"])
+    middle = middle.broadcast_to((1,)).take(np.array(0))
+    strokes = list(result["events"].stroke.values)
+    directions: list[Literal["forward", "backward"]] = [d for d in DIRECTIONS if d in strokes]
+    base = float(measured.base_x[0]), float(measured.base_y[0])
+    fitted = scan(
+        middle,
+        direction="both" if len(directions) == 2 else directions[0],
+        base=base,
+        rod=rod_of(measured),
+        friction=friction,
+    )
+
+    figure, axes = panels(3, 1, 7.0, 5.4, sharex=True)
+    plotting.observables(measured, events=fitted.events, axes=axes[:, 0])
+    save("observables", figure)
+    figure, axes = panels(len(directions), 1, 7.0, 4.0 * len(directions))
+    for direction, ax in zip(directions, axes[:, 0], strict=True):
+        plotting.rods(fitted, direction=direction, ax=ax)
+    save("rods", figure)
+    bounds = gap(result) if len(directions) == 2 else None
+    edges = None
+    if bounds is not None:
+        edges = float(bounds["left"].sel(bound="median")), float(bounds["right"].sel(bound="median"))
+    figure, axes = panels(1, 1, 7.0, 4.0)
+    plotting.contour(band.x.values, truth=truth, contacts=contacts, band=band, gap=edges, base=base, ax=axes[0, 0])
+    save("contour", figure)
+    names = list(draws.data_vars)
+    figure, axes = panels(len(names), 2, 7.0, 1.6 * len(names))
+    plotting.trace(result, axes=axes)
+    save("trace", figure)
+    figure, axes = panels(len(names), len(names), 1.6 * len(names) + 0.6, 1.6 * len(names) + 0.6)
+    plotting.pairs(result, axes=axes)
+    save("pairs", figure)
+    return files

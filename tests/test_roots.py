@@ -1,0 +1,60 @@
+"""Newton kept in its bracket, against scipy's brentq."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tactile_bayes.roots import falling_root
+
+EPS = np.finfo(float).eps
+
+
+def shifted_cubes(shift):
+    """x³ + x falls through `shift` from 2 to −2, one function a shift."""
+
+    def function(i, x):
+        return x**3 + x - shift[i], 3 * x**2 + 1
+
+    return function
+
+
+def test_many_roots_at_once_against_brentq():
+    shift = np.linspace(-9.9, 9.9, 37)
+    found = falling_root(shifted_cubes(shift), np.full(37, 2.0), np.full(37, -2.0))
+    truth = [brentq(lambda x, s=s: x**3 + x - s, -2, 2, xtol=1e-15, rtol=4 * EPS) for s in shift]
+    np.testing.assert_allclose(found, truth, rtol=0, atol=2e-14 * 4)  # 1e-14 of the bracket, from both
+
+
+@pytest.mark.parametrize("start", [None, np.array([1.9]), np.array([0.2])])
+def test_functions_that_send_newton_astray(start):
+    """From 1.9 Newton on arctan(5 − 5x) leaves the bracket; the answer is the root all the same."""
+
+    def function(_i, x):
+        return np.arctan(100 * (1 - x)), -100 / (1 + (100 * (1 - x)) ** 2)
+
+    root = falling_root(function, np.array([0.0]), np.array([2.0]), start)
+    np.testing.assert_allclose(root, 1.0, rtol=0, atol=2e-14)
+
+
+def test_a_flat_root_and_an_infinite_slope():
+    def cube(_i, x):
+        return -(x**3), -3 * x**2
+
+    def root(_i, x):
+        with np.errstate(divide="ignore"):
+            return -np.cbrt(x), -1 / (3 * np.cbrt(x) ** 2)
+
+    for function in (cube, root):
+        found = falling_root(function, np.array([-1.0]), np.array([0.7]))
+        assert abs(found[0]) < 1e-4 if function is cube else abs(found[0]) <= 2e-14
+
+
+def test_bracket_of_no_width_nothing_and_inputs_left_alone():
+    lo, hi = np.array([1.0, 2.0]), np.array([1.0, -2.0])
+    found = falling_root(shifted_cubes(np.array([2.0, 0.0])), lo, hi)
+    np.testing.assert_array_equal(lo, [1.0, 2.0])
+    np.testing.assert_array_equal(hi, [1.0, -2.0])
+    np.testing.assert_allclose(found, [1.0, 0.0], rtol=0, atol=4e-14)
+    assert falling_root(shifted_cubes(np.zeros(0)), np.zeros(0), np.zeros(0)).shape == (0,)
