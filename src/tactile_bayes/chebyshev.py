@@ -50,8 +50,7 @@ def polynomials(count: int, z: Floats) -> Floats:
     if count > 1:
         out[1] = x
     for k in range(2, count):
-        np.multiply(2.0 * x, out[k - 1], out=out[k])
-        out[k] -= out[k - 2]
+        out[k] = 2.0 * x * out[k - 1] - out[k - 2]
     return np.moveaxis(out, 0, -1)
 
 

@@ -20,7 +20,16 @@ from numpy.typing import NDArray
 from tactile_bayes import chebyshev
 from tactile_bayes.contours.base import Locus
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import TANGENTIAL, TIP, Wrench, tangential_arclength, wrench_from_contact
+from tactile_bayes.elastica import (
+    TANGENTIAL,
+    TIP,
+    QuickWrench,
+    Wrench,
+    quick_tangential_arclength,
+    quick_wrench,
+    tangential_arclength,
+    wrench_from_contact,
+)
 from tactile_bayes.roots import falling_root
 
 __all__ = ["CHANNELS", "Paths", "Reach", "SnapOff", "States", "trace"]
@@ -36,8 +45,8 @@ _LAST_STEP = 1e-6
 
 
 _BRIEF = 1e-6
-"""Stretch of tip contact after its onset, in the contour's parameter, that is so short that the slope of the drive angle
-would be lost in rounding; it rises there."""
+"""Stretch of tip contact after its onset, in the contour's parameter, so short that the slope of the drive angle would
+be lost in rounding; it rises there."""
 
 
 class Reach(IntEnum):
@@ -211,7 +220,8 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     order : int
         Number of Chebyshev nodes on a segment.
     exact_events : bool
-        Whether phase changes and snap-off are computed to rounding, or to the accuracy of the interpolation.
+        Whether phase changes and snap-off are computed to rounding, and states on the nodes exactly; else both are as
+        good as the interpolation, which is what a likelihood needs and several times faster.
     """
     reach, distance, begin, end, tip_first = _limits(seen, friction_angle)
     segments = _segments(seen, np.flatnonzero(reach == Reach.TOUCHES), begin, end, tip_first, friction_angle, order)
@@ -220,12 +230,10 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
 
     # Over the way along the contour: drive angle and its first maximum.
     ways = np.broadcast_to(chebyshev.nodes(order), (segments.lane.size, order))
-    phase = np.where(segments.tip, TIP, TANGENTIAL)[:, None]
-    parameter, _ = segments.take(np.s_[:, None]).along(ways)
-    states = _states(seen, segments.lane[:, None], parameter, friction_angle, phase=phase, derivatives=False)
-    angle = chebyshev.coefficients(states.wrench.drive_angle)
+    sampled = _sample(seen, segments, ways, friction_angle, exact_events)
+    angle = chebyshev.coefficients(sampled.drive_angle)
     keep, stop, kind = _first_maximum(segments, angle)
-    loads = [chebyshev.coefficients(getattr(states.wrench, name))[:, keep] for name in CHANNELS]
+    loads = [chebyshev.coefficients(getattr(sampled, name))[:, keep] for name in CHANNELS]
     segments, angle = segments.take(keep), angle[:, keep]
     folds = kind == SnapOff.FOLD
     if exact_events:
@@ -243,10 +251,10 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     node = chebyshev.nodes(order)
     end_rate = chebyshev.evaluate(chebyshev.derivative(angle), stop) * stop / (end_angle - begin_angle)
     steadiness = np.where(folds, 0.0, np.clip(end_rate, 0.0, 1.0))
-    ahead = 1.0 - node[:, None]
-    wanted = end_angle - (end_angle - begin_angle) * ahead * (steadiness + (1.0 - steadiness) * ahead)
-    way = _invert(angle, np.broadcast_to(stop, wanted.shape), wanted)
-    curves = [way, *(chebyshev.evaluate(load[:, None], way) for load in loads)]
+    ahead, steady = 1.0 - node, steadiness[:, None]
+    wanted = end_angle[:, None] - (end_angle - begin_angle)[:, None] * ahead * (steady + (1.0 - steady) * ahead)
+    way = _invert(angle, stop, wanted)
+    curves = np.concatenate([way[..., None], chebyshev.polynomials(order, way) @ np.stack(loads).T], axis=-1)
 
     def per_lane(values: Floats, of: NDArray[np.bool_]) -> Floats:
         out = np.full(seen.lanes, np.nan)
@@ -269,7 +277,7 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
         begin_angle=begin_angle,
         end_angle=end_angle,
         steadiness=steadiness,
-        coefficients=chebyshev.coefficients(np.moveaxis(np.stack(curves), 1, -1)),
+        coefficients=chebyshev.coefficients(np.moveaxis(curves, 1, -1)).swapaxes(1, 2),
     )
 
 
@@ -280,13 +288,23 @@ def _states(
     friction_angle: float,
     *,
     phase: NDArray[Any] | None = None,
-    derivatives: bool = True,
 ) -> States:
     locus = seen.locate(lane, parameter)
-    wrench = wrench_from_contact(
-        locus.x, locus.y, locus.slope_angle, friction_angle, phase=phase, derivatives=derivatives
-    )
+    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle, phase=phase)
     return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
+
+
+def _sample(
+    seen: SeenContour, segments: _Segments, ways: Floats, friction_angle: float, exactly: bool
+) -> Wrench | QuickWrench:
+    """Wrenches at ways, shape (segments, k), along the segments."""
+    parameter, _ = segments.take(np.s_[:, None]).along(ways)
+    lane, tip = segments.lane[:, None], segments.tip[:, None]
+    if exactly or friction_angle:
+        phase = np.where(tip, TIP, TANGENTIAL)
+        return _states(seen, lane, parameter, friction_angle, phase=phase).wrench
+    locus = seen.locate(lane, parameter)
+    return quick_wrench(locus.x, locus.y, locus.slope_angle, tip)
 
 
 def _angle_rate(seen: SeenContour, lane: Index, state: States) -> Floats:
@@ -375,7 +393,11 @@ def _segments(
 
     node = chebyshev.nodes(order)
     locus = seen.locate(lane[:, None], start[:, None] + (stop - start)[:, None] * node)
-    excess = chebyshev.coefficients(tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0)
+    if friction_angle:
+        length = tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle)
+    else:
+        length = quick_tangential_arclength(locus.x, locus.y, locus.slope_angle)
+    excess = chebyshev.coefficients(length - 1.0)
     grid = np.concatenate([[0.0], node, [1.0]])
     beyond = chebyshev.tabulate(excess, grid) > 0.0
     piece, cell = np.nonzero(beyond[:, :-1] != beyond[:, 1:])
@@ -470,13 +492,15 @@ def _polish_fold(seen: SeenContour, segments: _Segments, angle: Floats, stop: Fl
 
 
 def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
-    """Arguments in [0, stop] at which interpolants that grow there take wanted values, shape (k, functions)."""
+    """Arguments in [0, stop] at which interpolants that grow there take wanted values, shape (functions, k)."""
+    order = coefficients.shape[0]
     slope = np.zeros_like(coefficients)
     slope[:-1] = chebyshev.derivative(coefficients)
-    both = np.stack([coefficients, slope], axis=1)[:, :, None]
-    z = stop * chebyshev.nodes(wanted.shape[0])[:, None]
+    both = np.stack([coefficients, slope]).T  # (function, order, 2)
+    stop = stop[:, None]
+    z = stop * chebyshev.nodes(wanted.shape[1])
     for _ in range(8):
-        value, rate = chebyshev.evaluate(both, z)
+        value, rate = np.moveaxis(chebyshev.polynomials(order, z) @ both, -1, 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = (value - wanted) / rate
         z = np.clip(z - step, 0.0, stop)
@@ -484,13 +508,14 @@ def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
         if np.all(settled):
             return z
 
+    which, k = np.nonzero(~settled)
+    goal = wanted[which, k]
+
     def missing(i: Index, at: Floats) -> tuple[Floats, Floats]:
-        value, rate = chebyshev.evaluate(both[:, :, 0, which[i]], at)
+        value, rate = np.einsum("np,npc->cn", chebyshev.polynomials(order, at), both[which[i]])
         return goal[i] - value, -rate
 
-    k, which = np.nonzero(~settled)
-    goal = wanted[k, which]
-    z[k, which] = falling_root(missing, np.zeros(k.size), np.broadcast_to(stop, wanted.shape)[k, which])
+    z[which, k] = falling_root(missing, np.zeros(k.size), np.broadcast_to(stop, wanted.shape)[which, k])
     return z
 
 

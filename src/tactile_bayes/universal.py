@@ -202,14 +202,6 @@ def _tangential_table() -> Floats:
     return chebyshev.coefficients(chi**2 / angle)
 
 
-class _TipTable(NamedTuple):
-    """Chebyshev coefficients over polar coordinates in (tilt, lack): angle, and share of the greatest radius."""
-
-    radius: Floats
-    chi2: Floats
-    tilt: Floats
-
-
 @functools.cache
 def _tangential_numbers_table() -> Floats:
     """Coefficients, shape (order, 3), of `TangentialNumbers` with what makes them vanish divided out."""
