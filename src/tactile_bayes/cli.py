@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +18,30 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main"]
 
+
+class _Commands(TyperGroup):
+    """Refusals are one line on stderr and exit code 2, an interrupt is exit code 130."""
+
+    def invoke(self, ctx: Any) -> Any:
+        from tactile_bayes.errors import TactileBayesError
+
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:  # whoever was reading has read enough
+            raise
+        except TactileBayesError as error:
+            words, code = str(error), 2
+        except OSError as error:
+            where = f"{error.filename}: " if error.filename else ""
+            words, code = where + (error.strerror or str(error)), 2
+        except KeyboardInterrupt:
+            words, code = "interrupted, results are incomplete", 130
+        typer.echo(f"tactile-bayes: {words}", err=True)
+        raise typer.Exit(code)
+
+
 app = typer.Typer(
+    cls=_Commands,
     help="Contours from what a flexible rod's base feels: contact points, posteriors, bands.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -30,28 +54,26 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only th
 
 
 def main() -> None:
-    """Entry point: refusals are one line on stderr and exit code 2, an interrupt is exit code 130."""
-    from tactile_bayes.errors import TactileBayesError
+    """Entry point."""
+    app()
 
-    try:
-        app()
-    except TactileBayesError as error:
-        print(f"tactile-bayes: {error}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        print("tactile-bayes: interrupted", file=sys.stderr)
-        sys.exit(130)
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from tactile_bayes import __version__
+
+        typer.echo(__version__)
+        raise typer.Exit
 
 
 @app.callback()
 def _options(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)] = False,
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version and stop.", callback=_print_version, is_eager=True),
+    ] = False,
 ) -> None:
-    if version:
-        from tactile_bayes import __version__
-
-        print(__version__)
-        raise typer.Exit
+    pass
 
 
 @app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")
@@ -85,11 +107,19 @@ def infer(
 
     if (length is None) != (flexural_rigidity is None):
         raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
+    if diameter and length is None:
+        raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
     rod = None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
     cell = None
     if force_noise is not None or moment_noise is not None:
         cell = LoadCell(force_noise=force_noise or 0.0, moment_noise=moment_noise or 0.0)
     measured = read_record(record, rod=rod, missing=missing or ())
+    if measured.attrs.get("units_source") == "assumed":
+        typer.echo(
+            "The record states no units: its numbers are taken as dimensionless, in units of the rod (L, EI/L, EI/L²). "
+            "If they are SI, give --length and --flexural-rigidity.",
+            err=True,
+        )
     with _progress(quiet) as progress:
         run = analyse(
             measured,
@@ -175,7 +205,8 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
     console = Console()
     console.print(table)
     attrs = run.posterior.attrs
-    console.print(("" if attrs["converged"] else "NOT CONVERGED. ") + attrs["message"], highlight=False, soft_wrap=True)
+    message = attrs["message"].replace("not converged", "NOT CONVERGED", 1)
+    console.print(message, highlight=False, soft_wrap=True)
     if run.contacts is None:
         console.print("No contact points: Step 2 needs all three load channels.")
     console.print()

@@ -33,7 +33,8 @@ def falling_root(
         To 1e-14 of the bracket.
     """
     lo, hi = lo.astype(float), hi.astype(float)
-    settled = 1e-14 * np.abs(hi - lo)
+    last_step = np.abs(hi - lo)
+    settled = 1e-14 * last_step
     x = 0.5 * (lo + hi) if start is None else start.astype(float)
     active = np.arange(lo.size)
     for _ in range(100):
@@ -46,9 +47,10 @@ def falling_root(
         with np.errstate(divide="ignore", invalid="ignore"):
             new = x[active] - value / slope
         a, b = lo[active], hi[active]
-        inside = (new - a) * (new - b) <= 0.0
-        new = np.where(inside, new, 0.5 * (a + b))
+        # Steps that do not shrink by half go round in circles, for instance about a kink.
+        trusted = ((new - a) * (new - b) <= 0.0) & (np.abs(new - x[active]) <= 0.5 * last_step[active])
+        new = np.where(trusted, new, 0.5 * (a + b))
         step = np.abs(new - x[active])
-        x[active] = new
+        x[active], last_step[active] = new, step
         active = active[(step > settled[active]) & (value != 0.0)]
     return x

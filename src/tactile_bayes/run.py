@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
@@ -82,6 +83,8 @@ def analyse(
     -------
     Run
     """
+    if not 0.0 < probability < 1.0:
+        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
     measured = with_rod(validate(measured), rod)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
@@ -211,8 +214,9 @@ def _draw(
     edges = None
     if bounds is not None:
         edges = float(bounds["left"].sel(bound="median")), float(bounds["right"].sel(bound="median"))
-    figure, axes = panels(1, 1, 7.0, 4.0)
+    figure, axes = panels(2, 1, 7.0, 5.6, height_ratios=(2.2, 1.0))
     plotting.contour(band.x.values, truth=truth, contacts=contacts, band=band, gap=edges, base=base, ax=axes[0, 0])
+    plotting.band_detail(band, truth=truth, gap=edges, ax=axes[1, 0])
     save("contour", figure)
     names = list(draws.data_vars)
     figure, axes = panels(len(names), 2, 7.0, 1.6 * len(names))

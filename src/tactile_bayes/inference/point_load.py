@@ -73,7 +73,9 @@ _ROUGH = 0.01
 """Noise over range of the readings that the search begins with."""
 
 _INFLATION = 2.0
-"""Scatter of the walkers' starts over the sd of the normal approximation."""
+"""Scatter of the walkers' starts over the sd of the normal approximation; halved until enough of them are possible."""
+
+_LEAST_INFLATION = 1e-3
 
 _DROP = 10.0
 """Log-probability per parameter that a start may lie below the centre: farther down a poor mode might hold it."""
@@ -340,6 +342,33 @@ def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[
     return centre, covariance
 
 
+def _scatter(
+    model: _Model, centre: Floats, covariance: Floats, top: float, *, seed: Seed, settings: SamplerSettings
+) -> Floats:
+    """Walkers around the centre, as widely as the posterior allows: it may be bent where its approximation is straight."""
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+
+    def not_far_down(points: Floats) -> Floats:
+        drop = top - model.log_probability(points)
+        return np.where(drop < _DROP * centre.size, 0.0, -np.inf)
+
+    inflation = _INFLATION
+    while True:
+
+        def around_centre(rng: np.random.Generator, count: int, inflation: float = inflation) -> Floats:
+            return centre + inflation * rng.normal(size=(count, centre.size)) @ root.T
+
+        try:
+            return scatter_walkers(
+                not_far_down, around_centre, parameters=centre.size, seed=seed, settings=settings, max_rounds=20
+            )
+        except InferenceError:
+            inflation *= 0.5
+            if inflation < _LEAST_INFLATION:
+                raise
+
+
 def _rms(residuals: Floats, fitted: int) -> float:
     """Root mean square of residuals over the noise, not quite zero where the fit is perfect."""
     return max(float(np.sqrt((residuals**2).sum() / (residuals.size - fitted))), 1e-9)
@@ -475,17 +504,7 @@ def infer_point_load(
             "no clamp that the priors allow lets the rod reach all probe points: measure `axial` roughly from the "
             "clamp along the undeflected rod, or widen the priors"
         )
-    values, vectors = np.linalg.eigh(covariance)
-    spread = _INFLATION * vectors * np.sqrt(np.maximum(values, 0.0))
-
-    def around_centre(rng: np.random.Generator, count: int) -> Floats:
-        return centre + rng.normal(size=(count, centre.size)) @ spread.T
-
-    def not_far_down(points: Floats) -> Floats:
-        drop = top - model.log_probability(points)
-        return np.where(drop < _DROP * centre.size, 0.0, -np.inf)
-
-    start = scatter_walkers(not_far_down, around_centre, parameters=centre.size, seed=for_walkers, settings=settings)
+    start = _scatter(model, centre, covariance, top, seed=for_walkers, settings=settings)
     draws = sample(
         model.log_probability, start, names=model.names, seed=for_walkers, settings=settings, progress=progress
     )

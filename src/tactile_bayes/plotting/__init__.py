@@ -6,8 +6,8 @@ made; its settings are left alone, and nothing is shown.
 """
 
 from tactile_bayes.plotting.axes import PALETTE
-from tactile_bayes.plotting.maps import contour, rods
+from tactile_bayes.plotting.maps import band_detail, contour, rods
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.records import observables, predictive
 
-__all__ = ["PALETTE", "contour", "observables", "pairs", "predictive", "rods", "trace"]
+__all__ = ["PALETTE", "band_detail", "contour", "observables", "pairs", "predictive", "rods", "trace"]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tactile_bayes.contours.base import Contour
     from tactile_bayes.scanning import Event, Scan
 
-__all__ = ["contour", "rods"]
+__all__ = ["band_detail", "contour", "rods"]
 
 _CONTACT_MARKERS = {"tip": "o", "tangential": "s"}
 
@@ -207,6 +207,54 @@ def contour(
     margin = 0.03 * (high - low)
     ax.set_xlim(low - margin, high + margin)
     _finish_map(ax, attrs)
+    return ax
+
+
+def band_detail(
+    band: xr.Dataset,
+    *,
+    truth: Contour | None = None,
+    gap: tuple[float, float] | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """A band measured from its median, enlarged as far as it fills the Axes; a good one is invisible on a map.
+
+    Parameters
+    ----------
+    band : xr.Dataset
+        Over coordinate "x": lower, upper and median.
+    truth : Contour, optional
+        The true contour.
+    gap : (float, float), optional
+        x of the contacts between which nothing was touched.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> flat = {"lower": ("x", [-1e-3, -2e-3]), "median": ("x", [0.0, 0.0]), "upper": ("x", [1e-3, 2e-3])}
+    >>> band_detail(xr.Dataset(flat, coords={"x": [0.0, 1.0]})).get_ylabel()
+    '$y$ − median [$L$]'
+    """
+    ax = single_axes() if ax is None else ax
+    x, median = band["x"].values, band["median"].values
+    lower, upper = band["lower"].values - median, band["upper"].values - median
+    if gap is not None:
+        _draw_gap(ax, (float(gap[0]), float(gap[1])))
+    ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5)
+    ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0)
+    if truth is not None:
+        ax.plot(x, np.asarray(truth.height(x)) - median, color=PALETTE["change"], linewidth=1.0, linestyle="--")
+    margin = 0.03 * float(np.ptp(x))
+    ax.set_xlim(float(x.min()) - margin, float(x.max()) + margin)
+    attrs = band["lower"].attrs or band["x"].attrs
+    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, x)
+    set_unit(ax.yaxis, LABELS["contact_y"] + " − median ", "contact_y", attrs, np.concatenate([lower, upper]))
     return ax
 
 

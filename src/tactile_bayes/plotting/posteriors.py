@@ -181,7 +181,8 @@ def _parameters(posterior: xr.DataTree | xr.Dataset, names: Sequence[str] | None
     parameters = []
     for name in names or known:
         values = posterior[name].transpose("chain", "draw", ...)
-        unit = str(values.attrs.get("units", "1")).removeprefix("1")
+        stated = str(values.attrs.get("units", "1"))
+        unit = "" if stated == "1" else stated
         for index in np.ndindex(values.shape[2:]):
             inside = ", ".join(map(str, index))
             element, label = (f"{name}[{inside}]", f"{_symbol(name)}[{inside}]") if index else (name, _symbol(name))
