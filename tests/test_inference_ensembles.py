@@ -10,8 +10,8 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference import ensembles
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, diagnosis, sample, scatter_walkers
+from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time, walker_major
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=40)
 
@@ -116,13 +116,13 @@ def test_walker_major_layout_gives_the_right_effective_sample_size():
     noise = np.random.default_rng(7).normal(size=(chains, steps + 200, walkers, 1))
     samples = lfilter([1.0], [1.0, -rho], noise, axis=1)[:, 200:]
     draws = chains * steps * walkers
-    laid_out = ensembles._walker_major(samples)
+    laid_out = walker_major(samples)
     np.testing.assert_array_equal(laid_out[1, :steps, 0], samples[1, :, 0, 0])
     np.testing.assert_array_equal(laid_out[2, -steps:, 0], samples[2, :, -1, 0])
     ess = array_stats.ess(laid_out, chain_axis=0, draw_axis=1)[0]
     error = 4.0 * np.sqrt(2.0 * (10.0 * tau + 1.0) / draws) + 2.0 * tau / steps
     assert ess == pytest.approx(draws / tau, rel=error)
-    assert ensembles._autocorrelation_time(samples)[0] == pytest.approx(tau, rel=error)
+    assert autocorrelation_time(samples)[0] == pytest.approx(tau, rel=error)
     step_major = array_stats.ess(samples.reshape(chains, -1, 1), chain_axis=0, draw_axis=1)[0]
     assert step_major > 0.5 * tau * ess
 
@@ -245,7 +245,7 @@ def test_an_interrupt_of_the_diagnosis_leaves_what_has_been_drawn(monkeypatch):
             raise KeyboardInterrupt
         return np.array([1.0, 1.0])
 
-    monkeypatch.setattr(ensembles.array_stats, "rhat", rhat)
+    monkeypatch.setattr(diagnosis.array_stats, "rhat", rhat)
     draws = draw_from(standard, 2, settings=SMALL)
     assert draws.steps_run == 20
     assert not draws.converged

@@ -1,0 +1,22 @@
+"""Several independent emcee ensembles, run until R̂ and the effective sample size say that they agree.
+
+The walkers of one ensemble propose from one another and are not independent, so a convergence test across walkers
+means nothing. Here a chain is a whole ensemble, several of them run side by side from their own starts and random
+numbers, and the diagnostics compare ensembles.
+
+The draws of a chain are laid out walker-major: each walker's history in one piece, one walker after the other. Laid
+out step by step, neighbours in the array would be different walkers, and any estimate of autocorrelation would take
+the draws for nearly independent.
+
+The proposals are differential evolution (ter Braak 2006, doi 10.1007/s11222-006-8769-1; Nelson et al. 2014,
+doi 10.1088/0067-0049/210/1/11): the difference of two other walkers, scaled, and one time in ten unscaled, which lets
+a walker jump between separated modes. The snooker proposal of emcee 3.1.6 does not leave the target invariant and is
+not used.
+"""
+
+from tactile_bayes.inference.ensembles.draws import Draws
+from tactile_bayes.inference.ensembles.sampling import Progress, sample
+from tactile_bayes.inference.ensembles.settings import SamplerSettings
+from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers
+
+__all__ = ["Draws", "Progress", "SamplerSettings", "Seed", "sample", "scatter_walkers"]

@@ -1,0 +1,76 @@
+"""What the draws of a run say about themselves: R̂ across ensembles, effective sample sizes, autocorrelation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import emcee
+import numpy as np
+from arviz_stats.base.array import array_stats
+from numpy.typing import NDArray
+
+__all__ = ["Diagnosis", "autocorrelation_time", "walker_major"]
+
+
+Floats = NDArray[np.float64]
+
+_TAIL = (0.05, 0.95)
+"""Quantiles whose effective sample size is the tail's."""
+
+
+class Diagnosis:
+    """What the second half of a run says about itself."""
+
+    def __init__(self, samples: Floats) -> None:
+        """`samples`: (chain, step, walker, parameter)."""
+        half = samples.shape[1] // 2
+        halves = np.concatenate([samples[:, :half], samples[:, half : 2 * half]])
+        self.r_hat = _each(array_stats.rhat, walker_major(halves), method="rank")
+        laid_out = walker_major(samples)
+        self.ess_bulk = _each(array_stats.ess, laid_out, method="bulk")
+        self.ess_tail = _each(array_stats.ess, laid_out, method="tail", prob=_TAIL)
+
+    @property
+    def worst_r_hat(self) -> int:
+        return int(np.argmax(np.where(np.isnan(self.r_hat), np.inf, self.r_hat)))
+
+    @property
+    def worst_ess(self) -> int:
+        return int(np.argmin(np.nan_to_num(self.ess)))
+
+    @property
+    def ess(self) -> Floats:
+        return np.minimum(self.ess_bulk, self.ess_tail)
+
+    def satisfies(self, max_r_hat: float, min_ess: float) -> bool:
+        return bool(np.all(self.r_hat < max_r_hat) and np.all(self.ess >= min_ess))
+
+    def in_words(self, names: Sequence[str]) -> str:
+        i, j = self.worst_r_hat, self.worst_ess
+        return (
+            f"largest R̂ {self.r_hat[i]:.4f} ({names[i]}), smallest effective sample size {self.ess[j]:.0f} ({names[j]})"
+        )
+
+
+def _each(statistic: Callable[..., Floats], draws: Floats, **options: object) -> Floats:
+    """A statistic of ArviZ per parameter of (chain, draw, parameter); NaN where there are too few draws for it."""
+    if draws.shape[1] < 8:
+        return np.full(draws.shape[-1], np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(statistic(draws, chain_axis=0, draw_axis=1, **options), dtype=float)
+
+
+def walker_major(samples: Floats) -> Floats:
+    """(chain, step, walker, …) → (chain, walker · step, …)."""
+    swapped = np.swapaxes(samples, 1, 2)
+    return np.ascontiguousarray(swapped).reshape(swapped.shape[0], -1, *swapped.shape[3:])
+
+
+def autocorrelation_time(samples: Floats) -> Floats:
+    """emcee's τ [steps] of (chain, step, walker, parameter), averaged over chains."""
+    if samples.shape[1] < 2:
+        return np.full(samples.shape[-1], np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        times = np.array([emcee.autocorr.integrated_time(chain, tol=0) for chain in samples])
+    still = np.all(samples == samples[:, :1], axis=1).any(axis=1)  # (chain, parameter)
+    return np.where(still, np.inf, times).mean(axis=0)

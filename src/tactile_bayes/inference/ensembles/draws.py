@@ -1,0 +1,55 @@
+"""Draws from a posterior, and how far to trust them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Draws"]
+
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws from a posterior, and how far to trust them."""
+
+    samples: Floats
+    """(chain, draw, parameter): a chain is an ensemble, its draws lie walker-major."""
+    log_probability: Floats
+    """(chain, draw)."""
+    names: tuple[str, ...]
+    walkers: int
+    steps_kept: int
+    """Steps of each walker that are in `samples`: the second half of those it made."""
+    steps_run: int
+    r_hat: Floats
+    """Rank-normalised R̂ per parameter across ensembles, each cut in early and late steps: a common drift shows too."""
+    ess_bulk: Floats
+    """Effective sample size of the bulk, per parameter."""
+    ess_tail: Floats
+    """The smaller effective sample size of the 5 % and 95 % quantiles, per parameter."""
+    acceptance: Floats
+    """Share of accepted proposals, per ensemble, over the steps kept."""
+    autocorrelation_time: Floats
+    """emcee's integrated autocorrelation time [steps] per parameter, mean over ensembles.
+
+    Infinite where a walker is stuck. emcee takes each walker's own mean off, so over few autocorrelation times it
+    comes out too small.
+    """
+    evaluations: int
+    """Points at which the log-probability was computed."""
+    seconds: float
+    converged: bool
+    message: str
+    """In words, how the run ended."""
+    stuck: int
+    """Number of walkers that did not move in all the steps kept."""
+
+    def by_walker(self) -> Floats:
+        """The samples as (chain, walker, step, parameter)."""
+        chains, _, parameters = self.samples.shape
+        return self.samples.reshape(chains, self.walkers, self.steps_kept, parameters)

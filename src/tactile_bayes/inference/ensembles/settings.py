@@ -1,0 +1,97 @@
+"""How many walkers walk, and when they may stop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["SamplerSettings", "refuse_few_walkers"]
+
+
+@dataclass(frozen=True)
+class SamplerSettings:
+    """How many walkers walk, and when they may stop.
+
+    Parameters
+    ----------
+    ensembles : int
+        Number of independent ensembles, the chains of the result.
+    walkers : int, optional
+        Number of walkers of each ensemble, even and at least twice the number of parameters. By default the larger of
+        32 and six times the number of parameters: the effective draws per evaluation hardly depend on it (Gaussian
+        targets of 2 to 14 dimensions, 2 to 12 walkers per dimension), and a vectorised target and emcee itself are
+        faster with more of them, but every one of them has to forget its start.
+    block_steps : int
+        Steps before the first look at the diagnostics, and the least between later ones, which come when the number of
+        steps has grown by a quarter.
+    max_r_hat : float
+        Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
+    min_ess : float
+        Every parameter's effective sample size, in the bulk and in the tails, must reach this.
+    max_steps : int
+        Steps after which each ensemble stops, converged or not.
+    max_seconds : float, optional
+        Time after which the ensembles stop [s]. A run that ends by it is not reproducible from its seed.
+
+    Raises
+    ------
+    ParameterError
+        If a value is impossible.
+
+    Examples
+    --------
+    >>> SamplerSettings(min_ess=400).walkers_for(9)
+    54
+    """
+
+    ensembles: int = 4
+    walkers: int | None = None
+    block_steps: int = 50
+    max_r_hat: float = 1.01
+    min_ess: float = 1000.0
+    max_steps: int = 20_000
+    max_seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("ensembles", "walkers", "block_steps", "max_steps"):
+            value = getattr(self, name)
+            if value is None and name == "walkers":
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | np.integer):
+                raise ParameterError(f"{name} is {value!r}: give a whole number")
+        if self.ensembles < 2:
+            raise ParameterError(
+                f"{self.ensembles} ensembles: give at least 2 (4 is better), since convergence is judged by comparing "
+                "independent ensembles; walkers of one ensemble are not independent"
+            )
+        if self.walkers is not None and (self.walkers < 4 or self.walkers % 2):
+            raise ParameterError(f"{self.walkers} walkers: give an even number of at least 4, or None for the default")
+        if self.block_steps < 1:
+            raise ParameterError(f"block_steps is {self.block_steps}: give at least 1")
+        if self.max_steps < 1:
+            raise ParameterError(f"max_steps is {self.max_steps}: give at least 1")
+        if not self.max_r_hat > 1.0:
+            raise ParameterError(f"max_r_hat is {self.max_r_hat!r}: R̂ is 1 at best, give a little more, like 1.01")
+        if not (math.isfinite(self.min_ess) and self.min_ess > 0.0):
+            raise ParameterError(f"min_ess is {self.min_ess!r}: give a positive number")
+        if self.max_seconds is not None and not self.max_seconds > 0.0:
+            raise ParameterError(f"max_seconds is {self.max_seconds!r}: give a positive time [s], or None for no limit")
+
+    def walkers_for(self, parameters: int) -> int:
+        """Number of walkers of each ensemble for a target of this many parameters."""
+        if self.walkers is None:
+            return max(32, 6 * parameters)
+        refuse_few_walkers(self.walkers, parameters)
+        return self.walkers
+
+
+def refuse_few_walkers(walkers: int, parameters: int) -> None:
+    if walkers < 2 * parameters:
+        raise ParameterError(
+            f"{walkers} walkers for {parameters} parameters: give at least {2 * parameters}, or the proposals of half "
+            "an ensemble do not span the space"
+        )

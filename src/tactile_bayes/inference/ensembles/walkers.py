@@ -1,0 +1,137 @@
+"""Where walkers start, and the random numbers they walk by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import emcee
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
+from tactile_bayes.inference.ensembles.target import LogProbability
+
+__all__ = ["Seed", "checked_start", "scatter_walkers", "spawn", "walking_ensemble"]
+
+
+Floats = NDArray[np.float64]
+Seed = int | np.random.SeedSequence
+
+
+def spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:
+    """Independent seeds; the same for the same seed, however often it has been asked before."""
+    if isinstance(seed, np.random.SeedSequence):
+        fresh = np.random.SeedSequence(seed.entropy, spawn_key=seed.spawn_key, pool_size=seed.pool_size)
+    elif isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up, or a numpy.random.SeedSequence")
+    else:
+        fresh = np.random.SeedSequence(int(seed))
+    return fresh.spawn(count)
+
+
+def walking_ensemble(
+    start: Floats, values: Floats, target: LogProbability, seed: np.random.SeedSequence
+) -> Iterator[Any]:
+    """Endless states of one ensemble."""
+    walkers, parameters = start.shape
+    moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+    sampler: Any = emcee.EnsembleSampler(walkers, parameters, target, moves=moves, vectorize=True)
+    sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
+    given: Any = np.random.RandomState(np.random.MT19937(seed)).get_state()
+    sampler.random_state = given
+    taken = sampler.random_state
+    if not (taken[0] == given[0] and np.array_equal(taken[1], given[1]) and taken[2:] == given[2:]):
+        raise InferenceError("emcee did not take the random state that it was given: use version 3.1.6 or a later 3.1")
+    states: Iterator[Any] = sampler.sample(emcee.State(start, log_prob=values), iterations=None, store=False)
+    return states
+
+
+def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:
+    points = np.array(start, dtype=float)
+    if points.ndim != 3 or points.shape[0] != settings.ensembles or points.shape[2] != len(names):
+        raise ParameterError(
+            f"start has shape {points.shape}: it has to be (ensembles, walkers, parameters) = "
+            f"({settings.ensembles}, walkers, {len(names)})"
+        )
+    walkers = points.shape[1]
+    if settings.walkers is not None and walkers != settings.walkers:
+        raise ParameterError(f"start has {walkers} walkers in an ensemble, but the settings ask for {settings.walkers}")
+    if walkers % 2:
+        raise ParameterError(f"start has {walkers} walkers in an ensemble: give an even number, it moves by halves")
+    refuse_few_walkers(walkers, len(names))
+    if not np.all(np.isfinite(points)):
+        raise InferenceError(f"{np.count_nonzero(~np.isfinite(points))} numbers of start are not finite")
+    for k, ensemble in enumerate(points):
+        if not emcee.ensemble.walkers_independent(ensemble):
+            raise InferenceError(
+                f"the walkers of ensemble {k} start in a plane (or all at one point), which they could never leave: "
+                "scatter them in every direction of parameter space"
+            )
+    return points
+
+
+def scatter_walkers(
+    log_probability: LogProbability,
+    draw: Callable[[np.random.Generator, int], Floats],
+    *,
+    parameters: int,
+    seed: Seed,
+    settings: SamplerSettings | None = None,
+    max_rounds: int = 100,
+) -> Floats:
+    """Starting points for `sample`: random points, redrawn until each has a finite log-probability.
+
+    Parameters
+    ----------
+    log_probability : callable
+        The target, as `sample` takes it.
+    draw : callable
+        Takes a random generator and n, returns n points (n, parameters), scattered more widely than the posterior:
+        draws from the prior, or from a widened normal approximation.
+    parameters : int
+        Number of parameters.
+    seed : int or numpy.random.SeedSequence
+        Each ensemble draws from its own stream.
+    settings : SamplerSettings, optional
+        Says how many ensembles of how many walkers.
+    max_rounds : int
+        Points that are drawn at most for each walker, on average.
+
+    Returns
+    -------
+    ndarray, shape (ensembles, walkers, parameters)
+
+    Raises
+    ------
+    InferenceError
+        If too few points lie inside the support.
+
+    Examples
+    --------
+    >>> def log_probability(x):
+    ...     return np.where(x[:, 0] > 0, -x[:, 0], -np.inf)
+    >>> start = scatter_walkers(log_probability, lambda rng, n: rng.normal(size=(n, 1)), parameters=1, seed=1)
+    >>> start.shape, bool(np.all(start > 0))
+    ((4, 32, 1), True)
+    """
+    settings = SamplerSettings() if settings is None else settings
+    walkers = settings.walkers_for(parameters)
+    # A step aside, so that the streams differ from those that the same seed gives to the ensembles themselves.
+    seeds = spawn(seed, 2 * settings.ensembles)[settings.ensembles :]
+    start = np.empty((settings.ensembles, walkers, parameters))
+    for k, each in enumerate(seeds):
+        rng = np.random.default_rng(each)
+        found, drawn = 0, 0
+        while found < walkers:
+            if drawn >= max_rounds * walkers:
+                raise InferenceError(
+                    f"only {found} of {drawn} random starting points have a finite log-probability and {walkers} are "
+                    "needed: draw them closer to a point that is known to be possible"
+                )
+            points = np.asarray(draw(rng, walkers), dtype=float)
+            points = points[np.isfinite(log_probability(points))][: walkers - found]
+            start[k, found : found + len(points)] = points
+            found, drawn = found + len(points), drawn + walkers
+    return start
