@@ -32,7 +32,7 @@ from tactile_bayes.elastica import (
 )
 from tactile_bayes.roots import falling_root
 
-__all__ = ["CHANNELS", "Paths", "Reach", "SnapOff", "States", "trace"]
+__all__ = ["CHANNELS", "CLEARANCE", "Paths", "Reach", "SnapOff", "States", "trace"]
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -49,6 +49,11 @@ _BRIEF = 1e-6
 be lost in rounding; it rises there."""
 
 
+CLEARANCE = 0.02
+"""Least distance of pivot and contour, in rod lengths, at which a path is followed: nearer, almost all of it happens
+within a degree of snap-off, and the nodes would miss it."""
+
+
 class Reach(IntEnum):
     """Whether a rod finds its contour."""
 
@@ -59,6 +64,8 @@ class Reach(IntEnum):
     """The pivot is not below the contour."""
     ENDS = 3
     """The rod would first touch beyond an end of the contour."""
+    TOO_CLOSE = 4
+    """The pivot is nearer to the contour than `CLEARANCE`."""
 
 
 class SnapOff(IntEnum):
@@ -370,6 +377,7 @@ def _limits(
     reach = np.full(seen.lanes, Reach.TOUCHES, dtype=np.int8)
     reach[~straddles | open_end] = Reach.ENDS
     reach[(distance >= 1.0) | (np.hypot(at_end.x, at_end.y) >= 1.0)] = Reach.TOO_FAR
+    reach[distance < CLEARANCE] = Reach.TOO_CLOSE
     reach[~below] = Reach.CUTS_PIVOT
     return reach, distance, begin, end, tip_first
 

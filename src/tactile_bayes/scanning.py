@@ -14,7 +14,7 @@ from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, Wrench, wrench_from_contact
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.path import Paths, Reach, SnapOff, States, trace
+from tactile_bayes.path import CLEARANCE, Paths, Reach, SnapOff, States, trace
 from tactile_bayes.record import COLUMNS, make_record
 from tactile_bayes.rod import Rod
 
@@ -195,7 +195,7 @@ def scan(
     ReachError
         If the rod is too short to touch the contour.
     ContourError
-        If the pivot is not below the contour, or the rod would touch beyond an end of it.
+        If the pivot is not below the contour or too close to it, or the rod would touch beyond an end of it.
     ParameterError
         If an argument is none that is offered.
 
@@ -261,6 +261,12 @@ def sweep_paths(
             raise ContourError(
                 f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
                 "contour or lower the pivot"
+            )
+        case Reach.TOO_CLOSE:
+            raise ContourError(
+                f"the contour comes within {paths.distance[0] * rod.length:.6g} of the pivot at ({base[0]:g}, "
+                f"{base[1]:g}); a path can be followed from {CLEARANCE * rod.length:g} on ({CLEARANCE:.0%} of the "
+                "rod's length): move one of them away"
             )
         case Reach.ENDS:
             side = "right" if direction == "forward" else "left"

@@ -25,24 +25,24 @@ class Rest(NamedTuple):
     tip: bool
 
 
-def _piece(theta: float, m: float) -> tuple[float, float, float]:
+def piece(theta: float, m: float) -> tuple[float, float, float]:
     """√f times arc length, u and v."""
     tau = ellipk(m) - ellipkinc(theta, m)
     return tau, 2 * np.sqrt(m) * np.cos(theta), 2 * (ellipe(m) - ellipeinc(theta, m)) - tau
 
 
-def _theta(angle: float, m: float) -> float:
+def theta_of(angle: float, m: float) -> float:
     """θ0 whose chord stands at an angle over the direction along the contour: it falls as θ0 grows."""
 
     def miss(theta: float) -> float:
-        _, u, v = _piece(theta, m)
+        _, u, v = piece(theta, m)
         return float(np.arctan2(v, u)) - angle
 
     return brentq(miss, -HALF, HALF - 1e-6, xtol=1e-15, rtol=1e-15)
 
 
 def _rest(theta: float, m: float, alpha: float, arclength: float, tip: bool) -> Rest:
-    tau, u, _ = _piece(theta, m)
+    tau, u, _ = piece(theta, m)
     root = tau / arclength
     return Rest(alpha + HALF - 2 * np.arcsin(np.sqrt(m) * np.sin(theta)), u * root, root**2, arclength, tip)
 
@@ -50,24 +50,24 @@ def _rest(theta: float, m: float, alpha: float, arclength: float, tip: bool) -> 
 def tangential_arclength(x: float, y: float, alpha: float) -> float:
     """Arc length that tangential contact takes."""
     angle = np.arctan2(y, x) - alpha
-    tau, u, v = _piece(_theta(angle, 0.5), 0.5)
+    tau, u, v = piece(theta_of(angle, 0.5), 0.5)
     return float(np.hypot(x, y) * tau / np.hypot(u, v))
 
 
 def equilibrium(x: float, y: float, alpha: float) -> Rest:
     """Frictionless forward equilibrium at a contact point relative to the pivot."""
     angle, distance = float(np.arctan2(y, x)) - alpha, float(np.hypot(x, y))
-    theta = _theta(angle, 0.5)
-    tau, u, v = _piece(theta, 0.5)
+    theta = theta_of(angle, 0.5)
+    tau, u, v = piece(theta, 0.5)
     arclength = distance * tau / np.hypot(u, v)
     if arclength <= 1:
         return _rest(theta, 0.5, alpha, arclength, False)
 
     def miss(psi1: float) -> float:
         m = 0.5 * (1 - np.sin(psi1))
-        tau, u, v = _piece(_theta(angle, m), m)
+        tau, u, v = piece(theta_of(angle, m), m)
         return float(np.hypot(u, v)) / tau - distance
 
     psi1 = brentq(miss, 0.0, min(angle, HALF) - 1e-5, xtol=1e-15, rtol=1e-15)
     m = 0.5 * (1 - np.sin(psi1))
-    return _rest(_theta(angle, m), m, alpha, 1.0, True)
+    return _rest(theta_of(angle, m), m, alpha, 1.0, True)

@@ -1,0 +1,324 @@
+"""The equilibrium path of many contours at once: events, interpolation, and a search for trouble."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from helpers.legendre import equilibrium, tangential_arclength
+from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.elastica import NONE, TANGENTIAL, TIP
+from tactile_bayes.path import CHANNELS, CLEARANCE, Reach, SnapOff, trace
+
+SCAN = {"order": 32, "exact_events": True}
+LIKELIHOOD = {"order": 16, "exact_events": False}
+
+
+def seen_from(contour, base_x=0.0, base_y=0.0, mirrored=False, standoff=0.0):
+    n = contour.shape[0] if contour.shape else 1
+    lanes = (n,)
+    return SeenContour(
+        contour.broadcast_to(lanes),
+        np.full(n, base_x) if np.ndim(base_x) == 0 else base_x,
+        np.full(n, base_y) if np.ndim(base_y) == 0 else base_y,
+        1.0,
+        standoff,
+        np.broadcast_to(np.asarray(mirrored), lanes),
+    )
+
+
+def wide(family, n, seed):
+    """Contours over a wide prior: size log-uniform in 0.1…5, q in −0.3…0.95, x_c in −0.7…0.7."""
+    rng = np.random.default_rng(seed)
+
+    def size():
+        return np.exp(rng.uniform(np.log(0.1), np.log(5.0), n))
+
+    q, x_c = rng.uniform(-0.3, 0.95, n), rng.uniform(-0.7, 0.7, n)
+    power = rng.choice([2.0, 2.5, 3.0, 4.0, 6.0], n)
+    contour = {
+        "parabola": lambda: Parabola(size(), q, x_c),
+        "circle": lambda: Circle(size(), q, x_c),
+        "power": lambda: PowerLaw(size(), power, q, x_c),
+        "joined": lambda: Joined(Parabola(size(), q, x_c), PowerLaw(size(), power, q, x_c)),
+    }[family]()
+    return contour, rng.random(n) < 0.5
+
+
+FAMILIES = ("parabola", "circle", "power", "joined")
+
+
+def paths_of(seen, lane, friction_angle=0.0, **options):
+    """The path of one lane, alone."""
+    pick = np.array([lane])
+    alone = SeenContour(
+        seen.contour.take(pick),
+        seen.base_x[pick],
+        seen.base_y[pick],
+        seen.length,
+        seen.standoff,
+        seen.mirrored[pick],
+    )
+    return trace(alone, friction_angle=friction_angle, **(options or SCAN))
+
+
+# --- a search for trouble ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("standoff", [0.0, 0.01])
+@pytest.mark.parametrize("family", FAMILIES)
+def test_invariants_on_random_contours(family, standoff):
+    """No surprises on any contour: states everywhere, one after the other, loaded the right way."""
+    contour, mirrored = wide(family, 250, FAMILIES.index(family))
+    seen = seen_from(contour, mirrored=mirrored, standoff=standoff)
+    paths = trace(seen, **SCAN)
+    lanes = np.flatnonzero(paths.reach == Reach.TOUCHES)
+    assert lanes.size > 100
+    height = contour.height(np.zeros(1)) - standoff
+    assert not np.any(height[lanes] <= 0)
+    first, snap = paths.first_angle[lanes], paths.snap_angle[lanes]
+    assert np.all(np.isfinite(first) & (first < snap) & (snap < 2 * np.pi))
+    assert np.all(paths.snap_off[lanes] != SnapOff.NEVER)
+    out = np.setdiff1d(np.arange(250), lanes)
+    assert np.isnan(paths.first_angle[out]).all()
+    assert np.all(paths.snap_off[out] == SnapOff.NEVER)
+    assert np.all(paths.observables(np.linspace(-7, 7, 5))[out] == 0)
+
+    # Along the contour, from just after first contact up to snap-off.
+    ways = np.linspace(0.02, 1.0, 60) ** 2
+    parameter = paths.first_parameter[lanes, None] + (paths.snap_parameter - paths.first_parameter)[lanes, None] * ways
+    w = paths.states_at(lanes[:, None], parameter).wrench
+    assert np.all(w.phase != NONE)
+    loads = np.stack([w.drive_angle, w.holding_moment, w.force_x, w.force_y])
+    assert np.isfinite(loads).all()
+    assert np.all(np.diff(w.drive_angle, axis=1) > -1e-12)
+    assert np.all(w.holding_moment > -1e-12 * np.hypot(w.force_x, w.force_y))
+    assert np.all((w.contact_arclength > 0) & (w.contact_arclength <= 1))
+    assert np.all(w.contact_arclength[w.phase == TIP] == 1)
+    np.testing.assert_allclose(w.drive_angle[:, -1], snap, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("options", [SCAN, LIKELIHOOD], ids=["scan", "likelihood"])
+@pytest.mark.parametrize("family", FAMILIES)
+def test_snap_off_is_the_first_maximum(family, options):
+    """Against a dense scan of exact states; a maximum missed or imagined would be off by tenths."""
+    contour, mirrored = wide(family, 150, 10 + FAMILIES.index(family))
+    seen = seen_from(contour, mirrored=mirrored)
+    paths = trace(seen, **options)
+    # With the pivot this close below the contour the path is a needle that 16 nodes do not resolve.
+    lanes = np.flatnonzero(
+        (paths.reach == Reach.TOUCHES) & (paths.distance > (0.02 if options is LIKELIHOOD else 5e-3))
+    )
+    seen_end = _nearest_parameter(seen, lanes)
+    ways = np.linspace(0.002, 1.0, 400) ** 2
+    begin = paths.first_parameter[lanes]
+    parameter = begin[:, None] + (seen_end - begin)[:, None] * ways
+    angle = np.nan_to_num(paths.states_at(lanes[:, None], parameter).wrench.drive_angle, nan=-9.0)
+    falls = np.diff(angle, axis=1) < -1e-9
+    at = np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)
+    dense = angle[np.arange(lanes.size), at]
+    miss = paths.snap_angle[lanes] - dense
+    # A corner between two points of the dense scan is missed by it by up to a step's rise.
+    room = np.abs(angle[np.arange(lanes.size), np.maximum(at - 1, 0)] - dense) + 1e-3
+    # A maximum may be too flat for the dense scan, which then goes on to the next one: it must be one, though.
+    side = 2e-5 * (begin - seen_end)
+    beside = paths.snap_parameter[lanes] + side * np.array([[1.0], [-1.0]])
+    around = paths.states_at(np.broadcast_to(lanes, beside.shape), beside).wrench.drive_angle
+    flat = (miss < 0) & np.all(around < paths.snap_angle[lanes] + (0 if options is SCAN else 1e-4), axis=0)
+    bad = ~(np.abs(miss) < room) & ~flat
+    assert not bad.any(), [(int(i), float(m)) for i, m in zip(lanes[bad], miss[bad], strict=True)]
+
+
+def _nearest_parameter(seen, lanes):
+    """Where the contour is nearest to the pivot: there the line of force passes through the pivot."""
+    lo, hi = (end[lanes] for end in seen.domain())
+    for _ in range(70):
+        middle = 0.5 * (lo + hi)
+        locus = seen.locate(lanes, middle)
+        right = locus.x * np.cos(locus.slope_angle) + locus.y * np.sin(locus.slope_angle) > 0
+        lo, hi = np.where(right, lo, middle), np.where(right, middle, hi)
+    return 0.5 * (lo + hi)
+
+
+@pytest.mark.parametrize("options", [SCAN, LIKELIHOOD], ids=["scan", "likelihood"])
+@pytest.mark.parametrize("beyond", [3e-2, 1e-2, 1e-3, 1e-4, 1e-6, 1e-9, -1e-9, -1e-4])
+def test_tip_and_tangent_touch_at_almost_the_same_time(beyond, options):
+    """The tangent from the pivot touches at distance 1 + `beyond`: a tip contact so short that it hardly is one must
+    neither end the path nor lose it."""
+    rng = np.random.default_rng(3)
+    a, slope = np.exp(rng.uniform(np.log(0.1), np.log(5.0), 300)), rng.uniform(-0.3, 1.2, 300)
+    x, y, t = (1 + beyond) * np.cos(slope), (1 + beyond) * np.sin(slope), np.tan(slope)
+    x_c, q = x - t / (2 * a), y - t * t / (4 * a)
+    keep = (a * x_c**2 + q > 0.1) & (np.abs(x_c) < 0.7) & (q > -0.3)
+    contour = Parabola(a[keep], q[keep], x_c[keep])
+    assert keep.sum() > 60
+    near = trace(seen_from(contour), **options)
+    assert np.all(near.reach == Reach.TOUCHES)
+    lanes = np.arange(near.seen.lanes)
+    end = _nearest_parameter(near.seen, lanes)
+    ways = np.linspace(0.002, 1.0, 400) ** 2
+    parameter = near.first_parameter[:, None] + (end - near.first_parameter)[:, None] * ways
+    angle = np.nan_to_num(near.states_at(lanes[:, None], parameter).wrench.drive_angle, nan=-9.0)
+    falls = np.diff(angle, axis=1) < -1e-9
+    dense = angle[lanes, np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)]
+    assert np.all(np.abs(near.snap_angle - dense) < 1e-2)
+
+
+@pytest.mark.parametrize("clearance", [0.1, 0.05, 1.01 * CLEARANCE])
+def test_a_pivot_just_below_the_contour_still_has_a_path(clearance):
+    contour = Parabola(np.geomspace(0.1, 5.0, 60), clearance, 0.0)
+    for options in (SCAN, LIKELIHOOD):
+        paths = trace(seen_from(contour), **options)
+        assert np.all(paths.reach == Reach.TOUCHES)
+        assert np.all(paths.first_angle < paths.snap_angle)
+        assert np.isfinite(paths.observables(np.linspace(0, 3.2, 30))).all()
+
+
+def test_nearer_than_the_clearance_there_is_no_path():
+    distance = CLEARANCE * np.array([0.01, 0.99, 1.01])
+    paths = trace(seen_from(Parabola(np.full(3, 0.3), distance, 0.0)))
+    np.testing.assert_array_equal(paths.reach, [Reach.TOO_CLOSE, Reach.TOO_CLOSE, Reach.TOUCHES])
+    assert np.isnan(paths.snap_angle[:2]).all()
+    assert not np.any(paths.observables(np.linspace(0.0, 3.2, 30))[:2])
+
+
+# --- reach -----------------------------------------------------------------------------------------------------------
+
+
+def test_reach():
+    paths = trace(
+        seen_from(
+            Circle(
+                np.array([1.0, 1.0, 0.2, 1.0, 1.0]), np.array([0.5, 1.1, 0.3, -0.1, -1.5]), np.array([0, 0, -0.6, 0, 0])
+            )
+        )
+    )
+    assert [Reach(int(r)).name for r in paths.reach] == ["TOUCHES", "TOO_FAR", "ENDS", "CUTS_PIVOT", "CUTS_PIVOT"]
+    np.testing.assert_allclose(paths.distance[:2], [0.5, 1.1], rtol=1e-14)
+
+
+def test_how_near_decides_whether_it_is_reached():
+    distance = 1 + np.array([-1e-6, -1e-9, 1e-9, 1e-6])
+    paths = trace(seen_from(Parabola(np.full(4, 0.5), distance, 0.0)))
+    np.testing.assert_array_equal(paths.reach, [Reach.TOUCHES] * 2 + [Reach.TOO_FAR] * 2)
+    assert np.all(np.isfinite(paths.snap_angle[:2]))
+
+
+# --- interpolation ---------------------------------------------------------------------------------------------------
+
+
+def interpolation_errors(family, options, count=150, samples=20):
+    """Largest error of every lane's observables, over the greatest value on its path; and how near its pivot is."""
+    contour, mirrored = wide(family, count, 20 + FAMILIES.index(family))
+    seen = seen_from(contour, mirrored=mirrored)
+    paths, exact = trace(seen, **options), trace(seen, **SCAN)
+    lanes = np.flatnonzero(paths.reach == Reach.TOUCHES)
+    share = np.linspace(0.01, 0.99, samples)
+    snap = np.minimum(paths.snap_angle, exact.snap_angle)
+    angle = exact.first_angle[:, None] + (snap - exact.first_angle)[:, None] * share
+    told = paths.observables(np.where(np.isfinite(angle), angle, 0.0))[lanes]
+    truth = np.empty_like(told)
+    for block in np.array_split(np.arange(lanes.size), max(1, lanes.size // 25)):
+        some = lanes[block]
+        few = SeenContour(seen.contour.take(some), seen.base_x[some], seen.base_y[some], 1.0, 0.0, seen.mirrored[some])
+        lane = np.repeat(np.arange(some.size), samples)
+        wrench = trace(few, **SCAN).states(lane, angle[some].ravel()).wrench
+        truth[block] = np.stack([getattr(wrench, name) for name in CHANNELS], -1).reshape(some.size, samples, 3)
+    error = np.abs(told - truth) / np.abs(truth).max(axis=1, keepdims=True)
+    return error.max(axis=(1, 2)), paths.distance[lanes], 1 - lanes.size / count
+
+
+@pytest.mark.parametrize("family", ["parabola", "circle"])
+def test_what_the_likelihood_interpolates(family):
+    """Against exact states over a wide prior, relative to the greatest load of the path. The worst are pivots a few
+    hundredths below the contour, whose load peaks in a degree or two: sixteen nodes do not follow it."""
+    error, distance, out_of_reach = interpolation_errors(family, LIKELIHOOD)
+    assert out_of_reach < 0.4
+    assert np.median(error) < 3e-5
+    assert np.quantile(error, 0.9) < 2e-3
+    clear = error[distance > 0.1]
+    assert clear.max() < 1e-2, clear.max()
+    fine, _, _ = interpolation_errors(family, SCAN)
+    assert np.median(fine) < 1e-9
+    assert fine[distance > 0.1].max() < 1e-4
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_many_lanes_at_once_equal_one_at_a_time(family):
+    contour, mirrored = wide(family, 40, 30)
+    seen = seen_from(contour, mirrored=mirrored)
+    angle = np.linspace(0.0, 3.5, 40)
+    for options in (SCAN, LIKELIHOOD):
+        many = trace(seen, **options)
+        table = many.observables(angle)
+        for lane in range(0, 40, 4):
+            one = paths_of(seen, lane, **options)
+            assert one.reach[0] == many.reach[lane]
+            assert one.snap_off[0] == many.snap_off[lane]
+            for name in ("first_angle", "snap_angle", "distance"):
+                np.testing.assert_allclose(getattr(one, name)[0], getattr(many, name)[lane], rtol=0, atol=1e-12)
+            scale = 1 + np.abs(table[lane]).max()
+            # Newton's steps settle together; what they leave is far below the interpolation's error.
+            off = np.abs(one.observables(angle)[0] - table[lane]) / scale
+            assert np.all(off < 1e-6)
+
+
+def test_own_angles_for_every_lane():
+    contour = Parabola(np.array([0.5, 0.7, 0.6]), np.array([0.5, 0.3, 1.5]), 0.0)
+    paths = trace(seen_from(contour))
+    rows = np.array([[0.5, 1.5, 2.5], [1.0, 2.0, 9.0], [1.0, 2.0, 3.0]])
+    own = paths.observables(rows)
+    for k in range(3):
+        np.testing.assert_array_equal(own[k], paths.observables(rows[k])[k])
+    assert np.all(own[2] == 0)
+    assert np.all(own[1, 2] == 0)
+    assert np.isfinite(own).all()
+
+
+# --- states ----------------------------------------------------------------------------------------------------------
+
+
+def test_states_against_bracketed_legendre():
+    """At drive angles over the path; judged by bisection on another closed form, to 1e-9 of the load."""
+    contour = Parabola(np.array([0.5, 0.7, 0.5, 2.0]), np.array([0.5, 0.3, 0.7, 0.6]), np.array([0.0, 0.1, -0.2, 0.0]))
+    for lane in range(4):
+        one = contour.broadcast_to((4,)).take(np.array([lane]))
+        paths = trace(seen_from(one), **SCAN)
+        angle = np.linspace(paths.first_angle[0] + 0.15, paths.snap_angle[0] - 1e-3, 7)
+        states = paths.states(np.zeros(7, dtype=np.intp), angle)
+        for k in range(7):
+            rest = equilibrium(float(states.x[k]), float(states.y[k]), float(states.slope_angle[k]))
+            assert rest.drive_angle == pytest.approx(angle[k], abs=1e-10)
+            assert rest.moment == pytest.approx(states.wrench.holding_moment[k], rel=1e-9)
+            assert rest.force == pytest.approx(np.hypot(states.wrench.force_x[k], states.wrench.force_y[k]), rel=1e-9)
+            assert rest.tip == (states.wrench.phase[k] == TIP)
+            assert not rest.tip or rest.arclength == 1
+            assert rest.tip or rest.arclength == pytest.approx(states.wrench.contact_arclength[k], rel=1e-9)
+
+
+def test_out_of_contact_there_is_no_state():
+    paths = trace(seen_from(Parabola(np.array([0.5, 0.5]), np.array([0.5, 1.2]), 0.0)))
+    angle = np.array([paths.first_angle[0] - 1e-9, paths.snap_angle[0] + 1e-9, 2.0, np.nan])
+    states = paths.states(np.array([0, 0, 1, 0]), angle)
+    assert np.all(states.wrench.phase == NONE)
+    assert np.isnan(states.x).all()
+    inside = paths.states(np.zeros(2, dtype=np.intp), np.array([paths.first_angle[0] + 1e-6, paths.snap_angle[0]]))
+    assert np.all(inside.wrench.phase != NONE)
+    assert inside.parameter[1] == pytest.approx(paths.snap_parameter[0], abs=1e-14)
+
+
+def test_the_dense_corner_is_where_arc_length_is_one():
+    """Profile II, q = 0.5, by bisection."""
+
+    def excess(alpha):
+        x = np.tan(alpha)
+        return tangential_arclength(x, 0.5 * x * x + 0.5, alpha) - 1
+
+    corner = brentq(excess, 0.02, 0.2, xtol=1e-15)
+    paths = trace(seen_from(Parabola(0.5, 0.5)), **SCAN)
+    assert SnapOff(int(paths.snap_off[0])) == SnapOff.CORNER
+    assert paths.snap_parameter[0] == pytest.approx(corner, abs=1e-12)
+    phases = paths.states_at(np.zeros(2, dtype=np.intp), corner + np.array([1e-9, -1e-9])).wrench.phase
+    np.testing.assert_array_equal(phases, [TANGENTIAL, TIP])
