@@ -9,7 +9,6 @@ interpolated.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -18,19 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
-from tactile_bayes.contours.base import Locus
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import (
-    TANGENTIAL,
-    TIP,
-    QuickWrench,
-    Wrench,
-    quick_tangential_arclength,
-    quick_wrench,
-    tangential_arclength,
-    wrench_from_contact,
-)
+from tactile_bayes.elastica import TANGENTIAL, TIP, QuickWrench, Wrench, quick_wrench, wrench_from_contact
+from tactile_bayes.reach import CLEARANCE, Reach, limits, seen_frame
 from tactile_bayes.roots import falling_root
+from tactile_bayes.segments import Segments, cut_path, first_of_lane, last_of_lane, polish_changes
 
 __all__ = ["CHANNELS", "CLEARANCE", "Paths", "Reach", "SnapOff", "States", "trace"]
 
@@ -47,25 +38,6 @@ _LAST_STEP = 1e-6
 _BRIEF = 1e-6
 """Stretch of tip contact after its onset, in the contour's parameter, so short that the slope of the drive angle would
 be lost in rounding; it rises there."""
-
-
-CLEARANCE = 0.02
-"""Least distance of pivot and contour, in rod lengths, at which a path is followed: nearer, almost all of it happens
-within a degree of snap-off, and the nodes would miss it."""
-
-
-class Reach(IntEnum):
-    """Whether a rod finds its contour."""
-
-    TOUCHES = 0
-    TOO_FAR = 1
-    """No point is within the rod's length."""
-    CUTS_PIVOT = 2
-    """The pivot is not below the contour."""
-    ENDS = 3
-    """The rod would first touch beyond an end of the contour."""
-    TOO_CLOSE = 4
-    """The pivot is nearer to the contour than `CLEARANCE`."""
 
 
 class SnapOff(IntEnum):
@@ -92,28 +64,6 @@ class States(NamedTuple):
     wrench: Wrench
 
 
-class _Segments(NamedTuple):
-    """Smooth stretches of all the paths; lanes may have one or several, in the order of the path."""
-
-    lane: Index
-    begin: Floats
-    """Contour parameter where the stretch begins (the greater one)."""
-    end: Floats
-    tip: NDArray[np.bool_]
-    """Whether the tip touches here."""
-    rooted: NDArray[np.bool_]
-    """Whether contact began here with the tip: loads then grow like the square root of the arc since."""
-
-    def take(self, index: Any) -> _Segments:
-        return _Segments(*(a[index] for a in self))
-
-    def along(self, way: Floats) -> tuple[Floats, Floats]:
-        """Contour parameter a way of 0 to 1 along, in which loads are smooth, and its derivative."""
-        span = self.end - self.begin
-        parameter = self.begin + span * np.where(self.rooted, way * way, way)
-        return parameter, span * np.where(self.rooted, 2.0 * way, 1.0)
-
-
 @dataclass(frozen=True)
 class Paths:
     """Paths of many contours, a lane each; see `trace`.
@@ -133,7 +83,7 @@ class Paths:
     """Drive angle of snap-off."""
     snap_parameter: Floats
     snap_off: NDArray[np.int8]
-    segments: _Segments
+    segments: Segments
     """What there is of each path up to snap-off."""
     begin_angle: Floats
     end_angle: Floats
@@ -185,7 +135,7 @@ class Paths:
     def _loaded(self, angles: Floats) -> tuple[Index, Index]:
         """Pairs of segment and sample such that the sample's angle, shape (lanes, k), lies in the segment."""
         at = angles[self.segments.lane]
-        last = _last_of_lane(self.segments.lane)
+        last = last_of_lane(self.segments.lane)
         with np.errstate(invalid="ignore"):
             inside = (at >= self.begin_angle[:, None]) & (at < self.end_angle[:, None])
             segment, sample = np.nonzero(inside | (last[:, None] & (at == self.end_angle[:, None])))
@@ -230,10 +180,10 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
         Whether phase changes and snap-off are computed to rounding, and states on the nodes exactly; else both are as
         good as the interpolation, which is what a likelihood needs and several times faster.
     """
-    reach, distance, begin, end, tip_first = _limits(seen, friction_angle)
-    segments = _segments(seen, np.flatnonzero(reach == Reach.TOUCHES), begin, end, tip_first, friction_angle, order)
+    bounds = limits(seen, friction_angle)
+    segments = cut_path(seen, bounds, friction_angle, order)
     if exact_events:
-        segments = _polish_changes(seen, segments, friction_angle)
+        segments = polish_changes(seen, segments, friction_angle)
 
     # Over the way along the contour: drive angle and its first maximum.
     ways = np.broadcast_to(chebyshev.nodes(order), (segments.lane.size, order))
@@ -247,7 +197,7 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
         stop = np.where(folds, _polish_fold(seen, segments, angle, stop, friction_angle), stop)
 
     # Over the drive angle: where on the way it takes the values that the nodes want.
-    first, last = _first_of_lane(segments.lane), _last_of_lane(segments.lane)
+    first, last = first_of_lane(segments.lane), last_of_lane(segments.lane)
     end_parameter, _ = segments.along(stop)
     end_angle = chebyshev.evaluate(angle, stop)
     if exact_events:
@@ -273,8 +223,8 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     return Paths(
         seen=seen,
         friction_angle=friction_angle,
-        reach=reach,
-        distance=distance,
+        reach=bounds.reach,
+        distance=bounds.distance,
         first_angle=per_lane(begin_angle, first),
         first_parameter=per_lane(segments.begin, first),
         snap_angle=per_lane(end_angle, last),
@@ -302,7 +252,7 @@ def _states(
 
 
 def _sample(
-    seen: SeenContour, segments: _Segments, ways: Floats, friction_angle: float, exactly: bool
+    seen: SeenContour, segments: Segments, ways: Floats, friction_angle: float, exactly: bool
 ) -> Wrench | QuickWrench:
     """Wrenches at ways, shape (segments, k), along the segments."""
     parameter, _ = segments.take(np.s_[:, None]).along(ways)
@@ -317,7 +267,7 @@ def _sample(
 def _angle_rate(seen: SeenContour, lane: Index, state: States) -> Floats:
     """Derivative of the drive angle by the contour's parameter."""
     locus = seen.locate(lane, state.parameter)
-    along, facing = _frame(locus)
+    along, facing = seen_frame(locus)
     distance2 = locus.x**2 + locus.y**2
     bearing_rate = -facing * locus.arclength_rate / distance2
     with np.errstate(invalid="ignore"):
@@ -325,150 +275,17 @@ def _angle_rate(seen: SeenContour, lane: Index, state: States) -> Floats:
         return bearing_rate + state.wrench.by_slope * (locus.slope_rate - bearing_rate) + by_distance
 
 
-def _frame(locus: Locus) -> tuple[Floats, Floats]:
-    """The vector from the pivot to the contour along the contour and into the object."""
-    cos, sin = np.cos(locus.slope_angle), np.sin(locus.slope_angle)
-    return locus.x * cos + locus.y * sin, locus.y * cos - locus.x * sin
-
-
-def _limits(
-    seen: SeenContour, friction_angle: float
-) -> tuple[NDArray[np.int8], Floats, Floats, Floats, NDArray[np.bool_]]:
-    """Reach, least distance, parameters of first contact and of thrust, and whether the tip touches first."""
-    lanes = np.arange(seen.lanes)
-    lo, hi = seen.domain()
-
-    def thrust(tilt: float) -> Callable[[Index, Floats], tuple[Floats, Floats]]:
-        """Lever arm of a force that is turned by `tilt` from the normal."""
-        cos, sin = np.cos(tilt), np.sin(tilt)
-
-        def lever(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
-            locus = seen.locate(lane, parameter)
-            along, facing = _frame(locus)
-            along_rate = locus.arclength_rate + facing * locus.slope_rate
-            return cos * along + sin * facing, cos * along_rate - sin * along * locus.slope_rate
-
-        return lever
-
-    def facing_root(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
-        locus = seen.locate(lane, parameter)
-        along, facing = _frame(locus)
-        return facing, -along * locus.slope_rate
-
-    def within_root(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
-        locus = seen.locate(lane, parameter)
-        along, _ = _frame(locus)
-        return 1.0 - locus.x**2 - locus.y**2, -2.0 * along * locus.arclength_rate
-
-    lever = thrust(0.0)
-    straddles = (lever(lanes, hi)[0] > 0.0) & (lever(lanes, lo)[0] < 0.0)
-    ends = np.where(lever(lanes, hi)[0] > 0.0, lo, hi)
-    nearest = np.where(straddles, falling_root(lever, np.where(straddles, hi, lo), lo), ends)
-    locus = seen.locate(lanes, nearest)
-    distance, below = np.hypot(locus.x, locus.y), _frame(locus)[1] > 0.0
-
-    end = falling_root(thrust(friction_angle), hi, nearest) if friction_angle else nearest
-    tangent = falling_root(facing_root, end, hi)
-    at_hi, at_tangent, at_end = (seen.locate(lanes, p) for p in (hi, tangent, end))
-    tip_first = np.hypot(at_tangent.x, at_tangent.y) > 1.0
-    begin = np.where(tip_first, falling_root(within_root, end, tangent), tangent)
-    open_end = (_frame(at_hi)[1] > 0.0) & (np.hypot(at_hi.x, at_hi.y) <= 1.0)
-
-    reach = np.full(seen.lanes, Reach.TOUCHES, dtype=np.int8)
-    reach[~straddles | open_end] = Reach.ENDS
-    reach[(distance >= 1.0) | (np.hypot(at_end.x, at_end.y) >= 1.0)] = Reach.TOO_FAR
-    reach[distance < CLEARANCE] = Reach.TOO_CLOSE
-    reach[~below] = Reach.CUTS_PIVOT
-    return reach, distance, begin, end, tip_first
-
-
-def _segments(
-    seen: SeenContour,
-    lanes: Index,
-    begin: Floats,
-    end: Floats,
-    tip_first: NDArray[np.bool_],
-    friction_angle: float,
-    order: int,
-) -> _Segments:
-    """Cut the paths at knots, and where tangential contact takes exactly the rod's length."""
-    knots = np.sort(np.clip(seen.knots()[:, lanes], end[lanes], begin[lanes]), axis=0)[::-1]
-    bounds = np.vstack([begin[lanes], knots, end[lanes]])
-    start, stop = bounds[:-1].T.ravel(), bounds[1:].T.ravel()
-    lane = np.repeat(lanes, bounds.shape[0] - 1)
-    some = start - stop > 1e-13 * (begin[lane] - end[lane])
-    lane, start, stop = lane[some], start[some], stop[some]
-
-    node = chebyshev.nodes(order)
-    locus = seen.locate(lane[:, None], start[:, None] + (stop - start)[:, None] * node)
-    if friction_angle:
-        length = tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle)
-    else:
-        length = quick_tangential_arclength(locus.x, locus.y, locus.slope_angle)
-    excess = chebyshev.coefficients(length - 1.0)
-    grid = np.concatenate([[0.0], node, [1.0]])
-    beyond = chebyshev.tabulate(excess, grid) > 0.0
-    piece, cell = np.nonzero(beyond[:, :-1] != beyond[:, 1:])
-    sign = np.where(beyond[piece, cell], 1.0, -1.0)
-    slope = chebyshev.derivative(excess)
-
-    def signed(i: Index, z: Floats) -> tuple[Floats, Floats]:
-        at = piece[i]
-        return sign[i] * chebyshev.evaluate(excess[:, at], z), sign[i] * chebyshev.evaluate(slope[:, at], z)
-
-    change = falling_root(signed, grid[cell], grid[cell + 1])
-    owner = np.concatenate([np.arange(lane.size), piece])
-    cut = np.concatenate([np.zeros(lane.size), change])
-    order_of = np.lexsort((cut, owner))
-    owner, cut = owner[order_of], cut[order_of]
-    following = np.where(_last_of_lane(owner), 1.0, np.append(cut[1:], 1.0)[: cut.size])
-    tip = chebyshev.evaluate(excess[:, owner], 0.5 * (cut + following)) > 0.0
-    span = (stop - start)[owner]
-    lane = lane[owner]
-    return _Segments(
-        lane,
-        start[owner] + cut * span,
-        start[owner] + following * span,
-        tip,
-        tip & tip_first[lane] & _first_of_lane(lane),
-    )
-
-
-def _polish_changes(seen: SeenContour, segments: _Segments, friction_angle: float) -> _Segments:
-    """Phase changes to rounding, by secants from the interpolant's answer."""
-    inner = np.flatnonzero(~_first_of_lane(segments.lane))
-    inner = inner[segments.tip[inner] != segments.tip[inner - 1]]
-    lane = segments.lane[inner]
-    room = np.minimum(segments.begin[inner - 1] - segments.end[inner - 1], segments.begin[inner] - segments.end[inner])
-
-    def excess(parameter: Floats) -> Floats:
-        locus = seen.locate(lane, parameter)
-        return tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0
-
-    old, now = segments.begin[inner] + 1e-4 * room, segments.begin[inner]
-    at_old, at_now = excess(old), excess(now)
-    for _ in range(4):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = at_now * (now - old) / (at_now - at_old)
-        new = np.where(np.isfinite(step) & (np.abs(step) < 0.1 * room), now - step, now)
-        old, at_old, now = now, at_now, new
-        at_now = excess(now)
-    begin, end = segments.begin.copy(), segments.end.copy()
-    begin[inner] = end[inner - 1] = now
-    return segments._replace(begin=begin, end=end)
-
-
-def _first_maximum(segments: _Segments, angle: Floats) -> tuple[Index, Floats, NDArray[np.int8]]:
+def _first_maximum(segments: Segments, angle: Floats) -> tuple[Index, Floats, NDArray[np.int8]]:
     """Segments up to the first maximum of the drive angle, how far each is followed, and how the last one ends."""
     slope = chebyshev.derivative(angle)
     grid = np.linspace(0.0, 1.0, 2 * angle.shape[0] + 1)
     falls = chebyshev.tabulate(slope, grid) <= 0.0
-    falls[_first_of_lane(segments.lane), 0] = False  # it always rises from first contact
-    falls[segments.rooted & ~_last_of_lane(segments.lane) & (segments.begin - segments.end < _BRIEF)] = False
+    falls[first_of_lane(segments.lane), 0] = False  # it always rises from first contact
+    falls[segments.rooted & ~last_of_lane(segments.lane) & (segments.begin - segments.end < _BRIEF)] = False
     any_fall, cell = falls.any(axis=1), falls.argmax(axis=1)
     fold = any_fall & (cell > 0)
     before: Index = np.cumsum(any_fall) - any_fall
-    first = np.maximum.accumulate(np.where(_first_of_lane(segments.lane), np.arange(before.size), 0))
+    first = np.maximum.accumulate(np.where(first_of_lane(segments.lane), np.arange(before.size), 0))
     keep = np.flatnonzero((before == before[first]) & (fold | ~any_fall))
 
     bend = chebyshev.derivative(slope)
@@ -481,14 +298,14 @@ def _first_maximum(segments: _Segments, angle: Floats) -> tuple[Index, Floats, N
     stop = np.ones(keep.size)
     stop[kept_fold] = falling_root(rate, grid[cell[at] - 1], grid[cell[at]])
     kind = np.full(keep.size, SnapOff.NEVER, dtype=np.int8)
-    last = _last_of_lane(segments.lane[keep])
-    whole = _last_of_lane(segments.lane)[keep]
+    last = last_of_lane(segments.lane[keep])
+    whole = last_of_lane(segments.lane)[keep]
     kind[last] = np.where(whole, SnapOff.THRUST, SnapOff.CORNER)[last]
     kind[kept_fold] = SnapOff.FOLD
     return keep, stop, kind
 
 
-def _polish_fold(seen: SeenContour, segments: _Segments, angle: Floats, stop: Floats, friction_angle: float) -> Floats:
+def _polish_fold(seen: SeenContour, segments: Segments, angle: Floats, stop: Floats, friction_angle: float) -> Floats:
     """Ways at which the exact derivative of the drive angle vanishes: Newton with the interpolant's curvature."""
     bend = chebyshev.evaluate(chebyshev.derivative(chebyshev.derivative(angle)), stop)
     for _ in range(5):
@@ -525,11 +342,3 @@ def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
 
     z[which, k] = falling_root(missing, np.zeros(k.size), np.broadcast_to(stop, wanted.shape)[which, k])
     return z
-
-
-def _first_of_lane(lane: Index) -> NDArray[np.bool_]:
-    return np.append(True, np.diff(lane) != 0)[: lane.size]
-
-
-def _last_of_lane(lane: Index) -> NDArray[np.bool_]:
-    return np.append(np.diff(lane) != 0, True)[: lane.size] if lane.size else np.zeros(0, dtype=bool)

@@ -1,0 +1,119 @@
+"""Smooth stretches of equilibrium paths: cut where the phase changes and where the contour's curvature jumps."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes import chebyshev
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.elastica import quick_tangential_arclength, tangential_arclength
+from tactile_bayes.reach import Limits, Reach
+from tactile_bayes.roots import falling_root
+
+__all__ = ["Segments", "cut_path", "first_of_lane", "last_of_lane", "polish_changes"]
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class Segments(NamedTuple):
+    """Smooth stretches of all the paths; lanes may have one or several, in the order of the path."""
+
+    lane: Index
+    begin: Floats
+    """Contour parameter where the stretch begins (the greater one)."""
+    end: Floats
+    tip: NDArray[np.bool_]
+    """Whether the tip touches here."""
+    rooted: NDArray[np.bool_]
+    """Whether contact began here with the tip: loads then grow like the square root of the arc since."""
+
+    def take(self, index: Any) -> Segments:
+        return Segments(*(a[index] for a in self))
+
+    def along(self, way: Floats) -> tuple[Floats, Floats]:
+        """Contour parameter a way of 0 to 1 along, in which loads are smooth, and its derivative."""
+        span = self.end - self.begin
+        parameter = self.begin + span * np.where(self.rooted, way * way, way)
+        return parameter, span * np.where(self.rooted, 2.0 * way, 1.0)
+
+
+def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: int) -> Segments:
+    """Cut the paths that there are at knots, and where tangential contact takes exactly the rod's length."""
+    lanes = np.flatnonzero(limits.reach == Reach.TOUCHES)
+    begin, end = limits.begin, limits.end
+    knots = np.sort(np.clip(seen.knots()[:, lanes], end[lanes], begin[lanes]), axis=0)[::-1]
+    bounds = np.vstack([begin[lanes], knots, end[lanes]])
+    start, stop = bounds[:-1].T.ravel(), bounds[1:].T.ravel()
+    lane = np.repeat(lanes, bounds.shape[0] - 1)
+    some = start - stop > 1e-13 * (begin[lane] - end[lane])
+    lane, start, stop = lane[some], start[some], stop[some]
+
+    node = chebyshev.nodes(order)
+    locus = seen.locate(lane[:, None], start[:, None] + (stop - start)[:, None] * node)
+    if friction_angle:
+        length = tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle)
+    else:
+        length = quick_tangential_arclength(locus.x, locus.y, locus.slope_angle)
+    excess = chebyshev.coefficients(length - 1.0)
+    grid = np.concatenate([[0.0], node, [1.0]])
+    beyond = chebyshev.tabulate(excess, grid) > 0.0
+    piece, cell = np.nonzero(beyond[:, :-1] != beyond[:, 1:])
+    sign = np.where(beyond[piece, cell], 1.0, -1.0)
+    slope = chebyshev.derivative(excess)
+
+    def signed(i: Index, z: Floats) -> tuple[Floats, Floats]:
+        at = piece[i]
+        return sign[i] * chebyshev.evaluate(excess[:, at], z), sign[i] * chebyshev.evaluate(slope[:, at], z)
+
+    change = falling_root(signed, grid[cell], grid[cell + 1])
+    owner = np.concatenate([np.arange(lane.size), piece])
+    cut = np.concatenate([np.zeros(lane.size), change])
+    order_of = np.lexsort((cut, owner))
+    owner, cut = owner[order_of], cut[order_of]
+    following = np.where(last_of_lane(owner), 1.0, np.append(cut[1:], 1.0)[: cut.size])
+    tip = chebyshev.evaluate(excess[:, owner], 0.5 * (cut + following)) > 0.0
+    span = (stop - start)[owner]
+    lane = lane[owner]
+    return Segments(
+        lane,
+        start[owner] + cut * span,
+        start[owner] + following * span,
+        tip,
+        tip & limits.tip_first[lane] & first_of_lane(lane),
+    )
+
+
+def polish_changes(seen: SeenContour, segments: Segments, friction_angle: float) -> Segments:
+    """Phase changes to rounding, by secants from the interpolant's answer."""
+    inner = np.flatnonzero(~first_of_lane(segments.lane))
+    inner = inner[segments.tip[inner] != segments.tip[inner - 1]]
+    lane = segments.lane[inner]
+    room = np.minimum(segments.begin[inner - 1] - segments.end[inner - 1], segments.begin[inner] - segments.end[inner])
+
+    def excess(parameter: Floats) -> Floats:
+        locus = seen.locate(lane, parameter)
+        return tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0
+
+    old, now = segments.begin[inner] + 1e-4 * room, segments.begin[inner]
+    at_old, at_now = excess(old), excess(now)
+    for _ in range(4):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = at_now * (now - old) / (at_now - at_old)
+        new = np.where(np.isfinite(step) & (np.abs(step) < 0.1 * room), now - step, now)
+        old, at_old, now = now, at_now, new
+        at_now = excess(now)
+    begin, end = segments.begin.copy(), segments.end.copy()
+    begin[inner] = end[inner - 1] = now
+    return segments._replace(begin=begin, end=end)
+
+
+def first_of_lane(lane: Index) -> NDArray[np.bool_]:
+    return np.append(True, np.diff(lane) != 0)[: lane.size]
+
+
+def last_of_lane(lane: Index) -> NDArray[np.bool_]:
+    return np.append(np.diff(lane) != 0, True)[: lane.size] if lane.size else np.zeros(0, dtype=bool)
