@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", ROOT.parent / "shared" / "data"))
 WHISKER = MEASURED / "whisker-calibration" / "in_plane.csv"
 QUICK = SamplerSettings(walkers=24, min_ess=400)
+ROUGH = SamplerSettings(ensembles=2, walkers=32, min_ess=300, max_r_hat=1.02)
 
 
 def integrated(force, arclength, compliance):
@@ -275,23 +276,29 @@ def test_the_suspension_of_a_real_whisker_is_soft(whisker_posterior):
     ids=["linear beam", "rigid clamp"],
 )
 def test_lesser_models_fit_a_real_whisker_worse(whisker, options, least, most):
-    tree = infer_point_load(*whisker, seed=1, settings=QUICK, **options)
+    tree = infer_point_load(*whisker, seed=1, settings=ROUGH, **options)
     assert tree.attrs["converged"], tree.attrs["message"]
     assert least < rms_over_range(tree) < most
 
 
 @pytest.mark.slow
 def test_posteriors_are_calibrated():
-    """Simulation-based calibration: parameters from the prior, ranks among the posterior uniform (Kolmogorov-Smirnov).
+    """Simulation-based calibration: parameters from the prior, ranks in the posterior uniform (Kolmogorov-Smirnov).
 
-    Nine parameters at 1e-4 each: false alarm below 1e-3.
+    Nine parameters at 1e-4 each: false alarm below 1e-3. What the rod cannot do is drawn again, as the prior has it.
     """
     axial, lateral = probe_points()
     rng = np.random.default_rng(8)
-    priors = default_priors(axial, lateral, full_scale=1.0) | {"noise_sd": stats.loguniform(0.03, 3.0)}
+    priors = {
+        "clamp_axial": stats.norm(-3.0, 1.0),
+        "clamp_lateral": stats.norm(0.0, 0.5),
+        "clamp_angle": stats.norm(0.0, 0.05),
+        "compliance": stats.halfnorm(0.0, 5.0),
+        "noise_sd": stats.loguniform(0.3, 3.0),
+    }
     unit = 3.0 / np.hypot(axial, lateral).max()
     ranks = []
-    while len(ranks) < 60:
+    while len(ranks) < 40:
         truth = {name: float(prior.rvs(random_state=rng)) for name, prior in priors.items()}
         curvature = rig_curvature(axial, lateral, truth)
         coefficients = rng.normal(scale=100.0, size=4) / unit ** np.arange(4)
@@ -300,6 +307,7 @@ def test_posteriors_are_calibrated():
         reading = np.polynomial.polynomial.polyval(curvature, coefficients)
         reading = reading + rng.normal(scale=truth["noise_sd"], size=reading.size)
         tree = infer_point_load(axial, lateral, reading, seed=len(ranks), priors=priors, full_scale=1.0, settings=QUICK)
+        assert tree.attrs["converged"], tree.attrs["message"]
         posterior = tree.posterior.to_dataset()
         rank = [float((posterior[name] < truth[name]).mean()) for name in priors]
         ranks.append(rank + (posterior.sensor_coefficient < coefficients).mean(("chain", "draw")).values.tolist())

@@ -345,7 +345,7 @@ def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[
 def _scatter(
     model: _Model, centre: Floats, covariance: Floats, top: float, *, seed: Seed, settings: SamplerSettings
 ) -> Floats:
-    """Walkers around the centre, as widely as the posterior allows: it may be bent where its approximation is straight."""
+    """Walkers around the centre, as widely as the posterior allows: it may bend where its approximation is straight."""
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
 

@@ -89,6 +89,7 @@ class _Block:
                 if time.monotonic() > deadline:
                     return _OUT_OF_TIME
         except KeyboardInterrupt:
+            self._together.abort()  # an ensemble may wait for others that were never asked to step
             return _INTERRUPTED
         return ""
 

@@ -76,6 +76,10 @@ class Together:
         except BaseException as error:  # every ensemble raises it, in its own thread
             self._error = error
 
+    def abort(self) -> None:
+        """Send home whoever waits: the run ends here."""
+        self._meeting.abort()
+
     def step(self, states: Iterator[Any]) -> Any:
         """The next state of an ensemble; one that fails lets the others go."""
         try:
