@@ -16,6 +16,7 @@ demo: $(READY)
 test: $(READY)
 	$(BIN)/python -m pytest
 	$(BIN)/python -m pytest --doctest-modules src
+	$(BIN)/python -m pytest --nbmake notebooks
 
 test-slow: $(READY)
 	$(BIN)/python -m pytest -m slow

@@ -1,0 +1,63 @@
+"""Predictive checks: could the data have come from the posterior?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+__all__ = ["predictive_p_value"]
+
+Floats = NDArray[np.float64]
+
+
+def _sum_of_squares(residuals: Floats) -> Floats:
+    return np.asarray((residuals**2).sum(axis=-1))
+
+
+def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = _sum_of_squares) -> float:
+    """How often data from the posterior are at least as discrepant as the real ones.
+
+    For each draw the residuals over the noise, of the real readings and of predicted ones, are put through a
+    discrepancy (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). The value is seldom extreme if the model holds:
+    it lies closer to one half than a uniform number does.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        From `infer_point_load`, with the noise inferred.
+    discrepancy : callable
+        Takes residuals (…, n) in the order of the data, returns (…); large is bad. By default the sum of squares.
+
+    Returns
+    -------
+    float
+        Share of the draws in which the prediction is at least as discrepant.
+
+    Examples
+    --------
+    >>> readings = np.zeros((1, 3, 2))
+    >>> noise = xr.Dataset({"noise_sd": (("chain", "draw"), np.ones((1, 3)))})
+    >>> predictive = {"expected_reading": readings, "reading": readings + np.array([0.5, 1.0, 2.0])[:, None]}
+    >>> dims = ("chain", "draw", "point")
+    >>> tree = xr.DataTree.from_dict({
+    ...     "posterior": noise,
+    ...     "posterior_predictive": xr.Dataset({name: (dims, a) for name, a in predictive.items()}),
+    ...     "observed_data": xr.Dataset({"reading": ("point", [0.9, 0.9])}),
+    ... })
+    >>> round(predictive_p_value(tree), 3)
+    0.667
+    """
+    posterior = tree["posterior"].to_dataset()
+    if "noise_sd" in posterior:
+        noise = posterior["noise_sd"].values[..., None]
+    else:
+        noise = np.asarray(json.loads(tree.attrs["known"])["noise_sd"])
+    predictive = tree["posterior_predictive"].to_dataset()
+    expected = predictive["expected_reading"].values
+    observed = tree["observed_data"].to_dataset()["reading"].values
+    real, predicted = (discrepancy((values - expected) / noise) for values in (observed, predictive["reading"].values))
+    return float(np.mean(predicted >= real))
