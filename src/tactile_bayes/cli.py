@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -48,7 +48,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Out = Annotated[Path, typer.Option(help="Folder for results; made if it is not there.")]
+Out = Annotated[Path, typer.Option(help="Folder for results; made if it is not there.", file_okay=False)]
 Seed = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
 
@@ -91,7 +91,7 @@ def infer(
         float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; inferred if not given.")
     ] = None,
     missing: Annotated[list[str] | None, typer.Option(help="Channel without a column: force_x and so on.")] = None,
-    friction: Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0)] = 0.0,
+    friction: Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)] = 0.0,
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
     seed: Seed = 1,
@@ -101,7 +101,7 @@ def infer(
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.record import read_record
+    from tactile_bayes.record import present_channels, read_record
     from tactile_bayes.rod import Rod
     from tactile_bayes.run import analyse
 
@@ -110,10 +110,16 @@ def infer(
     if diameter and length is None:
         raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
     rod = None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
+    measured = read_record(record, rod=rod, missing=missing or ())
     cell = None
     if force_noise is not None or moment_noise is not None:
         cell = LoadCell(force_noise=force_noise or 0.0, moment_noise=moment_noise or 0.0)
-    measured = read_record(record, rod=rod, missing=missing or ())
+        bare = [name for name in present_channels(measured) if not cell.standard_deviations[name]]
+        if bare:
+            option = "--moment-noise" if "holding_moment" in bare else "--force-noise"
+            raise ParameterError(
+                f"{bare[0]} is measured too: give {option} as well, above zero, or leave both out to have them inferred"
+            )
     if measured.attrs.get("units_source") == "assumed":
         typer.echo(
             "The record states no units: its numbers are taken as dimensionless, in units of the rod (L, EI/L, EI/L²). "
@@ -162,16 +168,17 @@ def demo(
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Callable[[Progress], object] | None]:
-    """A bar that fills with the effective sample size."""
-    if quiet:
-        yield None
-        return
+    """A bar that fills with the effective sample size; none where nobody sees it move."""
     from rich.console import Console
     from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield None
+        return
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task("looking for a start, then sampling", total=1000.0)
 
         def show(progress: Progress) -> None:
@@ -209,9 +216,14 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
     console.print(message, highlight=False, soft_wrap=True)
     if run.contacts is None:
         console.print("No contact points: Step 2 needs all three load channels.")
+    else:
+        fates = Counter(run.contacts.status.values.tolist()).most_common()
+        console.print("Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates), highlight=False)
     console.print()
     for what, path in {**files, **run.files}.items():
         console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)
+    if "interrupted" in attrs["message"]:
+        raise typer.Exit(130)
 
 
 def _digits(width: float) -> int:

@@ -85,11 +85,12 @@ class Contact(NamedTuple):
 
 
 def _refuse_friction(friction_angle: Floats) -> None:
-    if np.any(~((friction_angle >= 0.0) & (friction_angle <= MAX_FRICTION_ANGLE))):
-        bad = friction_angle[~((friction_angle >= 0.0) & (friction_angle <= MAX_FRICTION_ANGLE))].flat[0]
+    bad = ~((friction_angle >= 0.0) & (friction_angle <= MAX_FRICTION_ANGLE))
+    if np.any(bad):
+        found = float(friction_angle[bad].flat[0])
         raise ParameterError(
-            f"friction angle {bad!r} rad: give arctan of the friction coefficient, between 0 and {MAX_FRICTION_ANGLE} "
-            f"(coefficient {np.tan(MAX_FRICTION_ANGLE):.2f}; beyond, a rod would loop before it slides)"
+            f"the friction angle is {found:g} rad (coefficient {np.tan(found):g}): it must be between 0 and "
+            f"{MAX_FRICTION_ANGLE} (coefficient {np.tan(MAX_FRICTION_ANGLE):.2f}); beyond, a rod would loop before it slides"
         )
 
 

@@ -190,13 +190,13 @@ def _draw(
         return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
     draws = posterior_draws(result)
-    middle = contours_of(draws.median(("chain", "draw")), result.attrs["family"])
-    middle = middle.broadcast_to((1,)).take(np.array(0))
+    best = result["sample_stats"]["lp"].argmax(("chain", "draw"))  # medians by parameter may be out of the rod's reach
+    likeliest = contours_of(draws.isel(best), result.attrs["family"]).take(np.array(0))
     strokes = list(result["events"].stroke.values)
     directions: list[Literal["forward", "backward"]] = [d for d in DIRECTIONS if d in strokes]
     base = float(measured.base_x[0]), float(measured.base_y[0])
     fitted = scan(
-        middle,
+        likeliest,
         direction="both" if len(directions) == 2 else directions[0],
         base=base,
         rod=rod_of(measured),

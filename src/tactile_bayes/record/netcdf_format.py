@@ -15,6 +15,8 @@ __all__ = ["read_netcdf", "write_netcdf"]
 def read_netcdf(path: Path) -> Table:
     """Read a table."""
     source = Source(str(path))
+    with open(path, "rb"):  # what the system refuses, it refuses in fewer words than HDF5
+        pass
     try:
         with xr.open_dataset(
             path,
@@ -25,8 +27,6 @@ def read_netcdf(path: Path) -> Table:
             decode_coords=False,
         ) as stored:
             record = stored.load()
-    except FileNotFoundError:  # which is an OSError
-        raise
     except (OSError, ValueError) as error:
         raise source.error(f"this is no NetCDF file that can be read ({error}): write it again") from error
     return table_of(record, source)

@@ -129,7 +129,10 @@ def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
         else:
             continue
         if name in CHANNELS:
-            what += f", or declare the channel missing, with an empty column or missing=({name!r},)"
+            what += (
+                f", or declare the channel missing, with an empty column or missing=({name!r},), on the command line "
+                f"--missing {name}"
+            )
         elif not is_required:
             what += f", or add a column {name!r} (0 for a pivot in the origin)"
         raise source.error(what)

@@ -1,0 +1,42 @@
+"""What several files of tests share: an analysed record, and a quick stand-in for the slow parts of a run."""
+
+from __future__ import annotations
+
+import pytest
+
+from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.scanning import scan
+
+QUICK = SamplerSettings(ensembles=2, walkers=10, block_steps=10, max_steps=30)
+"""Enough for files and messages, not for numbers."""
+
+
+@pytest.fixture(scope="session")
+def measured():
+    """The demonstration's record, in coarse steps: SI, both directions, all channels."""
+    record = LOAD_CELL.measure(scan(CONTOUR, rod=ROD, drive_step=0.05).record, seed=1)
+    return record.drop_vars([name for name in record.data_vars if name.startswith("truth_")])
+
+
+@pytest.fixture(scope="session")
+def analysed(measured, tmp_path_factory):
+    """That record, analysed: the run and its folder."""
+    from tactile_bayes.run import analyse
+
+    folder = tmp_path_factory.mktemp("analysed") / "made" / "on the way"
+    return analyse(measured, folder, settings=QUICK, truth=CONTOUR), folder
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Runs without figures and of few steps, whatever settings they are given."""
+    from tactile_bayes import run
+
+    infer = run.infer_contour
+
+    def infer_quickly(*arguments, settings=None, **options):
+        return infer(*arguments, settings=QUICK, **options)
+
+    monkeypatch.setattr(run, "infer_contour", infer_quickly)
+    monkeypatch.setattr(run, "_draw", lambda *arguments, **options: {})

@@ -1,0 +1,209 @@
+"""What a stranger may get wrong, from the file or the contour to the message."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tactile_bayes.cli import app
+from tactile_bayes.contours import Circle, Parabola, PowerLaw, paper_profile
+from tactile_bayes.errors import ContourError, ReachError, RecordError
+from tactile_bayes.record import present_channels, read_record, write_record
+from tactile_bayes.rod import Rod
+from tactile_bayes.scanning import scan
+
+NAMES = ["sweep", "direction", "base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y"]
+
+
+@pytest.fixture(scope="module")
+def table(measured, tmp_path_factory):
+    """Header and rows of a good file, rows as lists of cells."""
+    path = tmp_path_factory.mktemp("good") / "record.csv"
+    write_record(measured, path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    header = [line for line in lines if line.startswith("#") and "column" not in line]
+    return header, [line.split(",") for line in lines if not line.startswith("#")][1:]
+
+
+def written(path, header, names, rows):
+    path.write_text("\n".join([*header, ",".join(names), *map(",".join, rows)]) + "\n", encoding="utf-8")
+    return path
+
+
+def edited(rows, row, column, text):
+    rows = [list(cells) for cells in rows]
+    rows[row][NAMES.index(column)] = text
+    return rows
+
+
+def mapped(rows, column, change):
+    place = NAMES.index(column)
+    return [[*cells[:place], change(cells[place]), *cells[place + 1 :]] for cells in rows]
+
+
+def without_last(rows):
+    return [cells[:-1] for cells in rows]
+
+
+FIRST_ROW = 9
+"""The line of the first sample: seven of header and the names come before it."""
+
+MISTAKES = {
+    "a missing column": (
+        lambda rows: (NAMES[:-1], without_last(rows)),
+        "there is no column 'force_y' (columns: sweep, direction, base_x, base_y, drive_angle, holding_moment, "
+        "force_x): add it, or declare the channel missing, with an empty column or missing=('force_y',), on the "
+        "command line --missing force_y",
+    ),
+    "a misspelt column": (
+        lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
+        "there is no column 'drive_angle', but a column 'drive_angel': did you mean 'drive_angle'? Rename it",
+    ),
+    "text in a row": (
+        lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),
+        f"line {FIRST_ROW + 3}, column 'force_x': 'overload' is not a number: correct it, or remove the row",
+    ),
+    "NaN in a row": (
+        lambda rows: (NAMES, edited(rows, 5, "holding_moment", "nan")),
+        f"line {FIRST_ROW + 5}, column 'holding_moment': the value is missing (nan): give a finite number, remove the "
+        "row, or empty the whole column if the channel is missing",
+    ),
+    "an empty cell": (
+        lambda rows: (NAMES, edited(rows, 5, "drive_angle", "")),
+        f"line {FIRST_ROW + 5}, column 'drive_angle': the value is missing (nan): give a finite number, remove the row",
+    ),
+    "a row too short": (
+        lambda rows: (NAMES, [*rows[:4], rows[4][:-1], *rows[5:]]),
+        f"line {FIRST_ROW + 4}: there are 7 cells in 8 columns ({', '.join(NAMES)}): write one per column, with a "
+        "point in decimals",
+    ),
+    "angles in degrees": (
+        lambda rows: (NAMES, mapped(rows, "drive_angle", lambda cell: f"{math.degrees(float(cell)):.4f}")),
+        "is more than a turn (2π), so the angles look like degrees: convert the column to radians, with numpy.radians "
+        "or times 0.017453292519943295",
+    ),
+    "a decreasing sweep labelled forward": (
+        lambda rows: (NAMES, mapped(rows, "direction", lambda cell: "forward")),
+        "sweep 1 is labelled 'forward', but its drive angle decreases, from ",
+    ),
+    "two strokes in one sweep": (
+        lambda rows: (NAMES, mapped(rows, "sweep", lambda cell: "0")),
+        f"sweep 0 mixes two values of 'direction', 'forward' (line {FIRST_ROW}) and 'backward' (line ",
+    ),
+    "no load at all": (
+        lambda rows: (NAMES, [[*cells[:5], "", "", ""] for cells in rows]),
+        "every load channel is empty: a record needs measurements of at least one of holding_moment, force_x, force_y",
+    ),
+    "no samples": (lambda rows: (NAMES, []), "there are no samples: give at least one row below the column names"),
+}
+
+
+@pytest.mark.parametrize(("mistake", "message"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, message):
+    """By the library as an error, by the command as a line on stderr and exit code 2: the same words."""
+    header, rows = table
+    names, rows = mistake(rows)
+    path = written(tmp_path / "record.csv", header, names, rows)
+    with pytest.raises(RecordError, match=re.escape(message)) as caught:
+        read_record(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run")])
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr == f"tactile-bayes: {caught.value}\n"
+    assert not (tmp_path / "run").exists()
+
+
+def test_semicolons_are_named(table, tmp_path):
+    header, rows = table
+    path = tmp_path / "record.csv"
+    path.write_text("\n".join([*header, ";".join(NAMES), *map(";".join, rows)]), encoding="utf-8")
+    with pytest.raises(RecordError, match="line 8: the columns are not separated by commas: use commas, and points"):
+        read_record(path)
+
+
+def test_si_without_a_rod_says_how_to_state_one(table, tmp_path):
+    path = written(tmp_path / "record.csv", ["# units: SI"], NAMES, table[1])
+    result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run")])
+    assert result.exit_code == 2
+    assert "the record is SI, but rod_length and rod_flexural_rigidity of its rod are not stated: give " in (
+        result.stderr
+    )
+    assert "on the command line --length and --flexural-rigidity" in result.stderr
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("way", ["an empty column", "no column"])
+def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
+    header, rows = table
+    if way == "no column":
+        path = written(tmp_path / "record.csv", header, NAMES[:-1], without_last(rows))
+        options = ["--missing", "force_y"]
+    else:
+        path = written(tmp_path / "record.csv", header, NAMES, mapped(rows, "force_y", lambda cell: ""))
+        options = []
+    assert present_channels(read_record(path, missing=options[1:])) == ("holding_moment", "force_x")
+    result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run"), "-q", *options])
+    assert result.exit_code == 0, result.output
+    assert "No contact points: Step 2 needs all three load channels." in result.stdout
+
+
+# --- Contours -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("contour", "base", "rod", "message"),
+    [
+        (
+            Parabola(0.5, 1.25),
+            (0.0, 0.0),
+            None,
+            "the contour is out of reach: its nearest point is 1.25 from the pivot at (0, 0), and the rod is 1 long",
+        ),
+        (
+            Parabola(2.5, 0.5),
+            (0.0, 0.1),
+            Rod(0.2, 2.4e-3),
+            "the contour is out of reach: its nearest point is 0.4 from the pivot at (0, 0.1), and the rod is 0.2 long",
+        ),
+    ],
+)
+def test_a_contour_out_of_reach_says_how_far_and_how_long(contour, base, rod, message):
+    with pytest.raises(ReachError, match=re.escape(message)):
+        scan(contour, base=base, rod=rod)
+
+
+@pytest.mark.parametrize(
+    ("q", "base", "message"),
+    [
+        (
+            -0.2,
+            (0.0, 0.0),
+            "the contour cuts the base: at x = 0 it is at y = -0.2, not above the pivot at y = 0; raise",
+        ),
+        (0.3, (1.0, 1.0), "the contour cuts the base: at x = 1 it is at y = 0.8, not above the pivot at y = 1; raise"),
+        (0.0, (0.0, 0.0), "the contour cuts the base: at x = 0 it is at y = 0, not above the pivot at y = 0; raise"),
+    ],
+)
+def test_a_contour_that_cuts_the_base_is_refused(q, base, message):
+    with pytest.raises(ContourError, match=re.escape(message)):
+        scan(Parabola(0.5, q), base=base)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Parabola(-0.5, 0.5), "Parabola: a must be positive, else the object is not strictly convex; found a"),
+        (lambda: Parabola(0.0, 0.5), "Parabola: a must be positive, else the object is not strictly convex; found a"),
+        (lambda: Parabola(0.5, np.nan), "Parabola: q and x_c must be finite; found q = nan"),
+        (lambda: Circle(-1.0, 0.5), "r must be positive"),
+        (lambda: PowerLaw(1.0, 1.0, 0.5), "n"),
+        (lambda: paper_profile("V", q=0.3), "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
+    ],
+)
+def test_what_is_not_strictly_convex_is_refused(build, message):
+    with pytest.raises(ContourError, match=re.escape(message)):
+        build()

@@ -1,0 +1,279 @@
+"""The command line, inside this process and as a stranger would start it."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tactile_bayes import __version__
+from tactile_bayes.cli import app
+from tactile_bayes.demonstration import LOAD_CELL, ROD
+from tactile_bayes.record import write_record
+
+HEAVY = {"scipy", "xarray", "matplotlib", "emcee", "numpy", "arviz_stats"}
+ROD_OPTIONS = ["--length", str(ROD.length), "--flexural-rigidity", repr(ROD.flexural_rigidity)]
+CELL_OPTIONS = ["--force-noise", str(LOAD_CELL.force_noise), "--moment-noise", str(LOAD_CELL.moment_noise)]
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def start(*arguments, code=0, cwd=None):
+    """The command in a process of its own; what it wrote to stdout and stderr."""
+    command = [str(Path(sys.executable).with_name("tactile-bayes")), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", cwd=cwd, timeout=300)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout, done.stderr
+
+
+def assert_refused(result, message):
+    """Exit code 2, a line on stderr with these words, and nothing else."""
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert message in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stderr.startswith("tactile-bayes: ")
+
+
+def assert_misused(result, message):
+    """The same for what is no proper call: usage, a hint to --help, and the reason."""
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    *usage, reason = result.stderr.splitlines()
+    assert usage[0].startswith("Usage: ")
+    assert reason.startswith("Error: ")
+    assert message in reason
+
+
+@pytest.fixture(scope="session")
+def record(measured, tmp_path_factory):
+    path = tmp_path_factory.mktemp("record") / "record.csv"
+    write_record(measured, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def bare(record):
+    """The same without header."""
+    path = record.with_name("bare.csv")
+    lines = record.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.startswith("#")) + "\n", encoding="utf-8")
+    return path
+
+
+# --- Help and imports -----------------------------------------------------------------------------------------------
+
+
+def test_help_lists_the_commands():
+    result = call("--help")
+    assert result.exit_code == 0
+    commands = result.stdout.split("Commands:")[1]
+    assert [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "] == [
+        "infer",
+        "demo",
+    ]
+
+
+@pytest.mark.parametrize("command", ["infer", "demo"])
+def test_help_of_a_command_ends_with_an_example(command):
+    result = call(command, "--help")
+    assert result.exit_code == 0
+    assert f"Example: tactile-bayes {command} " in result.stdout
+
+
+def test_version():
+    assert start("--version") == (f"{__version__}\n", "")
+
+
+@pytest.mark.parametrize("code", ["import tactile_bayes", "from tactile_bayes.cli import app; app(['--help'])"])
+def test_what_is_heavy_is_loaded_when_used(code):
+    """Importing the package and asking for help are quick because of what they do not import."""
+    script = f"import atexit, sys\natexit.register(lambda: print(sorted({HEAVY} & set(sys.modules))))\n{code}"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+# --- Results --------------------------------------------------------------------------------------------------------
+
+
+def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_path):
+    """As a stranger starts it, figures and all."""
+    out, errors = start("infer", record, "--out", "run", "--max-steps", 50, "--quiet", cwd=tmp_path)
+    assert errors == ""
+    assert "\nNOT CONVERGED, the steps allowed ran out after 50 steps: largest R̂ " in out
+    assert out.lower().count("not converged") == 1
+    assert "\nSamples: " in out
+    for name in ("a", "q", "x_c", "noise_scale", "gap width"):
+        assert f"\n{name} " in out
+    for line in out.split("\n\n")[-1].splitlines():
+        assert (tmp_path / line.split()[-1]).stat().st_size > 0
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
+    result = call("demo", "--out", tmp_path / "demo")
+    assert result.exit_code == 0, result.output
+    assert "the same job on your own: tactile-bayes infer RECORD --out RUN" in result.stdout
+    assert "truth" in result.stdout
+    assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_file_without_header_is_told_its_rod_and_cell(record, bare, tmp_path):
+    stated = call("infer", record, "--out", tmp_path / "1", "-q")
+    told = call("infer", bare, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, "--diameter", ROD.diameter, *CELL_OPTIONS)
+    assert told.exit_code == 0, told.output
+    assert told.stderr == ""
+    assert stated.stdout.split("\n\n")[0] == told.stdout.split("\n\n")[0]
+
+
+@pytest.mark.usefixtures("quick")
+def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(record, tmp_path, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
+    result = call("infer", record, "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert "effective draws" in result.stderr
+    assert "effective draws" not in result.stdout
+
+
+@pytest.mark.usefixtures("quick")
+def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_path):
+    path = tmp_path / "plain.csv"
+    rows = [f"0,forward,{0.5 + 0.05 * i},{0.1 * (3 < i < 30)},,,0,0" for i in range(40)]
+    names = "sweep,direction,drive_angle,holding_moment,force_x,force_y,base_x,base_y"
+    path.write_text("\n".join([names, *rows]) + "\n", encoding="utf-8")
+    result = call("infer", path, "--out", tmp_path / "run", "-q")
+    assert result.exit_code == 0, result.output
+    assert result.stderr.startswith("The record states no units: its numbers are taken as dimensionless")
+    assert "give --length and --flexural-rigidity" in result.stderr
+    assert "No contact points: Step 2 needs all three load channels." in result.stdout
+
+
+# --- Refusals -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--length", "0.1"], "--length and --flexural-rigidity go together: give both, or neither"),
+        (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity go together: give both, or neither"),
+        (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity beside it: give all three"),
+        (["--length", "-1", "--flexural-rigidity", "1"], "the rod's length is -1.0: give a positive number [m]"),
+        (["--length", "0.3", "--flexural-rigidity", "1"], "but Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0) w"),
+        (["--family", "blob"], "there is no family 'blob': choose 'parabola' or 'circle'"),
+        (["--probability", "1"], "probability is 1.0: give a number between 0 and 1, like 0.95"),
+        (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise as well, above zero, or leave"),
+        (["--moment-noise", "0.1"], "force_x is measured too: give --force-noise as well, above zero, or leave both"),
+        (["--force-noise", "-1"], "the load cell's force_noise is -1.0: give a standard deviation, zero or positive"),
+        (["--missing", "force_z"], "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
+        (["--missing", "force_x"], "column 'force_x' has values, but is declared missing"),
+    ],
+)
+def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
+    assert_refused(call("infer", record, "--out", tmp_path, *options), message)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["infer", "record.csv", "--out", "run", "--famly", "circle"], "No such option: --famly"),
+        (["infer", "record.csv", "--out", "run", "--max-steps", "many"], "--max-steps"),
+        (["infer", "record.csv", "--out", "run", "--friction", "1"], "--friction"),
+        (["infer", "record.csv", "--out", "run", "--seed", "-1"], "--seed"),
+        (["infer", "record.csv"], "Missing option '--out'"),
+        (["infer", "--out", "run"], "Missing argument 'record'"),
+        (["infer", "record.csv", "--out", __file__], "is a file"),
+        (["sing"], "No such command 'sing'"),
+        (["--quiet"], "No such option: --quiet"),
+    ],
+)
+def test_a_call_that_is_none_is_refused_with_the_usage(arguments, message):
+    assert_misused(call(*arguments), message)
+
+
+@pytest.mark.parametrize("name", ["nowhere.csv", "nowhere.nc"])
+def test_a_file_that_is_not_there(tmp_path, name):
+    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), f"{tmp_path / name}: No such file or directory")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("a.csv", "Is a directory"), ("a.nc", "Is a directory"), ("a", "a record is a .csv or")]
+)
+def test_a_directory_for_a_record(tmp_path, name, message):
+    (tmp_path / name).mkdir()
+    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), message)
+
+
+def test_a_folder_that_cannot_be_made(record):
+    assert_refused(call("infer", record, "--out", Path(__file__) / "run"), "Not a directory")
+    assert_refused(call("demo", "--quiet", "--out", Path(__file__) / "run"), "Not a directory")
+
+
+def test_refusals_of_the_command_itself(tmp_path):
+    out, errors = start("infer", "nowhere.csv", "--out", "run", code=2, cwd=tmp_path)
+    assert (out, errors) == ("", "tactile-bayes: nowhere.csv: No such file or directory\n")
+    assert list(tmp_path.iterdir()) == []
+    _, errors = start("infer", "nowhere.csv", "--famly", "circle", code=2)
+    assert "No such option: --famly" in errors
+
+
+# --- Interrupts -----------------------------------------------------------------------------------------------------
+
+SAMPLING = """
+import functools
+from tactile_bayes import run
+from tactile_bayes.cli import main
+from tactile_bayes.inference import contour, ensembles
+
+made = contour.sample
+def sample(*arguments, progress, **options):
+    return made(*arguments, progress=lambda state: print("sampling", flush=True), **options)
+
+contour.sample = sample
+run._draw = lambda *arguments, **options: {}
+ensembles.SamplerSettings = functools.partial(ensembles.SamplerSettings, block_steps=5, min_ess=1e9)
+main()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
+def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
+    command = [sys.executable, "-c", SAMPLING, "infer", record, "--out", "run", "-q"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", cwd=tmp_path
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "sampling\n"
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=300)
+    assert process.returncode == 130
+    assert errors == ""
+    assert "\nNOT CONVERGED, interrupted after " in out
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {
+        "posterior.nc",
+        "contacts.csv",
+        "band.csv",
+        "summary.csv",
+    }
+
+
+def test_control_c_before_there_is_a_draw_says_so(record, tmp_path, monkeypatch):
+    from tactile_bayes.inference import contour
+
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(contour, "sample", interrupted)
+    result = call("infer", record, "--out", tmp_path, "-q")
+    assert result.exit_code == 130
+    assert result.stderr == "tactile-bayes: interrupted, results are incomplete\n"
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,149 @@
+"""A run: every file it names, whatever the record holds."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from conftest import QUICK
+from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.demonstration import CONTOUR, ROD, TRUTH
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.result import read_result
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import to_dimensionless
+from tactile_bayes.run import analyse, summary
+from tactile_bayes.scanning import scan
+
+FIGURES = ("observables", "rods", "contour", "trace", "pairs")
+
+
+def assert_every_file_is_there(run, folder):
+    assert {path.name for path in run.files.values()} == {path.name for path in folder.iterdir()}
+    for name in FIGURES:
+        content = run.files[name].read_bytes()
+        assert content.startswith(b"\x89PNG\r\n")
+        assert len(content) > 5000
+
+
+def test_a_run_writes_every_file_it_names(analysed):
+    run, folder = analysed
+    assert list(run.files) == ["posterior", "contacts", "band", "summary", *FIGURES]
+    assert_every_file_is_there(run, folder)
+
+
+def test_the_files_hold_what_the_run_returns(analysed, measured):
+    run, _ = analysed
+    stored = read_result(run.files["posterior"])
+    assert stored["posterior"].to_dataset().identical(run.posterior["posterior"].to_dataset())
+    assert stored.attrs["message"] == run.posterior.attrs["message"]
+
+    contacts = pd.read_csv(run.files["contacts"], index_col="sample")
+    assert len(contacts) == measured.sizes["sample"]
+    np.testing.assert_array_equal(contacts["contact_x"], run.contacts.contact_x)
+    assert contacts["status"].tolist() == run.contacts.status.values.tolist()
+
+    band = pd.read_csv(run.files["band"], index_col="x")
+    np.testing.assert_array_equal(band["upper"], run.band.upper)
+    assert (band["lower"] <= band["median"]).all()
+    assert (band["median"] <= band["upper"]).all()
+
+    table = pd.read_csv(run.files["summary"], index_col="quantity")
+    assert table.index.tolist() == ["a", "q", "x_c", "noise_scale", "gap width"]
+    assert table["unit"].tolist() == ["1/m", "m", "m", "1", "m"]
+
+
+def test_the_estimate_is_near_the_truth(analysed):
+    """Not a test of the posterior: that names and units were not mixed up on the way."""
+    run, _ = analysed
+    table = summary(run.posterior)
+    for name in ("a", "q", "noise_scale"):
+        assert table["median"].sel(quantity=name) == pytest.approx(TRUTH[name], rel=0.2)
+    assert abs(table["median"].sel(quantity="x_c")) < 0.01 * ROD.length
+    np.testing.assert_allclose(run.band["median"], CONTOUR.height(run.band.x), atol=0.01 * ROD.length)
+
+
+def test_the_summary_has_the_probability_it_is_asked_for(analysed):
+    run, _ = analysed
+    wide, narrow = summary(run.posterior, 0.95), summary(run.posterior, 0.5)
+    assert (narrow["lower"] > wide["lower"]).all()
+    assert (narrow["upper"] < wide["upper"]).all()
+
+
+def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
+    record = scan(Parabola(0.5, 0.5), direction="backward", base=(0.1, 0.0), drive_step=0.05).record
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    measured["force_x"][:] = measured["force_y"][:] = np.nan
+    run = analyse(measured, tmp_path, settings=QUICK)
+    assert run.contacts is None
+    assert list(run.files) == ["posterior", "band", "summary", *FIGURES]
+    assert_every_file_is_there(run, tmp_path)
+    assert summary(run.posterior).quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
+
+
+def test_a_dimensionless_record_with_unknown_noise(tmp_path):
+    contour = Circle(1.0, 0.5)
+    record = scan(contour, direction="forward", drive_step=0.05).record
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    for name in ("load_cell_force_noise", "load_cell_moment_noise"):
+        del measured.attrs[name]
+    run = analyse(measured, tmp_path, family="circle", settings=QUICK, truth=contour)
+    assert_every_file_is_there(run, tmp_path)
+    table = summary(run.posterior)
+    assert table.quantity.values.tolist() == ["r", "q", "x_c", "moment_noise", "force_noise"]
+    assert set(table.unit.values) == {"1"}
+    assert table["median"].sel(quantity="q") == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
+    (tmp_path / "band.csv").write_text("old", encoding="utf-8")
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    analyse(measured, tmp_path)
+    assert (tmp_path / "band.csv").read_text(encoding="utf-8") != "old"
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.usefixtures("quick")
+def test_another_rod_is_that_of_all_results(measured, tmp_path):
+    wrong = measured.assign_attrs(rod_length=0.21, rod_diameter=0.0)
+    run = analyse(wrong, tmp_path, rod=ROD)
+    assert run.posterior.attrs["rod_length"] == ROD.length
+    np.testing.assert_array_equal(run.contacts.contact_x, reconstruct(measured).contact_x)
+
+
+@pytest.mark.usefixtures("quick")
+def test_units_do_not_matter(analysed, measured, tmp_path):
+    """To the rounding of the conversion; priors and random numbers scale with the rod."""
+    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path)
+    ratio = si.contacts.contact_x / plain.contacts.contact_x
+    np.testing.assert_allclose(ratio[si.contacts.status == "ok"], ROD.length, rtol=1e-9)
+    medians = [summary(run.posterior)["median"].sel(quantity="q").item() for run in (si, plain)]
+    assert medians[0] / ROD.length == pytest.approx(medians[1], rel=0.01)
+
+
+def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
+    from tactile_bayes import run as module
+
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
+    run = analyse(measured, tmp_path, settings=few)
+    assert not run.posterior.attrs["converged"]
+    assert "not converged, the steps allowed ran out after 1 steps" in run.posterior.attrs["message"]
+
+
+@pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])
+def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_path, probability):
+    with pytest.raises(ParameterError, match=re.escape(f"probability is {probability!r}: give a number between 0 and")):
+        analyse(measured, tmp_path / "run", probability=probability)
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_unknown_family_is_refused(measured, tmp_path):
+    with pytest.raises(ParameterError, match="there is no family 'ellipse': choose 'parabola' or 'circle'"):
+        analyse(measured, tmp_path, family="ellipse")
