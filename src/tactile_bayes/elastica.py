@@ -11,7 +11,6 @@ All contacts are forward ones (holding moment ≥ 0); `side=-1` mirrors a backwa
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -90,7 +89,7 @@ def _refuse_friction(friction_angle: Floats) -> None:
     if np.any(bad):
         found = float(friction_angle[bad].flat[0])
         raise ParameterError(
-            f"the friction angle is {found:g} rad (coefficient {math.tan(found):g}): give one between 0 and "
+            f"the friction angle is {found:g} rad: give one between 0 and "
             f"{MAX_FRICTION_ANGLE} (coefficient {np.tan(MAX_FRICTION_ANGLE):.2f}); beyond, a rod would loop before it "
             "slides"
         )

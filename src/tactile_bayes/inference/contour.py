@@ -16,9 +16,9 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
 from tactile_bayes.inference.families import Family, Prior, family_named
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
 from tactile_bayes.inference.result import provenance, sample_stats
-from tactile_bayes.inference.start import best_optimum
+from tactile_bayes.inference.start import best_optimum, gather
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Reach
 from tactile_bayes.reconstruction import reconstruct, with_rod
@@ -33,6 +33,12 @@ _KEPT_DRAWS = 250
 """Draws of each chain for which predictions and events are stored."""
 
 _PRIOR_DRAWS = 1000
+
+_MOST_TRIALS = 50
+"""Draws from the prior for each that is wanted within reach, before fewer will do."""
+
+_QUIET = 3e-4
+"""Noise over the largest load below which the fast interpolation of loads would be felt."""
 
 
 class _Noise(NamedTuple):
@@ -218,8 +224,19 @@ class _Model:
         self.family = family
         self.noise = noise
         self.priors = priors
+        self.friction = friction
         self.names = (*family.parameters, *noise.names)
+        self.positive = [self.names.index(name) for name in (*family.positive, *noise.names)]
         self.likelihood = RecordLikelihood(measured, noise.cell, friction)
+        self.deviation = self._rough_noise()
+        largest = np.abs(self.likelihood.measured[:, self.present]).max(axis=0)
+        quiet = np.any(self.deviation[self.present] < _QUIET * largest)
+        self.likelihood.order = FINE_ORDER if quiet else FAST_ORDER
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Which channels were measured, shape (3,)."""
+        return ~np.isnan(self.likelihood.measured).all(axis=0)
 
     def contours(self, points: Floats) -> Contour:
         return self.family.build(*points[:, : len(self.family.parameters)].T)
@@ -232,7 +249,8 @@ class _Model:
         return scale
 
     def log_prior(self, points: Floats) -> Floats:
-        return np.sum([self.priors[name].logpdf(points[:, i]) for i, name in enumerate(self.names)], axis=0)
+        logs = [self.priors[name].logpdf(points[:, i]) for i, name in enumerate(self.names)]
+        return np.where((points[:, self.positive] > 0.0).all(axis=1), np.sum(logs, axis=0), -np.inf)
 
     def log_probability(self, points: Floats) -> Floats:
         """Up to the prior's normalisation over contours within reach; −inf outside its support or reach."""
@@ -244,20 +262,21 @@ class _Model:
         return values
 
     def draw_prior(self, rng: np.random.Generator, count: int) -> tuple[Floats, float]:
-        """Draws within reach, and the share of all draws that they are."""
+        """Draws within reach, fewer where they are very rare, and the share of all draws that they are."""
         found, drawn = [np.empty((0, len(self.names)))], 0
-        while sum(map(len, found)) < count:
-            if drawn >= 200 * count:
-                raise ReachError(
-                    f"of {drawn} contours from the prior the rod can reach only {sum(map(len, found))} in every sweep: "
-                    "are base, rod length and units right, and the priors in the record's units?"
-                )
+        while sum(map(len, found)) < count and drawn < _MOST_TRIALS * count:
             points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
             drawn += count
             points = points[np.isfinite(self.log_prior(points))]
-            reach = self.likelihood.paths(self.contours(points)).reach.reshape(-1, len(points))
-            found.append(points[(reach == Reach.TOUCHES).all(axis=0)])
+            if len(points):
+                reach = self.likelihood.paths(self.contours(points)).reach.reshape(-1, len(points))
+                found.append(points[(reach == Reach.TOUCHES).all(axis=0)])
         points = np.concatenate(found)
+        if not len(points):
+            raise ReachError(
+                f"of {drawn} contours from the prior the rod can reach none in every sweep: are base, rod length and "
+                "units right, and the priors in the record's units?"
+            )
         return points[:count], len(points) / drawn
 
     # ---- where to start
@@ -266,20 +285,24 @@ class _Model:
         """Walkers scattered twice as wide as a normal approximation around the optimum."""
         rng = np.random.default_rng(seed)
         size = len(self.family.parameters)
-        deviation = self._rough_noise()
-        measured = self.likelihood.measured
-        present = ~np.isnan(measured).all(axis=0)
+        deviation, present = self.deviation, self.present
+        measured = self.likelihood.measured[:, present] / deviation[present]
+        candidates, _ = self.draw_prior(rng, 400)
+        some_noise = candidates[0, size:]
 
         def residuals(points: Floats) -> Floats:
-            allowed = np.isfinite(self.log_prior(self._with_noise(points, deviation)))
-            out = np.broadcast_to(measured / deviation, (len(points), *measured.shape)).copy()
+            noise = np.broadcast_to(some_noise, (len(points), some_noise.size))
+            allowed = np.isfinite(self.log_prior(np.concatenate([points, noise], axis=1)))
+            out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
             if allowed.any():
                 predicted, _ = self.likelihood.predict(self.contours(points[allowed]))
-                out[allowed] -= predicted / deviation
-            return out[..., present].reshape(len(points), -1)
+                out[allowed] = measured - predicted[..., present] / deviation[present]
+            return out.reshape(len(points), -1)
 
         spread = np.array([float(self.priors[name].std()) for name in self.family.parameters])
-        candidates, _ = self.draw_prior(rng, 400)
+        percentiles = np.quantile(candidates[:, :size], [0.16, 0.84], axis=0)
+        rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
+        spread = np.where(np.isfinite(spread), spread, rough)
         costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
         chosen = [candidates[i, :size] for i in np.argsort(costs)[:2]]
         by_contacts = self._from_contacts()
@@ -287,54 +310,66 @@ class _Model:
             chosen.insert(0, by_contacts)
         optimum = best_optimum(residuals, np.array(chosen), spread)
 
-        width = 2.0 * np.sqrt(np.diag(optimum.covariance))
-        square = np.linalg.cholesky(optimum.covariance * np.outer(*(2 * [np.minimum(spread / width, 1.0)])))
-        scale = self._fitted_noise(optimum.residuals.reshape(-1, int(present.sum())), deviation, present)
+        noise = self._fitted_noise(optimum.residuals.reshape(measured.shape))
+        possible = candidates[:, size:]
+        if not np.isfinite(self.log_prior(np.append(optimum.point, noise)[None]))[0]:
+            noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
+        narrow = np.minimum(0.5 * spread / np.sqrt(np.diag(optimum.covariance)), 1.0)
+        covariance = np.zeros((len(self.names), len(self.names)))
+        covariance[:size, :size] = optimum.covariance * np.outer(narrow, narrow)
+        covariance[range(size, len(self.names)), range(size, len(self.names))] = 0.5 / measured.size
 
-        def draw(rng: np.random.Generator, count: int) -> Floats:
-            points = np.empty((count, len(self.names)))
-            points[:, :size] = optimum.point + 2.0 * rng.normal(size=(count, size)) @ square.T
-            points[:, size:] = scale * np.exp(0.2 * rng.normal(size=(count, scale.size)))
-            return points
+        def with_logarithms(points: Floats) -> Floats:
+            return np.concatenate([points[:, :size], np.exp(points[:, size:])], axis=1)
 
-        return scatter_walkers(self.log_probability, draw, parameters=len(self.names), seed=seed, settings=settings)
+        def log_probability(points: Floats) -> Floats:
+            return self.log_probability(with_logarithms(points))
+
+        cloud = gather(log_probability, np.append(optimum.point, np.log(noise)), covariance, rng)
+        return scatter_walkers(
+            lambda points: np.where(self.log_probability(points) > cloud.floor, 0.0, -np.inf),
+            lambda rng, count: with_logarithms(cloud.draw(rng, count)),
+            parameters=len(self.names),
+            seed=seed,
+            settings=settings,
+        )
 
     def _rough_noise(self) -> Floats:
-        """Standard deviation of each channel from the median step between neighbouring samples, shape (3,)."""
-        steps = np.diff(self.likelihood.measured, axis=0)
+        """Standard deviation of each channel from the median bend between neighbouring samples, shape (3,)."""
+        measured = self.likelihood.measured
+        known = self.likelihood.load_cell.standard_deviations
         deviation = np.ones(len(CHANNELS))
-        for i, column in enumerate(steps.T):
-            if not np.isnan(column).all():
-                level = 1.4826 * np.median(np.abs(column)) / np.sqrt(2.0)
-                deviation[i] = max(level, 1e-4 * np.max(np.abs(self.likelihood.measured[:, i])), 1e-12)
+        for i in np.flatnonzero(self.present):
+            level = known[CHANNELS[i]]
+            if len(measured) > 2:
+                level = 1.4826 * float(np.median(np.abs(np.diff(measured[:, i], n=2)))) / np.sqrt(6.0)
+            deviation[i] = max(level, 1e-4 * float(np.max(np.abs(measured[:, i]))), 1e-12)
         return deviation
 
-    def _with_noise(self, points: Floats, deviation: Floats) -> Floats:
-        """Contour parameters filled up with noise parameters."""
+    def _fitted_noise(self, residuals: Floats) -> Floats:
+        """Noise parameters that fit the optimum's residuals, shape (samples, present channels), outliers aside."""
         known = self.likelihood.load_cell.standard_deviations
-        ratio = deviation / np.array([known[name] or 1.0 for name in CHANNELS])
-        noise = [float(np.median(ratio[[CHANNELS.index(c) for c in channels]])) for channels in self.noise.channels]
-        return np.concatenate([points, np.broadcast_to(noise, (len(points), len(noise)))], axis=1)
-
-    def _fitted_noise(self, residuals: Floats, deviation: Floats, present: NDArray[np.bool_]) -> Floats:
-        """Noise parameters that fit the optimum's residuals, outliers aside."""
-        fitted = deviation.copy()
-        fitted[present] *= np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
-        return self._with_noise(np.empty((1, 0)), fitted)[0]
+        fitted = self.deviation[self.present] * np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
+        names = [name for name, there in zip(CHANNELS, self.present, strict=True) if there]
+        ratio = {name: value / (known[name] or 1.0) for name, value in zip(names, fitted, strict=True)}
+        return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in self.noise.channels])
 
     def _from_contacts(self) -> Floats | None:
         """The family fitted to Step 2's contact points."""
         if len(present_channels(self.measured)) < len(CHANNELS):
             return None
         contacts = reconstruct(
-            self.measured, load_cell=self.noise.cell if self.noise.names == ("noise_scale",) else None
+            self.measured,
+            load_cell=self.noise.cell if self.noise.names == ("noise_scale",) else None,
+            friction=self.friction,
         )
         force = np.hypot(self.measured.force_x.values, self.measured.force_y.values)
         firm = (contacts.status.values == "ok") & (force > 0.1 * force.max())
         if np.count_nonzero(firm) < 2 * len(self.family.parameters):
             return None
-        values = self.family.fit(contacts.contact_x.values[firm], contacts.contact_y.values[firm])
-        point = np.array([values[name] for name in self.family.parameters])
+        length = self.likelihood.rod.length
+        values = self.family.fit(contacts.contact_x.values[firm] / length, contacts.contact_y.values[firm] / length)
+        point = np.array([values[name] * length**power for name, power in self.family.length_powers.items()])
         inside = [np.isfinite(self.priors[n].logpdf(v)) for n, v in zip(self.family.parameters, point, strict=True)]
         return point if all(inside) else None
 

@@ -39,15 +39,18 @@ class Family:
         From parameters by name, numbers or arrays, to contours.
     length_powers : mapping
         For every parameter the power of length in its unit.
+    positive : tuple of str
+        The parameters that have to be positive, whatever a prior says.
     default_priors : callable
         From pivot (x, y) and rod length to priors by name: weakly informative, and from nothing but the rod's reach.
     fit : callable
-        From points (x, y) to parameters by name, least squares that outliers do not rule.
+        From points (x, y) in rod lengths to parameters by name, least squares that outliers do not rule.
     """
 
     name: str
     build: Callable[..., Contour]
     length_powers: Mapping[str, int]
+    positive: tuple[str, ...]
     default_priors: Callable[[tuple[float, float], float], dict[str, Prior]]
     fit: Callable[[Floats, Floats], dict[str, float]]
 
@@ -93,15 +96,21 @@ def _circle_priors(base: tuple[float, float], length: float) -> dict[str, Prior]
     return {"r": stats.lognorm(s=1.0, scale=0.5 * length), **_vertex_priors(base, length)}
 
 
+def _robust(miss: Callable[[Floats], Floats], point: Any) -> Floats:
+    """Least squares that outliers do not rule: repeated, each time in units of the spread that the last one left."""
+    for _ in range(3):
+        spread = max(float(np.median(np.abs(miss(point)))), 1e-9)
+
+        def scaled(p: Floats, unit: float = spread) -> Floats:
+            return miss(p) / unit
+
+        point = least_squares(scaled, point, loss="soft_l1").x
+    return np.asarray(point)
+
+
 def _fit_parabola(x: Floats, y: Floats) -> dict[str, float]:
     design = np.stack([x * x, x, np.ones_like(x)], axis=1)
-    first = np.linalg.lstsq(design, y, rcond=None)[0]
-    spread = float(np.median(np.abs(design @ first - y))) or 1.0
-
-    def miss(p: Floats) -> Floats:
-        return np.asarray((design @ p - y) / spread)
-
-    a, b, c = least_squares(miss, first, loss="soft_l1").x
+    a, b, c = _robust(lambda p: design @ p - y, np.linalg.lstsq(design, y, rcond=None)[0])
     return {"a": float(a), "q": float(c - b * b / (4.0 * a)), "x_c": float(-b / (2.0 * a))}
 
 
@@ -110,20 +119,15 @@ def _fit_circle(x: Floats, y: Floats) -> dict[str, float]:
     design = np.stack([x, y, np.ones_like(x)], axis=1)
     b, c, d = np.linalg.lstsq(design, x * x + y * y, rcond=None)[0]
     first = np.array([0.5 * b, 0.5 * c, np.sqrt(max(d + 0.25 * (b * b + c * c), 1e-12))])
-
-    def miss(p: Floats, unit: float = 1.0) -> Floats:
-        return np.asarray((np.hypot(x - p[0], y - p[1]) - p[2]) / unit)
-
-    spread = float(np.median(np.abs(miss(first)))) or 1.0
-    centre_x, centre_y, r = least_squares(miss, first, loss="soft_l1", args=(spread,)).x
+    centre_x, centre_y, r = _robust(lambda p: np.hypot(x - p[0], y - p[1]) - p[2], first)
     return {"r": float(r), "q": float(centre_y - r), "x_c": float(centre_x)}
 
 
 FAMILIES: dict[str, Family] = {
     family.name: family
     for family in (
-        Family("parabola", Parabola, {"a": -1, "q": 1, "x_c": 1}, _parabola_priors, _fit_parabola),
-        Family("circle", Circle, {"r": 1, "q": 1, "x_c": 1}, _circle_priors, _fit_circle),
+        Family("parabola", Parabola, {"a": -1, "q": 1, "x_c": 1}, ("a",), _parabola_priors, _fit_parabola),
+        Family("circle", Circle, {"r": 1, "q": 1, "x_c": 1}, ("r",), _circle_priors, _fit_circle),
     )
 }
 """Families by name."""

@@ -16,12 +16,12 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Paths, Reach, trace
 from tactile_bayes.record import CHANNELS, rod_of, to_dimensionless
 
-__all__ = ["RecordLikelihood"]
+__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood"]
 
 Floats = NDArray[np.float64]
 
-_ORDER = 16
-"""Interpolates loads to about 1e-5 of their largest value, far below any load cell's noise."""
+FAST_ORDER, FINE_ORDER = 16, 32
+"""Interpolate loads to about 1e-5 of their largest value (at worst some 1e-4), and to 1e-10 (1e-6)."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,14 @@ class RecordLikelihood:
         In the record's units.
     friction : float
         Coulomb's coefficient μ.
+    order : int
+        Number of Chebyshev nodes on each smooth stretch of a path; more for a load cell that is nearly free of noise.
     """
 
-    def __init__(self, measured: xr.Dataset, load_cell: LoadCell, friction: float = 0.0) -> None:
+    def __init__(
+        self, measured: xr.Dataset, load_cell: LoadCell, friction: float = 0.0, order: int = FAST_ORDER
+    ) -> None:
+        self.order = order
         self.rod = rod_of(measured)
         self.friction_angle = float(np.arctan(friction))
         record = to_dimensionless(measured)
@@ -82,7 +87,7 @@ class RecordLikelihood:
             )
         )
         seen = SeenContour(contours.take(index), base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
-        return trace(seen, friction_angle=self.friction_angle, order=_ORDER, exact_events=exact_events)
+        return trace(seen, friction_angle=self.friction_angle, order=self.order, exact_events=exact_events)
 
     def predict(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
         """Noise-free loads, shape (n, samples, 3), and which contours every stroke can reach, shape (n,)."""

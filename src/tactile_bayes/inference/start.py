@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +12,26 @@ from scipy.optimize import least_squares
 
 from tactile_bayes.errors import InferenceError
 
-__all__ = ["Optimum", "best_optimum"]
+__all__ = ["Cloud", "Optimum", "best_optimum", "gather"]
 
 Floats = NDArray[np.float64]
 Residuals = Callable[[Floats], Floats]
 
 _BRAVE = 2.0
 """Residual in standard deviations from which on a sample pulls less than by its square."""
+
+
+_WIDER = 2.0
+"""How many times wider than the posterior walkers start."""
+
+_DEFICIT = 12.0
+"""Log-probability per parameter that a walker may start below the best: three times what _WIDER makes on average."""
+
+_ROUNDS = 30
+
+
+_FITS = 0.7
+"""Cost per residual that says that the noise explains the record: 0.4 if the noise is guessed right."""
 
 
 class Optimum(NamedTuple):
@@ -31,7 +45,7 @@ class Optimum(NamedTuple):
 
 
 def best_optimum(residuals: Residuals, candidates: Floats, spread: Floats) -> Optimum:
-    """Robust least squares from each of several candidates; the best of them.
+    """Robust least squares from one candidate after the other until one fits; the best of them.
 
     Parameters
     ----------
@@ -46,23 +60,76 @@ def best_optimum(residuals: Residuals, candidates: Floats, spread: Floats) -> Op
         found = _descend(residuals, candidate, spread)
         if best is None or found.cost < best.cost:
             best = found
+        if best.cost < _FITS * best.residuals.size:
+            break
     if best is None:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
     return best
 
 
 def _descend(residuals: Residuals, start: Floats, spread: Floats) -> Optimum:
+    """In units of the spread, so that the record's units do not matter."""
+
     def one(point: Floats) -> Floats:
-        return residuals(point[None])[0]
+        return residuals((point * spread)[None])[0]
 
     def jacobian(point: Floats) -> Floats:
         """Central differences; loads are interpolated, so the step must not be too small."""
-        step = 1e-4 * spread
-        moves = np.concatenate([np.diag(step), -np.diag(step)])
-        values = residuals(point + moves)
-        return np.asarray((values[: step.size] - values[step.size :]).T / (2.0 * step))
+        moves = 1e-4 * np.concatenate([np.eye(point.size), -np.eye(point.size)])
+        values = residuals((point + moves) * spread)
+        return np.asarray((values[: point.size] - values[point.size :]).T / 2e-4)
 
-    solution = least_squares(one, start, jacobian, loss="soft_l1", f_scale=_BRAVE, x_scale=spread, max_nfev=60)
+    solution = least_squares(one, start / spread, jacobian, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)
     slope = np.asarray(solution.jac)
-    information = slope.T @ slope + np.diag(spread**-2.0)
-    return Optimum(solution.x, np.linalg.inv(information), one(solution.x), float(solution.cost))
+    covariance = np.linalg.inv(slope.T @ slope + np.eye(spread.size)) * np.outer(spread, spread)
+    return Optimum(solution.x * spread, covariance, one(solution.x), float(solution.cost))
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Where walkers may start: a normal distribution, and the log-probability that is asked of them."""
+
+    centre: Floats
+    root: Floats
+    """Cholesky factor of the covariance."""
+    floor: float
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        return self.centre + rng.normal(size=(count, self.centre.size)) @ self.root.T
+
+
+def gather(
+    log_probability: Callable[[Floats], Floats], centre: Floats, covariance: Floats, rng: np.random.Generator
+) -> Cloud:
+    """A cloud that is wider than the posterior, but of which most is not hopeless.
+
+    A walker that starts where a sample of the record is impossible, as just beyond a snap-off, inflates the noise to
+    live with it, and takes thousands of steps to come back. So points are drawn around the centre, and while most of
+    them are far less probable than the best, centre and covariance are taken from the best fifth (the cross-entropy
+    method). Half its covariance, or the cloud would not shrink: of points twice as wide the best fifth are as wide.
+
+    Parameters
+    ----------
+    log_probability : callable
+        From points (n, d) to (n,); −inf where impossible.
+    centre : ndarray, shape (d,)
+    covariance : ndarray, shape (d, d)
+        A guess at the posterior's.
+    rng : np.random.Generator
+    """
+    size = centre.size
+    for _ in range(_ROUNDS):
+        root = np.linalg.cholesky(np.asarray(covariance, dtype=np.float64))
+        cloud = Cloud(centre, _WIDER * root, -np.inf)
+        points = cloud.draw(rng, 60 * size)
+        values = log_probability(points)
+        floor = values.max() - _DEFICIT * size
+        if np.mean(values > floor) > 0.5:
+            break
+        best = np.argsort(values)[-12 * size :]
+        best = best[np.isfinite(values[best])]
+        if best.size > 2 * size:
+            centre, covariance = points[best].mean(axis=0), 0.5 * np.cov(points[best].T)
+        else:
+            covariance = 0.25 * covariance
+    return replace(cloud, floor=float(min(floor, np.quantile(values, 0.8, method="lower"))))
