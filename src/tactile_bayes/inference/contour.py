@@ -13,7 +13,7 @@ from scipy import stats
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import ParameterError, ReachError
+from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
 from tactile_bayes.inference.families import Family, Prior, family_named
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
@@ -21,7 +21,7 @@ from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.inference.start import best_optimum, gather
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Reach
-from tactile_bayes.reconstruction import reconstruct, with_rod
+from tactile_bayes.reconstruction import loaded_samples, reconstruct, with_rod
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, record_hash, rod_of, validate
 from tactile_bayes.rod import Rod
 
@@ -108,7 +108,7 @@ def infer_contour(
     ParameterError
         If the family is unknown, a prior does not belong to a parameter, or the load cell has no noise on a channel.
     InferenceError
-        If no contour of the family is found that the rod can reach.
+        If no sample carries any load, or no contour of the family is found that the rod can reach.
 
     Examples
     --------
@@ -126,11 +126,20 @@ def infer_contour(
     chosen = family_named(family)
     noise = _noise(measured, load_cell)
     chosen_priors = {**_contour_priors(measured, chosen), **noise.priors}
-    for name in priors or {}:
+    for name, prior in (priors or {}).items():
         if name not in chosen_priors:
             raise ParameterError(
                 f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}"
             )
+        if not isinstance(prior, Prior):
+            raise ParameterError(
+                f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            )
+    if not loaded_samples(measured, noise.cell if noise.names == ("noise_scale",) else None).any():
+        raise InferenceError(
+            "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
+            "in the record's units?"
+        )
     chosen_priors.update(priors or {})
     model = _Model(measured, chosen, noise, chosen_priors, friction)
     seeds = np.random.SeedSequence(seed).spawn(4)
@@ -308,7 +317,7 @@ class _Model:
         by_contacts = self._from_contacts()
         if by_contacts is not None:
             chosen.insert(0, by_contacts)
-        optimum = best_optimum(residuals, np.array(chosen), spread)
+        optimum = best_optimum(residuals, np.array(chosen), percentiles.mean(axis=0), spread)
 
         noise = self._fitted_noise(optimum.residuals.reshape(measured.shape))
         possible = candidates[:, size:]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ __all__ = ["FAMILIES", "Family", "Prior", "family_named"]
 Floats = NDArray[np.float64]
 
 
+@runtime_checkable
 class Prior(Protocol):
     """What is asked of a prior: a frozen distribution of scipy.stats has it."""
 
@@ -98,7 +99,7 @@ def _circle_priors(base: tuple[float, float], length: float) -> dict[str, Prior]
 
 def _robust(miss: Callable[[Floats], Floats], point: Any) -> Floats:
     """Least squares that outliers do not rule: repeated, each time in units of the spread that the last one left."""
-    for _ in range(3):
+    for _ in range(5):
         spread = max(float(np.median(np.abs(miss(point)))), 1e-9)
 
         def scaled(p: Floats, unit: float = spread) -> Floats:

@@ -44,7 +44,7 @@ class Optimum(NamedTuple):
     cost: float
 
 
-def best_optimum(residuals: Residuals, candidates: Floats, spread: Floats) -> Optimum:
+def best_optimum(residuals: Residuals, candidates: Floats, middle: Floats, spread: Floats) -> Optimum:
     """Robust least squares from one candidate after the other until one fits; the best of them.
 
     Parameters
@@ -52,12 +52,12 @@ def best_optimum(residuals: Residuals, candidates: Floats, spread: Floats) -> Op
     residuals : callable
         From points (n, d) to residuals in standard deviations (n, k).
     candidates : ndarray, shape (m, d)
-    spread : ndarray, shape (d,)
-        Scale on which each parameter varies a priori.
+    middle, spread : ndarray, shape (d,)
+        Where each parameter lies a priori, and on which scale it varies there: it is drawn there like by one residual.
     """
     best: Optimum | None = None
     for candidate in candidates:
-        found = _descend(residuals, candidate, spread)
+        found = _descend(residuals, candidate, middle, spread)
         if best is None or found.cost < best.cost:
             best = found
         if best.cost < _FITS * best.residuals.size:
@@ -67,22 +67,22 @@ def best_optimum(residuals: Residuals, candidates: Floats, spread: Floats) -> Op
     return best
 
 
-def _descend(residuals: Residuals, start: Floats, spread: Floats) -> Optimum:
+def _descend(residuals: Residuals, start: Floats, middle: Floats, spread: Floats) -> Optimum:
     """In units of the spread, so that the record's units do not matter."""
 
     def one(point: Floats) -> Floats:
-        return residuals((point * spread)[None])[0]
+        return np.append(residuals((point * spread)[None])[0], point - middle / spread)
 
     def jacobian(point: Floats) -> Floats:
         """Central differences; loads are interpolated, so the step must not be too small."""
         moves = 1e-4 * np.concatenate([np.eye(point.size), -np.eye(point.size)])
         values = residuals((point + moves) * spread)
-        return np.asarray((values[: point.size] - values[point.size :]).T / 2e-4)
+        return np.concatenate([(values[: point.size] - values[point.size :]).T / 2e-4, np.eye(point.size)])
 
     solution = least_squares(one, start / spread, jacobian, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)
     slope = np.asarray(solution.jac)
-    covariance = np.linalg.inv(slope.T @ slope + np.eye(spread.size)) * np.outer(spread, spread)
-    return Optimum(solution.x * spread, covariance, one(solution.x), float(solution.cost))
+    covariance = np.linalg.inv(slope.T @ slope) * np.outer(spread, spread)
+    return Optimum(solution.x * spread, covariance, one(solution.x)[: -spread.size], float(solution.cost))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,60 @@
+"""Records of known contours, and posteriors that several tests look at: computed once, and not to be changed."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.contours import Parabola
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.scanning import scan
+
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+DEVIATIONS = np.array([0.02, 0.05, 0.05])
+STEP = float(np.radians(2.0))
+TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}
+
+BRIEF = SamplerSettings(ensembles=2, walkers=16, block_steps=30, max_steps=30, min_ess=1e9)
+"""Too short for anything but the layout of results."""
+
+MODEST = SamplerSettings(ensembles=2, walkers=16, min_ess=160, max_r_hat=1.06)
+"""Enough for means within a fraction of a standard deviation."""
+
+SOUND = SamplerSettings(ensembles=2, walkers=24, min_ess=400, max_r_hat=1.05)
+
+
+def swept(contour, *, bases=((0.0, 0.0),), step=STEP, **options) -> xr.Dataset:
+    """An exact record of sweeps in both directions from every base."""
+    parts = []
+    for k, base in enumerate(bases):
+        part = scan(contour, base=base, drive_step=step, **options).record
+        part["sweep"] = part.sweep + 2 * k
+        parts.append(part)
+    return xr.concat(parts, "sample", combine_attrs="override") if parts[1:] else parts[0]
+
+
+def without(record: xr.Dataset, *names: str) -> xr.Dataset:
+    """The record with channels or attributes taken away."""
+    record = record.copy(deep=True)
+    for name in names:
+        if name in record:
+            record[name] = ("sample", np.full(record.sizes["sample"], np.nan), record[name].attrs)
+        else:
+            del record.attrs[name]
+    return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
+
+
+@cache
+def measured() -> xr.Dataset:
+    """Profile II at q = 0.5, both sweeps in steps of 2°."""
+    return CELL.measure(swept(Parabola(**TRUTH)), seed=5)
+
+
+@cache
+def posterior() -> xr.DataTree:
+    """The parabola's posterior of it."""
+    return infer_contour(measured(), load_cell=CELL, seed=1, settings=SOUND)

@@ -1,0 +1,149 @@
+"""The likelihood of a whole record, against normal densities summed over exact states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+from scipy.optimize import brentq
+
+from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
+from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, rod_of
+from tactile_bayes.rod import Rod
+from tactile_bayes.scanning import scan
+
+SHARE = {FAST_ORDER: 3e-4, FINE_ORDER: 1e-6}
+"""Error of the interpolated loads over their largest value, at worst, in 150 contours."""
+
+WIRE = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
+WIRE_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+
+
+def exact_loads(record, contour, friction=0.0):
+    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`."""
+    out = np.empty((record.sizes["sample"], 3))
+    for sweep in np.unique(record.sweep.values):
+        rows = np.flatnonzero(record.sweep.values == sweep)
+        direction = str(record.direction.values[rows[0]])
+        base = float(record.base_x[rows[0]]), float(record.base_y[rows[0]])
+        angles = record.drive_angle.values[rows]
+        other = scan(
+            contour, direction=direction, base=base, drive_angles=angles, rod=rod_of(record), friction=friction
+        ).record
+        np.testing.assert_array_equal(other.drive_angle.values, angles)
+        out[rows] = np.stack([other[name].values for name in CHANNELS], axis=-1)
+    return out
+
+
+def stack(contours):
+    family = type(contours[0])
+    return family(*(np.array([getattr(c, name) for c in contours], dtype=float) for name in vars(contours[0])))
+
+
+RIGS = {
+    "dimensionless": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "far off": (Parabola(0.5, 0.5), Parabola(0.9, 0.35, -0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "circle": (Circle(0.6, 0.4, 0.1), Circle(0.61, 0.401, 0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "SI": (Parabola(2.5, 0.1), Parabola(2.52, 0.0999, 0.0004), WIRE, WIRE_CELL, ((0.0, 0.0),), 0.0),
+    "diameter": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(diameter=0.02), CELL, ((0.0, 0.0),), 0.0),
+    "pivots": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.2, 0.1), (-0.3, 0.0)), 0.0),
+    "friction": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.0, 0.0),), 0.3),
+}
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_against_an_independent_sum(rig):
+    """Loads off by e change a normal log-density by r e/σ² + e²/(2σ²) at most, r the residual."""
+    true, other, rod, cell, bases, friction = RIGS[rig]
+    whole = cell.measure(swept(true, bases=bases, rod=rod, friction=friction), seed=3)
+    exact = [exact_loads(whole, contour, friction) for contour in (true, other)]
+    scale = np.array([1.0, 1.3])
+    for missing in ((), ("force_x", "force_y"), ("holding_moment",)):
+        measured = without(whole, *missing)
+        values = np.stack([measured[name].values for name in CHANNELS], axis=-1)
+        present = ~np.isnan(values[0])
+        deviation = np.array([cell.standard_deviations[name] for name in CHANNELS])[present]
+        units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])[present]
+        for order in (FAST_ORDER, FINE_ORDER):
+            likelihood = RecordLikelihood(measured, cell, friction, order)
+            found = likelihood.log_likelihood(stack([true, other]), scale[:, None])
+            pointwise = likelihood.log_likelihood(stack([true, other]), scale[:, None], pointwise=True)
+            np.testing.assert_allclose(pointwise.sum(axis=1), found, rtol=1e-12)
+            for k, loads in enumerate(exact):
+                sigma = scale[k] * deviation
+                densities = stats.norm.logpdf(values[:, present], loads[:, present], sigma).sum(axis=1)
+                expected = densities + np.log(units).sum()  # densities of dimensionless loads
+                error = SHARE[order] * np.abs(loads[:, present]).max(axis=0)
+                slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
+                assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
+
+
+def test_truth_is_more_likely_than_what_is_a_little_off():
+    measured = CELL.measure(swept(Parabola(0.5, 0.5)), seed=3)
+    off = [Parabola(0.5, 0.5), Parabola(0.51, 0.5), Parabola(0.5, 0.502), Parabola(0.5, 0.5, 0.005)]
+    values = RecordLikelihood(measured, CELL).log_likelihood(stack(off))
+    assert np.argmax(values) == 0
+
+
+def test_a_contour_out_of_reach_of_any_pivot_is_impossible():
+    record = swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.3, 0.1)))
+    likelihood = RecordLikelihood(record, CELL)
+    contours = [
+        Parabola(0.5, 0.5),
+        Parabola(0.5, 1.02),  # within reach of the second pivot only
+        Parabola(0.5, 1.3),
+        Parabola(0.5, -0.1),
+        Parabola(2.0, 0.05, 0.3),  # cuts the second pivot
+    ]
+    found = likelihood.log_likelihood(stack(contours))
+    assert np.isfinite(found).tolist() == [True, False, False, False, False]
+    assert np.all(np.isneginf(found[1:]))
+    assert np.all(np.isneginf(likelihood.log_likelihood(stack(contours), pointwise=True)[1:]))
+
+
+def test_snap_off_tells_contours_apart():
+    """Across the contour that lets go at a sample's drive angle, likelihood jumps by what that sample says."""
+    record = swept(Parabola(0.5, 0.5), direction="forward")
+    measured = CELL.measure(record, seed=3)
+    last = int(np.flatnonzero(record.force_y.values)[-1])
+    angle = float(record.drive_angle[last])
+
+    def late(q):
+        return scan(Parabola(0.5, q), direction="forward").events["forward"].snap_off.drive_angle - angle
+
+    q = brentq(late, 0.45, 0.55, xtol=1e-13)
+    sides = sorted((q - 1e-9, q + 1e-9), key=late)
+    assert late(sides[0]) < 0.0 < late(sides[1])
+    likelihood = RecordLikelihood(measured, CELL, order=FINE_ORDER)
+    let_go, held_on = likelihood.log_likelihood(stack([Parabola(0.5, q) for q in sides]))
+    values = np.array([float(measured[name][last]) for name in CHANNELS])
+    load = exact_loads(measured, Parabola(0.5, sides[1]))[last]
+    jump = (stats.norm.logpdf(values, load, DEVIATIONS) - stats.norm.logpdf(values, 0.0, DEVIATIONS)).sum()
+    assert held_on - let_go > 1000.0
+    # All loads of a contour that is 1e-9 off change by about as much, over deviations of 0.02 in 100 samples.
+    np.testing.assert_allclose(held_on - let_go, jump, rtol=1e-4)
+
+
+def test_order_of_sweeps_and_their_number_do_not_matter():
+    measured = CELL.measure(swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.1))), seed=3)
+    contours = stack([Parabola(0.5, 0.5), Parabola(0.505, 0.5)])
+    expected = RecordLikelihood(measured, CELL).log_likelihood(contours)
+    mixed = measured.isel(sample=np.random.default_rng(1).permutation(measured.sizes["sample"]).argsort(kind="stable"))
+    mixed = mixed.sortby("sweep", ascending=False)
+    pointwise = RecordLikelihood(mixed, CELL).log_likelihood(contours, pointwise=True)
+    np.testing.assert_allclose(pointwise.sum(axis=1), expected, rtol=1e-12)
+    again = measured.copy()
+    again["sweep"] = again.sweep + 4
+    twice = xr.concat([measured, again], "sample", combine_attrs="override")
+    np.testing.assert_allclose(RecordLikelihood(twice, CELL).log_likelihood(contours), 2.0 * expected, rtol=1e-12)
+
+
+def test_a_channel_without_noise_is_refused():
+    likelihood = RecordLikelihood(swept(Parabola(0.5, 0.5)), LoadCell(moment_noise=0.02))
+    with pytest.raises(ParameterError, match="force_x is measured, but the load cell has no noise on it"):
+        likelihood.log_likelihood(stack([Parabola(0.5, 0.5)]))

@@ -1,0 +1,96 @@
+"""What a posterior carries, its file, and its form for ArviZ."""
+
+from __future__ import annotations
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.contour_posteriors import posterior
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.ensembles import SamplerSettings, sample
+from tactile_bayes.inference.result import (
+    posterior_draws,
+    provenance,
+    read_result,
+    sample_stats,
+    to_arviz,
+    write_result,
+)
+
+SETTINGS = SamplerSettings(ensembles=2, walkers=4, block_steps=8, max_steps=8)
+
+
+def draws():
+    start = np.random.default_rng(1).normal(size=(2, 4, 1))
+    return sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=1, settings=SETTINGS)
+
+
+def test_sample_stats_and_provenance_are_those_of_the_draws():
+    some = draws()
+    group = sample_stats(some)
+    np.testing.assert_array_equal(group.lp.values, some.log_probability)
+    np.testing.assert_array_equal(group.r_hat.sel(parameter="x"), some.r_hat[0])
+    assert group.attrs["steps_run"] == 8
+    attrs = provenance(
+        some, seed=np.random.SeedSequence(7, spawn_key=(1,)), settings=SETTINGS, data_sha256="ab", more=2
+    )
+    assert attrs["seed"] == "7, spawn key (1,)"
+    assert json.loads(attrs["settings"])["walkers"] == 4
+    assert attrs["converged"] == 0
+    assert attrs["message"] == some.message
+    assert (attrs["data_sha256"], attrs["more"]) == ("ab", 2)
+
+
+def test_a_file_holds_the_whole_result(tmp_path):
+    result = posterior()
+    write_result(result, tmp_path / "posterior.nc")
+    again = read_result(tmp_path / "posterior.nc")
+    xr.testing.assert_identical(again, result)
+    assert again.attrs == result.attrs
+    assert [path.name for path in tmp_path.iterdir()] == ["posterior.nc"]
+
+
+def test_what_is_no_result_is_refused(tmp_path):
+    with pytest.raises(InferenceError, match="there is no file"):
+        read_result(tmp_path / "none.nc")
+    (tmp_path / "text.nc").write_text("no NetCDF")
+    with pytest.raises(InferenceError, match="is no NetCDF file of a posterior"):
+        read_result(tmp_path / "text.nc")
+    other = xr.DataTree.from_dict({"prior": xr.Dataset({"a": 1.0})})
+    other.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    with pytest.raises(InferenceError, match="no group 'posterior', only prior"):
+        read_result(tmp_path / "other.nc")
+
+
+def test_draws_of_a_tree_and_of_a_dataset():
+    dataset = posterior()["posterior"].to_dataset()
+    xr.testing.assert_identical(posterior_draws(posterior()), dataset)
+    assert posterior_draws(dataset) is dataset
+    with pytest.raises(InferenceError, match="no group 'posterior', only nothing"):
+        posterior_draws(xr.DataTree())
+
+
+def test_arviz_takes_a_result():
+    """ArviZ's summary has our means, and its effective sample sizes are those that we stopped by."""
+    result = posterior()
+    handed = to_arviz(result)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 announces its refactoring
+        import arviz
+
+        summary = arviz.summary(handed, round_to="none")
+    names = list(result["posterior"].data_vars)
+    assert list(summary.index) == names
+    means = [float(result["posterior"][name].mean()) for name in names]
+    np.testing.assert_allclose(summary["mean"].astype(float), means, rtol=1e-6)
+    stats = result["sample_stats"].to_dataset()
+    np.testing.assert_allclose(summary["ess_bulk"].astype(float), stats.ess_bulk.sel(parameter=names), rtol=0.01)
+    if hasattr(arviz, "InferenceData"):
+        assert isinstance(handed, arviz.InferenceData)
+        assert {"posterior", "log_likelihood", "posterior_predictive", "observed_data"} <= set(handed.groups())
+    else:
+        assert handed is result

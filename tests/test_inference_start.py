@@ -1,0 +1,97 @@
+"""Where walkers start: optimum and cloud, for problems whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.start import best_optimum, gather
+
+DESIGN = np.random.default_rng(1).normal(size=(50, 2))
+TRUE = np.array([3.0, -0.02])
+SPREAD = np.array([10.0, 0.1])
+MIDDLE = TRUE
+
+
+def linear(data):
+    return lambda points: data - points / SPREAD @ DESIGN.T
+
+
+def test_optimum_of_a_linear_problem():
+    noise = 0.1 * np.random.default_rng(2).normal(size=50)
+    data = DESIGN @ (TRUE / SPREAD) + noise
+    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    # Residuals far below _BRAVE: robust and plain least squares agree to their square over 4 · 2².
+    expected = np.linalg.lstsq(DESIGN, data, rcond=None)[0] * SPREAD
+    np.testing.assert_allclose(found.point, expected, rtol=0.02)
+    information = DESIGN.T @ DESIGN + np.eye(2)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(information) * np.outer(SPREAD, SPREAD), rtol=0.02)
+    np.testing.assert_allclose(found.residuals, linear(data)(found.point[None])[0])
+
+
+def test_an_outlier_pulls_little():
+    data = DESIGN @ (TRUE / SPREAD)
+    data[7] += 1000.0
+    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    # By least squares it would pull by 1000 · |design| / 50, some 20 spreads; so by about 2 · |design| / 50.
+    assert np.all(np.abs(found.point - TRUE) < 0.2 * SPREAD)
+
+
+def test_a_tight_prior_is_heeded():
+    """Data say 3.0 with a deviation of about 10/√50; a prior that is a million times tighter wins."""
+    spread = np.array([1e-6, 0.1])
+    found = best_optimum(lambda p: linear(DESIGN @ (TRUE / SPREAD))(p), MIDDLE[None], np.array([2.0, -0.02]), spread)
+    assert found.point[0] == pytest.approx(2.0, abs=1e-5)
+    assert found.covariance[0, 0] == pytest.approx(1e-12, rel=0.5)
+
+
+def test_the_better_of_two_valleys_is_taken():
+    def residuals(points):
+        return np.where(points > 0.0, points - 1.0, 0.25 * (points + 1.0) ** 2 + 2.0) + np.zeros((1, 3))
+
+    for order in ([[-1.5], [0.7]], [[0.7], [-1.5]]):
+        assert best_optimum(residuals, np.array(order), np.ones(1), np.ones(1)).point == pytest.approx(1.0)
+
+
+def test_no_candidate_is_refused():
+    with pytest.raises(InferenceError, match="no contour was found"):
+        best_optimum(linear(np.zeros(50)), np.empty((0, 2)), MIDDLE, SPREAD)
+
+
+COVARIANCE = np.array([[1.0, 0.6], [0.6, 0.5]]) * 1e-4
+
+
+def gaussian(points):
+    return stats.multivariate_normal([1.0, 2.0], COVARIANCE).logpdf(points)
+
+
+def test_a_good_guess_is_kept_and_its_cloud_is_twice_as_wide():
+    cloud = gather(gaussian, np.array([1.0, 2.0]), COVARIANCE, np.random.default_rng(1))
+    np.testing.assert_array_equal(cloud.centre, [1.0, 2.0])
+    np.testing.assert_allclose(cloud.root @ cloud.root.T, 4.0 * COVARIANCE)
+    # Hardly any point misses the floor: χ² of two degrees above 2 · 24 / 4 is rarer than 0.3 %.
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    assert np.mean(gaussian(points) > cloud.floor) > 0.98
+
+
+@pytest.mark.parametrize("width", [1e-2, 1.0, 100.0])
+def test_a_bad_guess_is_mended(width):
+    guess = np.array([1.0, 2.0]) + 0.3 * np.array([1.0, -1.0])
+    cloud = gather(gaussian, guess, width * np.eye(2), np.random.default_rng(1))
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    good = points[gaussian(points) > cloud.floor]
+    assert len(good) > 300
+    # Nothing hopeless: all within √(2 (12 · 2 + some)) standard deviations, yet at least as wide as the target.
+    assert gaussian(good).min() > gaussian(np.array([1.0, 2.0])) - 24.0 - 5.0
+    assert np.all(good.std(axis=0) > 0.8 * np.sqrt(np.diag(COVARIANCE)))
+
+
+def test_a_wall_is_respected():
+    def walled(points):
+        return np.where(points[:, 0] > 1.0, gaussian(points), -np.inf)
+
+    cloud = gather(walled, np.array([0.5, 2.0]), np.eye(2), np.random.default_rng(1))
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    assert np.mean(walled(points) > cloud.floor) > 0.15

@@ -1,0 +1,110 @@
+"""Bands of contours, against quantiles of heights."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.contour_posteriors import posterior
+from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.uncertainty.band import contour_band, contour_heights
+
+X = np.linspace(-0.8, 0.8, 41)
+
+
+def tree(family, *, units="dimensionless", **values):
+    draws = {name: (("chain", "draw"), np.atleast_2d(v)) for name, v in values.items()}
+    out = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
+    out.attrs = {"family": family, "units": units}
+    return out
+
+
+def made(size=3000):
+    """Draws with a wide spread, in two chains."""
+    rng = np.random.default_rng(1)
+    a, q, x_c = rng.normal([[[0.5]], [[0.4]], [[0.0]]], [[[0.05]], [[0.01]], [[0.03]]], size=(3, 2, size // 2))
+    return tree("parabola", a=a, q=q, x_c=x_c)
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.95])
+def test_a_pointwise_band_is_made_of_quantiles(probability):
+    posterior_ = made()
+    draws = posterior_["posterior"].to_dataset()
+    heights = draws.a.values.ravel()[:, None] * (X - draws.x_c.values.ravel()[:, None]) ** 2
+    heights += draws.q.values.ravel()[:, None]
+    band = contour_band(posterior_, X, probability)
+    expected = np.quantile(heights, [0.5 - 0.5 * probability, 0.5, 0.5 + 0.5 * probability], axis=0)
+    np.testing.assert_allclose([band[name] for name in ("lower", "median", "upper")], expected, rtol=1e-12)
+    np.testing.assert_array_equal(band.share_reaching, 1.0)
+    assert band.attrs == {"probability": probability, "simultaneous": 0}
+
+
+@pytest.mark.parametrize("which", ["made", "inferred"])
+def test_a_simultaneous_band_holds_whole_contours(which):
+    """Its share of whole contours is the stated one, up to one contour; pointwise bands hold fewer."""
+    posterior_ = made() if which == "made" else posterior()
+    heights = contour_heights(posterior_, X)
+
+    def share(band):
+        slack = 1e-12
+        inside = (heights >= band.lower.values - slack) & (heights <= band.upper.values + slack)
+        return inside.all(axis=1).mean()
+
+    pointwise = contour_band(posterior_, X, 0.9)
+    whole = contour_band(posterior_, X, 0.9, simultaneous=True)
+    np.testing.assert_array_equal(whole["median"], pointwise["median"])
+    assert np.all(whole.lower < pointwise.lower)
+    assert np.all(whole.upper > pointwise.upper)
+    assert share(whole) == pytest.approx(0.9, abs=2.0 / len(heights))
+    assert share(pointwise) < 0.9
+
+
+def test_at_a_single_point_both_bands_are_nearly_the_same():
+    pointwise, whole = (contour_band(made(), [0.3], 0.9, simultaneous=s) for s in (False, True))
+    width = float((pointwise.upper - pointwise.lower)[0])
+    np.testing.assert_allclose(whole.upper, pointwise.upper, rtol=0, atol=0.02 * width)
+
+
+def test_a_single_contour_is_its_own_band():
+    for simultaneous in (False, True):
+        band = contour_band(tree("parabola", a=[0.5] * 5, q=[0.3] * 5, x_c=[0.1] * 5), X, simultaneous=simultaneous)
+        for name in ("lower", "median", "upper"):
+            np.testing.assert_allclose(band[name], Parabola(0.5, 0.3, 0.1).height(X), rtol=1e-12)
+
+
+def test_beyond_the_end_of_some_circles_the_band_is_not_known():
+    r = np.array([0.5, 0.5, 0.6, 0.7])
+    at = [0.0, 0.45, 0.55, 0.65, 0.8]
+    for simultaneous in (False, True):
+        band = contour_band(tree("circle", r=r, q=0.0 * r + 0.3, x_c=0.0 * r), at, simultaneous=simultaneous)
+        np.testing.assert_array_equal(band.share_reaching, [1.0, 1.0, 0.5, 0.25, 0.0])
+        for name in ("lower", "median", "upper"):
+            assert np.isfinite(band[name]).values.tolist() == [True, True, False, False, False]
+    band = contour_band(tree("circle", r=r, q=0.0 * r, x_c=0.0 * r), [2.0])
+    assert np.isnan(band["median"].values).all()
+
+
+def test_units():
+    assert contour_band(made(100), X).lower.attrs["units"] == "1"
+    in_si = tree("parabola", units="SI", a=[2.5], q=[0.1], x_c=[0.0])
+    assert contour_band(in_si, X).lower.attrs["units"] == "m"
+
+
+def test_many_draws_are_thinned_evenly():
+    heights = contour_heights(made(), X, most=100)
+    assert heights.shape == (100, X.size)
+    np.testing.assert_array_equal(heights[[0, -1]], contour_heights(made(), X)[[0, -1]])
+
+
+@pytest.mark.parametrize("probability", [0.0, 1.0, -0.1, np.nan])
+def test_impossible_probabilities_are_refused(probability):
+    with pytest.raises(ParameterError, match="give a number between 0 and 1"):
+        contour_band(made(10), X, probability)
+
+
+@pytest.mark.parametrize("x", [[[0.0, 1.0]], [0.0, np.nan]])
+def test_impossible_places_are_refused(x):
+    with pytest.raises(ParameterError, match="x must be a list of finite numbers"):
+        contour_band(made(10), x)
