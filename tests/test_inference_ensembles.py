@@ -84,6 +84,20 @@ def test_moments_of_a_truncated_gaussian():
     assert np.all(np.abs(((values - mean) ** 2).mean(axis=0) - sd**2) < 4.0 * np.sqrt((fourth - sd**4) / ess))
 
 
+def test_a_lost_walker_is_noticed():
+    """One of 128 sits in a mode of weight e⁻⁵⁰ that it cannot leave: R̂ alone would let it pass."""
+
+    def log_probability(x):
+        return np.logaddexp(standard(x), standard(x - 1000.0) - 50.0)
+
+    start = normal_start(1, SamplerSettings())
+    start[0, 0] += 1000.0
+    draws = sample(log_probability, start, names=["a"], seed=1, settings=SamplerSettings(max_steps=400))
+    assert np.all(draws.r_hat < 1.01)
+    assert not draws.converged
+    assert "1 of 128 walkers are lost" in draws.message
+
+
 def test_same_seed_same_draws():
     first, again, other = (draw_from(standard, 2, settings=SMALL, seed=seed) for seed in (5, 5, 6))
     np.testing.assert_array_equal(first.samples, again.samples)

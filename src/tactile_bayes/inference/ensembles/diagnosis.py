@@ -9,13 +9,28 @@ import numpy as np
 from arviz_stats.base.array import array_stats
 from numpy.typing import NDArray
 
-__all__ = ["Diagnosis", "autocorrelation_time", "walker_major"]
+__all__ = ["Diagnosis", "autocorrelation_time", "lost_walkers", "walker_major"]
 
 
 Floats = NDArray[np.float64]
 
 _TAIL = (0.05, 0.95)
 """Quantiles whose effective sample size is the tail's."""
+
+
+_LOST = 10.0
+"""Log-probability that a walker's best draw lies below the median of all when it has not found to the others."""
+
+
+def lost_walkers(values: Floats) -> int:
+    """Number of walkers that are nowhere near as probable as the rest, from log-probabilities (chain, step, walker).
+
+    R̂ and effective sample size do not see one of them among a hundred, and the tails of the result would be theirs.
+    Draws of one posterior differ by that much less than once in thousands, a walker's best of many practically never.
+    """
+    if not values.shape[1]:
+        return 0
+    return int(np.count_nonzero(values.max(axis=1) < np.median(values) - _LOST))
 
 
 class Diagnosis:

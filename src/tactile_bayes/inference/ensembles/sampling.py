@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, walker_major
+from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability, Together
@@ -195,7 +195,8 @@ def sample(
                 diagnosis = Diagnosis(kept)
             except KeyboardInterrupt:
                 ending, diagnosis = _INTERRUPTED, Diagnosis(kept)
-            if ending != _INTERRUPTED and diagnosis.satisfies(settings.max_r_hat, enough):
+            lost = lost_walkers(kept_values)
+            if ending != _INTERRUPTED and not lost and diagnosis.satisfies(settings.max_r_hat, enough):
                 ending = _CONVERGED
             elif not ending and steps == settings.max_steps:
                 ending = _OUT_OF_STEPS
@@ -211,6 +212,10 @@ def sample(
     message = f"{ending} after {steps} steps: {diagnosis.in_words(names)}"
     if ending != _CONVERGED:
         message += f"; wanted are R̂ below {settings.max_r_hat:g} and an effective sample size of {enough:.0f}"
+    if lost:
+        message += (
+            f"; {lost} of {chains * walkers} walkers are lost where nothing is probable: results are not to be used"
+        )
     if stuck:
         message += f"; {stuck} of {chains * walkers} walkers did not move in the steps kept: look where they sit"
     return Draws(
