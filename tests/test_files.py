@@ -34,3 +34,9 @@ def test_the_new_file_appears_only_at_the_end_and_where_a_link_points(tmp_path):
         assert target.read_text() == "old"
     assert link.is_symlink()
     assert target.read_text() == "new"
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError) as refusal, write_atomically(tmp_path / "nowhere" / "a.txt"):
+        pass
+    assert refusal.value.filename == str(tmp_path.resolve() / "nowhere")

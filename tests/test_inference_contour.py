@@ -293,6 +293,9 @@ def test_what_cannot_be_is_refused():
         infer_contour(record, seed=1, priors={"q": stats.uniform(2.0, 1.0)})
     with pytest.raises(ParameterError, match="force_x is measured, but the load cell has no noise on it"):
         infer_contour(record, seed=1, load_cell=LoadCell(moment_noise=0.02))
+    for seed in (-1, "x"):
+        with pytest.raises(ParameterError, match=r"seed is .*: give a whole number from 0 up"):
+            infer_contour(record, seed=seed)
 
 
 def test_a_record_without_load_is_refused():

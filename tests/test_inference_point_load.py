@@ -228,6 +228,8 @@ def test_bad_input_is_refused():
         infer_point_load(axial, lateral, reading, seed=1, priors=RIG | {"noise_sd": 1.0})
     with pytest.raises(ParameterError, match="full_scale"):
         infer_point_load(axial, lateral, reading, seed=1, full_scale=0.0)
+    with pytest.raises(ParameterError, match="seed is -1"):
+        infer_point_load(axial, lateral, reading, seed=-1)
     with pytest.raises(InferenceError, match="no clamp"):
         infer_point_load(axial, lateral, reading, seed=1, priors={"clamp_axial": 100.0, "clamp_angle": 0.0})
 

@@ -399,6 +399,12 @@ def test_refusals(call, error, message):
         call()
 
 
+def test_steps_so_coarse_that_the_margin_is_more_than_a_turn():
+    angle = scan(II, drive_step=0.5).record.drive_angle
+    assert -2.0 * np.pi < float(angle.min()) < -5.5
+    assert 5.5 < float(angle.max()) < 2.0 * np.pi
+
+
 def test_a_pivot_just_below_the_contour():
     """The whole load then comes in a few degrees of the drive; nearer than the clearance the scan is refused."""
     for contour in (Parabola(0.3, 0.03), Parabola(3.0, 0.03), Circle(0.7, 0.03)):

@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("contours", "elastica", "plotting")
+_MODULES = ("contours", "elastica", "errors", "plotting")
 
 _HOMES = {
     "LoadCell": "load_cell",
     "Rod": "rod",
+    "SamplerSettings": "inference.ensembles",
     "contour_band": "uncertainty.band",
     "equilibria": "scanning",
     "gap": "uncertainty.gap",
@@ -39,8 +40,10 @@ __all__ = ["__version__", *_MODULES, *_HOMES]
 if TYPE_CHECKING:
     from tactile_bayes import contours as contours
     from tactile_bayes import elastica as elastica
+    from tactile_bayes import errors as errors
     from tactile_bayes import plotting as plotting
     from tactile_bayes.inference.contour import infer_contour as infer_contour
+    from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
     from tactile_bayes.inference.point_load import infer_point_load as infer_point_load
     from tactile_bayes.inference.result import to_arviz as to_arviz
     from tactile_bayes.load_cell import LoadCell as LoadCell

@@ -85,12 +85,17 @@ def infer(
     flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], likewise.")] = None,
     diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0,
     force_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; inferred if not given.")
+        float | None,
+        typer.Option(
+            help="Standard deviation of the forces [N, or EI/L²]; by default as the record states, else inferred."
+        ),
     ] = None,
     moment_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; inferred if not given.")
+        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; likewise.")
     ] = None,
-    missing: Annotated[list[str] | None, typer.Option(help="Channel without a column: force_x and so on.")] = None,
+    missing: Annotated[
+        list[str] | None, typer.Option(help="Channel without a column, like force_x; give it again for another.")
+    ] = None,
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)] = 0.0,
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,

@@ -1,11 +1,10 @@
-"""The family of errors and warnings: each says what was wrong, where, and what to do."""
+"""The family of errors: each says what was wrong, where, and what to do."""
 
 from __future__ import annotations
 
 __all__ = [
     "ContourError",
     "InferenceError",
-    "InferenceWarning",
     "ParameterError",
     "ReachError",
     "RecordError",
@@ -35,7 +34,3 @@ class RecordError(TactileBayesError, ValueError):
 
 class InferenceError(TactileBayesError, RuntimeError):
     """A posterior cannot be set up or sampled."""
-
-
-class InferenceWarning(UserWarning):
-    """A result that can be used, with something its user has to know."""

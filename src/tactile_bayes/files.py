@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -32,7 +33,7 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     FileNotFoundError
-        If the block wrote no file.
+        If the folder of `path` is not there, or the block wrote no file.
 
     Examples
     --------
@@ -45,6 +46,8 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     '42'
     """
     target = Path(path).resolve()
+    if not target.parent.is_dir():  # else the refusal would name the temporary file
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(target.parent))
     temporary = target.with_name(f".{secrets.token_hex(8)}.tmp{target.suffix}")
     try:
         yield temporary

@@ -30,10 +30,8 @@ Index = NDArray[np.intp]
 
 CHANNELS = ("holding_moment", "force_x", "force_y")
 
-
 _LAST_STEP = 1e-6
 """Newton step on an interpolant, as a share of the segment, whose square is below the interpolation's error."""
-
 
 _BRIEF = 1e-6
 """Stretch of tip contact after its onset, in the contour's parameter, so short that the slope of the drive angle would

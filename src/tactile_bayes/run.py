@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
@@ -26,7 +27,7 @@ from tactile_bayes.uncertainty.gap import gap
 
 __all__ = ["Run", "analyse", "summary"]
 
-DIRECTIONS: tuple[Literal["forward"], Literal["backward"]] = ("forward", "backward")
+_DIRECTIONS: tuple[Literal["forward"], Literal["backward"]] = ("forward", "backward")
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def analyse(
     probability: float = 0.95,
     seed: int = 1,
     settings: SamplerSettings | None = None,
-    truth: Any = None,
+    truth: Contour | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> Run:
     """Contact points, contour posterior, band and figures of a record, written to a folder.
@@ -150,7 +151,7 @@ def summary(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
 
 
 def _reach(result: xr.DataTree) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Where the rod touched, and a little on."""
+    """Values of x from one end of what the rod touched to the other."""
     events = result["events"].to_dataset()
     x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
     lo, hi = np.quantile(x, [0.05, 0.95])
@@ -169,7 +170,7 @@ def _draw(
     band: xr.Dataset,
     folder: Path,
     *,
-    truth: Any,
+    truth: Contour | None,
     friction: float,
 ) -> dict[str, Path]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -193,7 +194,7 @@ def _draw(
     best = result["sample_stats"]["lp"].argmax(("chain", "draw"))  # medians by parameter may be out of the rod's reach
     likeliest = contours_of(draws.isel(best), result.attrs["family"]).take(np.array(0))
     strokes = list(result["events"].stroke.values)
-    directions: list[Literal["forward", "backward"]] = [d for d in DIRECTIONS if d in strokes]
+    directions: list[Literal["forward", "backward"]] = [d for d in _DIRECTIONS if d in strokes]
     base = float(measured.base_x[0]), float(measured.base_y[0])
     fitted = scan(
         likeliest,

@@ -177,7 +177,8 @@ def scan(
     base : (float, float)
         The pivot, in the contour's unit of length. The contour must lie above it.
     drive_step : float
-        Step of the drive [rad]; the grid consists of its multiples, and reaches 15 steps beyond contact on both sides.
+        Step of the drive [rad]; the grid consists of its multiples, and reaches 15 steps beyond contact on both sides,
+        as far as a turn goes.
     drive_angles : array_like, shape (n,), optional
         A grid of one's own [rad], used in increasing order forward and in decreasing order backward.
     rod : Rod, optional
@@ -223,6 +224,7 @@ def scan(
             first, snap = np.sort([events[sense].first_contact.drive_angle, events[sense].snap_off.drive_angle])
             steps = np.arange(np.floor(first / drive_step) - _MARGIN, np.ceil(snap / drive_step) + _MARGIN + 1)
             angles = steps * drive_step
+            angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a record knows none beyond
         else:
             angles = grid
         sweeps.append(_sweep(paths, angles[:: 1 if sense == "forward" else -1], number, sense, base, rod))

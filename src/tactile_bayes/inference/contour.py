@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, sample, scatter_walkers
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
 from tactile_bayes.inference.families import Family, Prior, family_named
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
 from tactile_bayes.inference.result import provenance, sample_stats
@@ -58,7 +58,7 @@ def infer_contour(
     family: str = "parabola",
     load_cell: LoadCell | None = None,
     priors: Mapping[str, Prior] | None = None,
-    seed: int,
+    seed: Seed,
     rod: Rod | None = None,
     friction: float = 0.0,
     settings: SamplerSettings | None = None,
@@ -81,8 +81,8 @@ def infer_contour(
         The sensor, in the record's units; by default the data sheet that the record carries. Its noise is taken as
         known up to the factor `noise_scale`, which is inferred. Without any, `moment_noise` and `force_noise` are.
     priors : mapping of str to frozen scipy.stats distribution, optional
-        In place of some of `default_priors`, in the record's units.
-    seed : int
+        In place of some of the default ones (see Notes), in the record's units.
+    seed : int or numpy.random.SeedSequence
         The same seed, the same draws.
     rod : Rod, optional
         In place of the rod that an SI record states.
@@ -106,13 +106,22 @@ def infer_contour(
     RecordError
         If `measured` is no record.
     ParameterError
-        If the family is unknown, a prior does not belong to a parameter, or the load cell has no noise on a channel.
+        If the family is unknown, a prior does not belong to a parameter, the seed is no whole number from 0 up, or the
+        load cell has no noise on a channel.
     InferenceError
         If no sample carries any load, or no contour of the family is found that the rod can reach.
 
+    Notes
+    -----
+    The default priors follow from pivot and rod length L alone, never from what was measured. Vertex: within a rod
+    length of the pivot sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r: log-normal
+    around L/2, both with standard deviation 1 of the logarithm. noise_scale: log-normal around 1, standard deviation
+    0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Contours out of reach are
+    excluded on top.
+
     Examples
     --------
-    >>> from tactile_bayes import LoadCell, scan
+    >>> from tactile_bayes import LoadCell, SamplerSettings, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
     >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
@@ -142,7 +151,7 @@ def infer_contour(
         )
     chosen_priors.update(priors or {})
     model = _Model(measured, chosen, noise, chosen_priors, friction)
-    seeds = np.random.SeedSequence(seed).spawn(4)
+    seeds = spawn(seed, 4)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         start = model.start(seeds[0], settings)
         draws = sample(
@@ -170,12 +179,7 @@ def infer_contour(
 def default_priors(
     measured: xr.Dataset, family: str = "parabola", load_cell: LoadCell | None = None
 ) -> dict[str, Prior]:
-    """The priors that `infer_contour` takes where it is given none, in the record's units.
-
-    They follow from pivot and rod length alone, never from what was measured. Vertex: within a rod length of the pivot
-    sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r: log-normal around L/2, both with
-    standard deviation 1 of the logarithm. noise_scale: log-normal around 1, standard deviation 0.5 of the logarithm.
-    Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Contours out of reach are excluded on top.
+    """The priors that `infer_contour` takes where it is given none, in the record's units; its notes say which.
 
     Examples
     --------

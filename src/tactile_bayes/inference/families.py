@@ -37,9 +37,9 @@ class Family:
     name : str
         What users call it.
     build : callable
-        From parameters by name, numbers or arrays, to contours.
+        From parameters in the order of `parameters`, numbers or arrays, to contours.
     length_powers : mapping
-        For every parameter the power of length in its unit.
+        For every parameter, by name, the power of length in its unit.
     positive : tuple of str
         The parameters that have to be positive, whatever a prior says.
     default_priors : callable

@@ -27,7 +27,7 @@ from scipy.optimize import least_squares
 
 from tactile_bayes.clamped_rod import base_curvature
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
 from tactile_bayes.inference.result import provenance, sample_stats
 
 __all__ = ["Prior", "default_priors", "infer_point_load"]
@@ -381,7 +381,7 @@ def infer_point_load(
     Raises
     ------
     ParameterError
-        If the data do not fit together or a prior is for an unknown name.
+        If the data do not fit together, a prior is for an unknown name, or the seed is no whole number from 0 up.
     InferenceError
         If no geometry that the priors allow lets the rod reach all the points.
 
@@ -405,9 +405,7 @@ def infer_point_load(
     unit = 3.0 / _reach(axial, lateral)
     model = _Model(axial, lateral, reading, unit, _VAGUE * full_scale, unknown, known, small_deflection)
 
-    root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    fresh = np.random.SeedSequence(root.entropy, spawn_key=root.spawn_key, pool_size=root.pool_size)
-    for_guess, for_walkers, for_predictions = fresh.spawn(3)
+    for_guess, for_walkers, for_predictions = spawn(seed, 3)
     centre, covariance = _normal_approximation(model, for_guess)
     top = float(model.log_probability(centre[None])[0])
     if not math.isfinite(top):

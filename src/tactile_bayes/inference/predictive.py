@@ -28,7 +28,7 @@ def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats
     Parameters
     ----------
     tree : xarray.DataTree
-        From `infer_point_load`, with the noise inferred.
+        From `infer_point_load`.
     discrepancy : callable
         Takes residuals (…, n) in the order of the data, returns (…); large is bad. By default the sum of squares.
 

@@ -79,6 +79,16 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
     result : xr.DataTree
     path : path-like
         Where to, with suffix .nc.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> draws = xr.Dataset({"q": (("chain", "draw"), np.full((4, 100), 0.5))})
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     path = Path(directory) / "posterior.nc"
+    ...     write_result(xr.DataTree.from_dict({"posterior": draws}), path)
+    ...     read_result(path)["posterior"].sizes["draw"]
+    100
     """
     with write_atomically(path) as temporary:
         result.to_netcdf(temporary, engine="h5netcdf")
@@ -116,6 +126,12 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     -------
     arviz.InferenceData or xr.DataTree
         ArviZ 0.23 wants the former, from 1.0 on the latter.
+
+    Examples
+    --------
+    >>> draws = xr.Dataset({"q": (("chain", "draw"), np.full((4, 100), 0.5))})
+    >>> float(to_arviz(xr.DataTree.from_dict({"posterior": draws})).posterior["q"].mean())
+    0.5
     """
     import warnings
 

@@ -20,7 +20,6 @@ Residuals = Callable[[Floats], Floats]
 _BRAVE = 2.0
 """Residual in standard deviations from which on a sample pulls less than by its square."""
 
-
 _WIDER = 2.0
 """How many times wider than the posterior walkers start."""
 
@@ -28,7 +27,6 @@ _DEFICIT = 12.0
 """Log-probability per parameter that a walker may start below the best: three times what _WIDER makes on average."""
 
 _ROUNDS = 30
-
 
 _FITS = 0.7
 """Cost per residual that says that the noise explains the record: 0.4 if the noise is guessed right."""

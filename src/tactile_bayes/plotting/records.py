@@ -102,6 +102,17 @@ def predictive(
     ------
     ParameterError
         If there are not three axes, or `predicted` has not the samples of the record.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> ideal = scan(paper_profile("II", q=0.5)).record
+    >>> measured = LoadCell(moment_noise=0.02, force_noise=0.05).measure(ideal, seed=1)
+    >>> ends = {"lower": -0.04, "upper": 0.04}
+    >>> predicted = xr.Dataset({f"holding_moment_{end}": ideal["holding_moment"] + off for end, off in ends.items()})
+    >>> predictive(measured, predicted).shape
+    (3,)
     """
     if predicted.sizes.get("sample") != record.sizes["sample"]:
         raise ParameterError(

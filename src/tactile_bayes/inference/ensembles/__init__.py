@@ -17,6 +17,6 @@ not used.
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers
+from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, spawn
 
-__all__ = ["Draws", "Progress", "SamplerSettings", "Seed", "sample", "scatter_walkers"]
+__all__ = ["Draws", "Progress", "SamplerSettings", "Seed", "sample", "scatter_walkers", "spawn"]

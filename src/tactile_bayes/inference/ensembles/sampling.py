@@ -116,7 +116,8 @@ def sample(
     The ensembles run in step. After `block_steps` steps, and whenever their number has grown by a quarter, the second
     half of the steps so far is judged: rank-normalised R̂ across ensembles, each cut in early and late steps, and
     effective sample size in bulk and tails (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every
-    parameter satisfies the settings, and every walker has on average given five effective draws.
+    parameter satisfies the settings, every walker has on average given five effective draws, and none is lost where
+    nothing is probable.
 
     Parameters
     ----------
