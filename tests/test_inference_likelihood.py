@@ -13,7 +13,8 @@ from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, rod_of
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, make_record, rod_of
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
 
@@ -141,6 +142,29 @@ def test_order_of_sweeps_and_their_number_do_not_matter():
     again["sweep"] = again.sweep + 4
     twice = xr.concat([measured, again], "sample", combine_attrs="override")
     np.testing.assert_allclose(RecordLikelihood(twice, CELL).log_likelihood(contours), 2.0 * expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+def test_a_drive_that_turns_back_in_contact_meets_the_same_side(direction):
+    """The way back takes the same states in reverse: contact points and likelihood know it by the moment's sign."""
+    contour = Parabola(0.5, 0.5)
+    out = scan(contour, direction=direction).record
+    out = out.isel(sample=slice(0, 100)).drop_vars([n for n in out.data_vars if n.startswith("truth_holding")])
+    back = out.isel(sample=slice(None, None, -1))
+    other = {"forward": "backward", "backward": "forward"}[direction]
+    columns = {
+        name: np.concatenate([out[name].values, back[name].values])
+        for name in (*CHANNELS, "drive_angle", "truth_contact_x")
+    }
+    columns |= {"sweep": np.repeat([0, 1], 100), "direction": np.repeat([direction, other], 100)}
+    both = make_record(columns)
+    contacts = reconstruct(both)
+    np.testing.assert_allclose(contacts.contact_x, both.truth_contact_x, atol=1e-10)
+    likelihood = RecordLikelihood(both, CELL)
+    predicted, _ = likelihood.predict(stack([contour]))
+    np.testing.assert_allclose(predicted[0], likelihood.measured, atol=1e-3)
+    noisy = RecordLikelihood(CELL.measure(both, seed=1), CELL)
+    np.testing.assert_array_equal(noisy.predict(stack([contour]))[0], predicted)
 
 
 def test_a_channel_without_noise_is_refused():

@@ -368,3 +368,12 @@ def test_unknown_names_are_refused(posterior):
             function(posterior, names=["a"], axes=panels(2, 2))
     with pytest.raises(ParameterError, match="truth names b"):
         plotting.pairs(posterior, truth={"b": 0.5})
+
+
+def test_a_gap_is_taken_as_it_comes():
+    bounds = xr.Dataset(
+        {"left": ("bound", [-0.12, -0.1, -0.08]), "right": ("bound", [0.08, 0.1, 0.12])},
+        coords={"bound": ["lower", "median", "upper"]},
+    )
+    patch = plotting.contour((-1.0, 1.0), gap=bounds).patches[0]
+    assert (patch.get_x(), patch.get_width()) == (-0.1, pytest.approx(0.2))

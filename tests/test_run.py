@@ -20,7 +20,7 @@ from tactile_bayes.record import to_dimensionless
 from tactile_bayes.run import analyse, summary
 from tactile_bayes.scanning import scan
 
-FIGURES = ("observables", "rods", "contour", "trace", "pairs")
+FIGURES = ("observables", "predictive", "rods", "contour", "trace", "pairs")
 
 
 def assert_every_file_is_there(run, folder):

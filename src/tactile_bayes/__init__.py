@@ -28,11 +28,15 @@ _HOMES = {
     "gap": "uncertainty.gap",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
+    "make_record": "record",
+    "predictive_interval": "uncertainty.predictive",
     "read_record": "record",
+    "read_result": "inference.result",
     "reconstruct": "reconstruction",
     "scan": "scanning",
     "to_arviz": "inference.result",
     "write_record": "record",
+    "write_result": "inference.result",
 }
 
 __all__ = ["__version__", *_MODULES, *_HOMES]
@@ -45,9 +49,12 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.contour import infer_contour as infer_contour
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
     from tactile_bayes.inference.point_load import infer_point_load as infer_point_load
+    from tactile_bayes.inference.result import read_result as read_result
     from tactile_bayes.inference.result import to_arviz as to_arviz
+    from tactile_bayes.inference.result import write_result as write_result
     from tactile_bayes.load_cell import LoadCell as LoadCell
     from tactile_bayes.reconstruction import reconstruct as reconstruct
+    from tactile_bayes.record import make_record as make_record
     from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record
     from tactile_bayes.rod import Rod as Rod
@@ -55,6 +62,7 @@ if TYPE_CHECKING:
     from tactile_bayes.scanning import scan as scan
     from tactile_bayes.uncertainty.band import contour_band as contour_band
     from tactile_bayes.uncertainty.gap import gap as gap
+    from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval
 
 
 def __getattr__(name: str) -> Any:

@@ -15,7 +15,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, rod_of, to_dimensionless, validate
 from tactile_bayes.rod import Rod
 
-__all__ = ["FALSE_ALARM", "STATUSES", "loaded_samples", "reconstruct", "with_rod"]
+__all__ = ["FALSE_ALARM", "STATUSES", "contact_sides", "loaded_samples", "reconstruct", "with_rod"]
 
 Floats = NDArray[np.float64]
 
@@ -102,7 +102,7 @@ def reconstruct(
     record = to_dimensionless(measured)
     rod = rod_of(measured)
     loaded = loaded_samples(measured, load_cell)
-    side = _sides(record, loaded)
+    side = contact_sides(record)
     moment, force_x, force_y = (np.where(loaded, record[name].values, 0.0) for name in CHANNELS)
     contact = contact_from_wrench(record.drive_angle.values, moment, force_x, force_y, np.arctan(friction), side=side)
     status, phase = _status(contact, loaded)
@@ -163,15 +163,20 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
     )
 
 
-def _sides(record: xr.Dataset, loaded: NDArray[np.bool_]) -> Floats:
-    """+1 where the object is met as in a forward sweep, −1 as in a backward one: the sign of a sweep's total moment."""
-    side = np.ones(loaded.size)
-    moment = np.where(loaded, record.holding_moment.values, 0.0)
+def contact_sides(record: xr.Dataset) -> Floats:
+    """+1 where the object is met as in a forward sweep, −1 as in a backward one, shape (samples,).
+
+    It is the sign of a sweep's total holding moment, so that a drive may also turn back in contact; the direction of
+    the drive decides where the moment is missing, or sums to no more than six standard errors of its noise.
+    """
+    side = np.where(record.direction.values == "backward", -1.0, 1.0)
     for sweep in np.unique(record.sweep.values):
         chosen = record.sweep.values == sweep
-        total = moment[chosen].sum()
-        backward = total < 0.0 if total else record.direction.values[chosen][0] == "backward"
-        side[chosen] = -1.0 if backward else 1.0
+        moment = record.holding_moment.values[chosen]
+        bends = np.diff(moment, n=2)
+        noise = 1.4826 * float(np.median(np.abs(bends))) / np.sqrt(6.0) if bends.size else 0.0
+        if abs(moment.sum()) > 6.0 * noise * np.sqrt(moment.size):
+            side[chosen] = np.sign(moment.sum())
     return side
 
 

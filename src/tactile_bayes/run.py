@@ -24,6 +24,7 @@ from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.gap import gap
+from tactile_bayes.uncertainty.predictive import predictive_interval
 
 __all__ = ["Run", "analyse", "summary"]
 
@@ -207,14 +208,16 @@ def _draw(
     figure, axes = panels(3, 1, 7.0, 5.4, sharex=True)
     plotting.observables(measured, events=fitted.events, axes=axes[:, 0])
     save("observables", figure)
+    figure, axes = panels(3, 1, 7.0, 5.4, sharex=True)
+    probability = band.attrs["probability"]
+    interval = predictive_interval(result, probability)
+    plotting.predictive(measured, interval, axes=axes[:, 0], label=f"{100 * probability:.6g} % predictive")
+    save("predictive", figure)
     figure, axes = panels(len(directions), 1, 7.0, 4.0 * len(directions))
     for direction, ax in zip(directions, axes[:, 0], strict=True):
         plotting.rods(fitted, direction=direction, ax=ax)
     save("rods", figure)
-    bounds = gap(result) if len(directions) == 2 else None
-    edges = None
-    if bounds is not None:
-        edges = float(bounds["left"].sel(bound="median")), float(bounds["right"].sel(bound="median"))
+    edges = gap(result) if len(directions) == 2 else None
     figure, axes = panels(2, 1, 7.0, 5.6, height_ratios=(2.2, 1.0))
     plotting.contour(band.x.values, truth=truth, contacts=contacts, band=band, gap=edges, base=base, ax=axes[0, 0])
     plotting.band_detail(band, truth=truth, gap=edges, ax=axes[1, 0])

@@ -303,8 +303,8 @@ def _columns(seen: SeenContour, states: States, rod: Rod) -> dict[str, NDArray[A
 
     return {
         "drive_angle": turned(wrench.drive_angle),
-        "holding_moment": sign * wrench.holding_moment * rod.moment_unit,
-        "force_x": sign * wrench.force_x * rod.force_unit,
+        "holding_moment": sign * wrench.holding_moment * rod.moment_unit + 0.0,  # never −0
+        "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
         "force_y": wrench.force_y * rod.force_unit,
         "contact_arclength": wrench.contact_arclength * rod.length_unit,
         "contact_phase": np.array([PHASE_NAMES[int(phase)] for phase in wrench.phase]),

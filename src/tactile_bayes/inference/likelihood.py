@@ -14,6 +14,7 @@ from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Paths, Reach, trace
+from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, rod_of, to_dimensionless
 
 __all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood"]
@@ -26,7 +27,7 @@ FAST_ORDER, FINE_ORDER = 16, 32
 
 @dataclass(frozen=True)
 class _Stroke:
-    """Samples with one pivot and one direction."""
+    """Samples with one pivot, that meet the object from one side."""
 
     base: tuple[float, float]
     backward: bool
@@ -61,7 +62,7 @@ class RecordLikelihood:
         self.load_cell = load_cell.dimensionless(self.rod)
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         angle = record.drive_angle.values
-        backward = record.direction.values == "backward"
+        backward = contact_sides(record) < 0.0
         place = np.stack([measured.base_x.values, measured.base_y.values, backward], axis=-1)
         kinds, which = np.unique(place, axis=0, return_inverse=True)
         self.strokes = [

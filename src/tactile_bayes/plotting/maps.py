@@ -137,7 +137,7 @@ def contour(
     truth: Contour | None = None,
     contacts: xr.Dataset | None = None,
     band: xr.Dataset | None = None,
-    gap: tuple[float, float] | None = None,
+    gap: tuple[float, float] | xr.Dataset | None = None,
     base: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
@@ -154,8 +154,9 @@ def contour(
         which only "ok" is drawn.
     band : xr.Dataset, optional
         Over coordinate "x": lower, upper and median, with the probability of the band as attribute.
-    gap : (float, float), optional
-        x of the contacts between which nothing was touched; if the first is the greater one, they overlap.
+    gap : (float, float) or xr.Dataset, optional
+        x of the contacts between which nothing was touched; if the first is the greater one, they overlap. Or what
+        `tactile_bayes.gap` returns, of which the medians are drawn.
     base : (float, float), optional
         The pivot.
     ax : Axes, optional
@@ -183,7 +184,7 @@ def contour(
     ax = single_axes() if ax is None else ax
 
     if gap is not None:
-        _draw_gap(ax, (float(gap[0]), float(gap[1])))
+        _draw_gap(ax, gap)
     attrs: Mapping[Any, Any] = {}
     if band is not None:
         attrs = band["lower"].attrs or band["x"].attrs
@@ -214,7 +215,7 @@ def band_detail(
     band: xr.Dataset,
     *,
     truth: Contour | None = None,
-    gap: tuple[float, float] | None = None,
+    gap: tuple[float, float] | xr.Dataset | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """A band measured from its median, enlarged as far as it fills the Axes; a good one is invisible on a map.
@@ -225,8 +226,8 @@ def band_detail(
         Over coordinate "x": lower, upper and median.
     truth : Contour, optional
         The true contour.
-    gap : (float, float), optional
-        x of the contacts between which nothing was touched.
+    gap : (float, float) or xr.Dataset, optional
+        As in `contour`.
     ax : Axes, optional
         Where to draw.
 
@@ -245,7 +246,7 @@ def band_detail(
     x, median = band["x"].values, band["median"].values
     lower, upper = band["lower"].values - median, band["upper"].values - median
     if gap is not None:
-        _draw_gap(ax, (float(gap[0]), float(gap[1])))
+        _draw_gap(ax, gap)
     ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5)
     ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0)
     if truth is not None:
@@ -307,9 +308,10 @@ def _draw_pivot(ax: Axes, base: tuple[float, float]) -> None:
     )
 
 
-def _draw_gap(ax: Axes, gap: tuple[float, float]) -> None:
-    left, right = sorted(gap)
-    overlap = gap[0] > gap[1]
+def _draw_gap(ax: Axes, gap: tuple[float, float] | xr.Dataset) -> None:
+    begin, end = (gap[side].sel(bound="median") for side in ("left", "right")) if isinstance(gap, xr.Dataset) else gap
+    left, right = sorted((float(begin), float(end)))
+    overlap = float(begin) > float(end)
     ax.axvspan(
         left,
         right,

@@ -1,0 +1,50 @@
+"""What the posterior expects a record to look like."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["predictive_interval"]
+
+
+def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
+    """Central interval of every sample of the record, noise included, as `plotting.predictive` draws it.
+
+    Far more samples outside than 1 − probability, or a run of them, say that the model does not describe the record.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    probability : float
+        In (0, 1).
+
+    Returns
+    -------
+    xr.Dataset
+        Over "sample", for every channel that was measured: its name with _lower and with _upper.
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not in (0, 1).
+
+    Examples
+    --------
+    >>> draws = xr.Dataset({"force_x": (("chain", "draw", "sample"), np.arange(101.0).reshape(1, 101, 1))})
+    >>> interval = predictive_interval(xr.DataTree.from_dict({"posterior_predictive": draws}), probability=0.9)
+    >>> interval.force_x_lower.item(), interval.force_x_upper.item()
+    (5.0, 95.0)
+    """
+    if not 0.0 < probability < 1.0:
+        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    levels = {"lower": 0.5 * (1.0 - probability), "upper": 0.5 * (1.0 + probability)}
+    out = {}
+    for name, values in posterior["posterior_predictive"].to_dataset().items():
+        for bound, level in levels.items():
+            edge = np.quantile(values.values, level, axis=(0, 1))
+            out[f"{name}_{bound}"] = ("sample", edge, values.attrs)
+    return xr.Dataset(out, attrs={"probability": probability})
