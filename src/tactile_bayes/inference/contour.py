@@ -339,13 +339,20 @@ class _Model:
             return self.log_probability(with_logarithms(points))
 
         cloud = gather(log_probability, np.append(optimum.point, np.log(noise)), covariance, rng)
-        return scatter_walkers(
-            lambda points: np.where(self.log_probability(points) > cloud.floor, 0.0, -np.inf),
-            lambda rng, count: with_logarithms(cloud.draw(rng, count)),
-            parameters=len(self.names),
-            seed=seed,
-            settings=settings,
-        )
+        try:
+            return scatter_walkers(
+                lambda points: np.where(self.log_probability(points) > cloud.floor, 0.0, -np.inf),
+                lambda rng, count: with_logarithms(cloud.draw(rng, count)),
+                parameters=len(self.names),
+                seed=seed,
+                settings=settings,
+            )
+        except InferenceError as error:
+            best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, optimum.point, strict=False))
+            raise InferenceError(
+                f"no {self.family.name} was found that describes the record (the nearest has {best}): are units, rod, "
+                "base and family right?"
+            ) from error
 
     def _rough_noise(self) -> Floats:
         """Standard deviation of each channel from the median bend between neighbouring samples, shape (3,)."""
