@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from tactile_bayes.elastica import Contact, contact_from_wrench
 from tactile_bayes.errors import ParameterError, RecordError
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell import LoadCell, rough_noise
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, rod_of, to_dimensionless, validate
 from tactile_bayes.rod import Rod
 
@@ -173,9 +173,7 @@ def contact_sides(record: xr.Dataset) -> Floats:
     for sweep in np.unique(record.sweep.values):
         chosen = record.sweep.values == sweep
         moment = record.holding_moment.values[chosen]
-        bends = np.diff(moment, n=2)
-        noise = 1.4826 * float(np.median(np.abs(bends))) / np.sqrt(6.0) if bends.size else 0.0
-        if abs(moment.sum()) > 6.0 * noise * np.sqrt(moment.size):
+        if abs(moment.sum()) > 6.0 * rough_noise(moment) * np.sqrt(moment.size):
             side[chosen] = np.sign(moment.sum())
     return side
 

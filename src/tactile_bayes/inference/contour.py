@@ -19,7 +19,7 @@ from tactile_bayes.inference.families import Family, Prior, family_named
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.inference.start import best_optimum, gather
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell import LoadCell, rough_noise
 from tactile_bayes.path import Reach
 from tactile_bayes.reconstruction import loaded_samples, reconstruct, with_rod
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, record_hash, rod_of, validate
@@ -360,9 +360,7 @@ class _Model:
         known = self.likelihood.load_cell.standard_deviations
         deviation = np.ones(len(CHANNELS))
         for i in np.flatnonzero(self.present):
-            level = known[CHANNELS[i]]
-            if len(measured) > 2:
-                level = 1.4826 * float(np.median(np.abs(np.diff(measured[:, i], n=2)))) / np.sqrt(6.0)
+            level = rough_noise(measured[:, i]) if len(measured) > 2 else known[CHANNELS[i]]
             deviation[i] = max(level, 1e-4 * float(np.max(np.abs(measured[:, i]))), 1e-12)
         return deviation
 
@@ -403,8 +401,9 @@ class _Model:
         predicted, likelihood, events = [], [], []
         for part in np.array_split(points, max(1, len(points) // 200)):
             contours, scale = self.contours(part), self.noise_scale(part)
-            predicted.append(self.likelihood.predict(contours)[0])
-            likelihood.append(self.likelihood.log_likelihood(contours, scale, pointwise=True))
+            loads, reached = self.likelihood.predict(contours)
+            predicted.append(loads)
+            likelihood.append(self.likelihood.score(loads, reached, scale, pointwise=True))
             events.append(self._events(contours))
         shape = (chains, kept.size)
         coords = {"chain": np.arange(chains), "draw": kept}

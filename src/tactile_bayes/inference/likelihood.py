@@ -114,9 +114,15 @@ class RecordLikelihood:
         pointwise : bool
             Whether samples are kept apart.
         """
-        predicted, reached = self.predict(contours)
-        values = self.load_cell.log_likelihood(self.measured, predicted, noise_scale=noise_scale, pointwise=pointwise)
+        values = self.score(*self.predict(contours), noise_scale, pointwise=pointwise)
         if np.any(np.isnan(values)):
             raise ParameterError(f"the likelihood is not a number for {contours}: please report this contour")
+        return values
+
+    def score(
+        self, predicted: Floats, reached: NDArray[np.bool_], noise_scale: Any = 1.0, *, pointwise: bool = False
+    ) -> Floats:
+        """`log_likelihood` of contours whose loads `predict` has given already."""
+        values = self.load_cell.log_likelihood(self.measured, predicted, noise_scale=noise_scale, pointwise=pointwise)
         values[~reached] = -np.inf
         return values
