@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, paper_profile
+from tactile_bayes.contours import (
+    Circle,
+    Ellipse,
+    Joined,
+    Parabola,
+    PowerLaw,
+    ShapeFree,
+    from_function,
+    paper_profile,
+)
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.errors import ContourError
 
@@ -19,6 +28,14 @@ CONTOURS = {
     "quadratic-power": PowerLaw(0.4, 2, 0.3, 0.2),
     "quartic": PowerLaw(1.3, 4, 0.3, 0.1),
     "odd-power": PowerLaw(0.8, 2.5, 0.4),
+    "sharp-power": PowerLaw(0.8, 1.5, 0.4, -0.1),
+    "flat-ellipse": Ellipse(1.4, 0.3, 0.3, 0.2),
+    "tall-ellipse": Ellipse(0.3, 1.1, 0.3, -0.2),
+    "catenary": from_function(lambda x: np.cosh(x - 0.1) - 0.7, (-2.5, 2.5)),
+    "tangent": from_function(
+        lambda x: 0.3 - np.log(np.cos(x)), (-1.4, 1.4), slope=np.tan, curvature=lambda x: 1 / np.cos(x) ** 2
+    ),
+    "shape-free": ShapeFree(np.linspace(-1.4, 1.4, 8), [0.3, -0.4, 0.1, 0.6, -0.2, -0.5, 0.2, 0.0], 0.1, 0.3),
     "joined": Joined(Parabola(0.5, 0.3, 0.2), Circle(0.6, 0.3, 0.2)),
     **{name: paper_profile(name, 0.3) for name in ("I", "II", "III", "IV")},
 }
@@ -56,7 +73,7 @@ def test_strictly_convex_and_the_height_is_that_of_the_point(contour):
     assert np.all(np.tan(ALPHAS[:-1]) < chord)
     assert np.all(chord < np.tan(ALPHAS[1:]))
     # The height of x, which is rounded, and its slope's worth.
-    tolerance = 32 * EPS * (1 + np.abs(y) + np.abs(np.tan(ALPHAS)) * (1 + np.abs(x)))
+    tolerance = 256 * EPS * (1 + np.abs(y) + np.abs(np.tan(ALPHAS)) * (1 + np.abs(x)))
     assert np.all(np.abs(contour.height(x) - y) <= tolerance)
 
 
@@ -78,7 +95,15 @@ def test_the_own_parameter_is_continuous_and_its_rates_are_derivatives(contour):
 
 
 @pytest.mark.parametrize(
-    ("make", "rest"), [(Parabola, (0.7,)), (Circle, (0.7,)), (PowerLaw, (1.2, 4)), (PowerLaw, (1.2, 2.5))]
+    ("make", "rest"),
+    [
+        (Parabola, (0.7,)),
+        (Circle, (0.7,)),
+        (Ellipse, (0.7, 0.4)),
+        (PowerLaw, (1.2, 4)),
+        (PowerLaw, (1.2, 2.5)),
+        (PowerLaw, (1.2, 1.3)),
+    ],
 )
 def test_mirror_symmetry_about_the_vertex(make, rest):
     contour = make(*rest, 0.3, 0.0)
@@ -106,7 +131,7 @@ def test_the_radius_jumps_at_the_vertex_of_profile_four():
     iv = paper_profile("IV", 0.3)
     assert float(iv.radius_of_curvature(-1e-12)) == pytest.approx(1.0, abs=1e-11)
     assert np.isinf(iv.radius_of_curvature(0.0))
-    assert [float(k) for k in iv.knots] == [0.0]
+    assert {float(k) for k in iv.knots} == {0.0}
     np.testing.assert_allclose(iv.point([-1e-300, 0.0, 1e-300]), [[0, 0, 0], [0.3] * 3], atol=1e-90)
 
 
@@ -123,10 +148,16 @@ def test_nothing_beyond_a_contours_end():
     assert (float(lo), float(hi)) == (-np.pi / 2, np.pi / 2)
 
 
+KNOTS = np.linspace(-1.3, 1.3, 5)
+
 ARRAYS = {
     "parabola": (lambda a, q: Parabola(a, q, 0.1), Parabola),
     "circle": (lambda a, q: Circle(a, q, 0.1), Circle),
+    "ellipse": (lambda a, q: Ellipse(a, 0.7, q, 0.1), Ellipse),
     "power": (lambda a, q: PowerLaw(a, 3.0, q, 0.1), PowerLaw),
+    "sharp power": (lambda a, q: PowerLaw(a, 1.0 + a, q, 0.1), PowerLaw),
+    "shape-free": (lambda a, q: ShapeFree(KNOTS, np.multiply.outer(a, KNOTS), 0.1, q), ShapeFree),
+    "edge": (lambda a, q: Joined(Parabola(0.2 * a, q, 1.0), Parabola(0.2 * a, q, -1.0), x=0.0), Joined),
     "joined": (lambda a, q: Joined(Parabola(a, q, 0.1), PowerLaw(2 * a, 4.0, q, 0.1)), Joined),
 }
 
@@ -158,6 +189,18 @@ def test_arrays_of_parameters(make, family):
     assert np.shape(table) == (2, 6, 3)
 
 
+def BATH(x):
+    return np.maximum(np.abs(x) - 0.5, 0.0) ** 4
+
+
+def BATH_SLOPE(x):
+    return 4 * np.sign(x) * np.maximum(np.abs(x) - 0.5, 0.0) ** 3
+
+
+def BATH_CURVATURE(x):
+    return 12 * np.maximum(np.abs(x) - 0.5, 0.0) ** 2
+
+
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -172,14 +215,38 @@ def test_arrays_of_parameters(make, family):
         (lambda: Circle(np.inf, 0.3), r"found r = inf"),
         (lambda: Circle(1.0, np.inf), r"Circle: q and x_c must be finite"),
         (lambda: PowerLaw(-1.0, 4, 0.3), r"PowerLaw: a must be positive"),
-        (lambda: PowerLaw(1.0, 1.9, 0.3), r"PowerLaw: n must be at least 2.*found n = 1\.9"),
+        (lambda: PowerLaw(1.0, 1.0, 0.3), r"PowerLaw: n must be at least 1\.1.*as good as an edge.*found n = 1\.0"),
+        (lambda: Ellipse(0.0, 1.0, 0.3), r"Ellipse: the half-axis a must be positive and finite; found a = 0\.0"),
+        (lambda: Ellipse(1.0, [1.0, -2.0], 0.3), r"the half-axis b must be positive.*found b = -2\.0"),
         (lambda: PowerLaw(1.0, np.nan, 0.3), r"found n = nan"),
         (lambda: PowerLaw(1.0, 4, 0.3, np.nan), r"PowerLaw: q and x_c must be finite"),
         (
             lambda: Joined(Parabola(0.5, 0.3), Parabola(0.5, 0.31)),
-            r"level at \(0\.0, 0\.3\).*give both halves the same",
+            r"Joined: the halves must meet at the joint: give both .*left y = 0\.3, .*right y = 0\.31",
         ),
         (lambda: Joined(Parabola(0.5, 0.3, 0.1), PowerLaw(1.0, 4, 0.3)), r"Joined: .*the same vertex"),
+        (lambda: Joined(Parabola(0.5, 0.3), Circle(1.0, 0.3, 3.0), x=0.1), r"Circle.* is not there at x = 0\.1"),
+        (lambda: Joined(Parabola(0.2, 0.3, -1.0), Parabola(0.2, 0.3, 1.0), x=0.0), r"the slope must not fall .*a dent"),
+        (lambda: ShapeFree([0.0, 0.1, 0.1, 0.2], np.zeros(4), 0, 0.3), r"ShapeFree: .*increasing angles"),
+        (lambda: ShapeFree(KNOTS, np.zeros(4), 0, 0.3), r"ShapeFree: log_radius of shape \(4,\).*each of 5"),
+        (lambda: ShapeFree(KNOTS, [0, 0, np.nan, 0, 0], 0, 0.3), r"ShapeFree: log_radius must be finite"),
+        (lambda: ShapeFree(KNOTS, np.zeros(5), 0, np.inf), r"ShapeFree: x and y must be finite"),
+        (lambda: ShapeFree(KNOTS, np.zeros(5), 0, 0.3, at=1.4), r"at = 1\.4 is not among .* -1\.3 to 1\.3"),
+        (lambda: from_function(np.abs, (-1, 1)), r"from_function: absolute is not smooth enough .*Joined"),
+        (lambda: from_function(np.sin, (-1, 1)), r"not strictly convex: .*negative from x = 0\.00\d* to 0\.99"),
+        (lambda: from_function(np.sqrt, (-1, 1)), r"sqrt is nan at x = -.*: shrink the domain"),
+        (lambda: from_function(np.square, (1, -1)), r"the domain is \(1\.0, -1\.0\)"),
+        (lambda: from_function(np.square, (-1, 1), slope=np.abs), r"both slope and curvature"),
+        (lambda: from_function(lambda x: 1.0, (-1, 1)), r"<lambda> gives \(\).*element by element"),
+        (
+            lambda: from_function(np.square, (-1, 1), slope=lambda x: 2 * x, curvature=lambda x: 3 + 0 * x),
+            r"the curvature given is not the derivative of the slope: from x = .* differ by 0\.00785",
+        ),
+        (
+            lambda: from_function(np.square, (-1, 1), slope=lambda x: 3 * x, curvature=lambda x: 3 + 0 * x),
+            r"the slope given is not the derivative of the function",
+        ),
+        (lambda: from_function(BATH, (-2, 2), slope=BATH_SLOPE, curvature=BATH_CURVATURE), r"straight from x = -0\.4"),
     ],
 )
 def test_refusals_say_what_was_wrong(build, message):
@@ -192,6 +259,67 @@ def test_joined_admits_rounding_of_the_vertex():
     assert third != 0.3
     joined = Joined(Parabola(0.5, third), PowerLaw(1.0, 4, 0.3))
     assert float(joined.height(0.0)) == pytest.approx(0.3, abs=EPS)
+
+
+def test_an_edge_turns_on_the_spot():
+    """Between the slopes of its halves an edge is an arc of radius zero; beyond them it is the halves."""
+    left, right = Parabola(0.2, 0.3, 1.0), Ellipse(2.0, 0.8, 0.3, -1.0)
+    x = 0.07
+    right = Ellipse(2.0, 0.8, 0.3 + float(left.height(x) - right.height(x)), -1.0)
+    edge = Joined(left, right, x=x)
+    first, last = (float(half.locate(half.parameter_of_x(x)).slope_angle) for half in (left, right))
+    assert first < -0.3 < 0.1 < last
+    inside = np.linspace(first + 1e-9, last - 1e-9, 7)
+    np.testing.assert_allclose(edge.point(inside), [[x] * 7, [float(left.height(x))] * 7], rtol=0, atol=4 * EPS)
+    np.testing.assert_array_equal(edge.radius_of_curvature(inside), 0.0)
+    for half, beyond in ((left, first - np.array([0.3, 1e-9])), (right, last + np.array([1e-9, 0.3]))):
+        np.testing.assert_allclose(edge.point(beyond), half.point(beyond), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(edge.radius_of_curvature(beyond), half.radius_of_curvature(beyond), rtol=1e-12)
+    across = np.array([-0.6, x, 0.4])
+    np.testing.assert_array_equal(edge.height(across), [left.height(-0.6), right.height(x), right.height(0.4)])
+    p = np.linspace(edge.parameter_of_slope(-0.9), edge.parameter_of_slope(0.9), 400)
+    here = edge.locate(p)
+    assert np.all(np.diff(here.slope_angle) > 0)
+    assert np.all(np.diff(here.x) >= 0)
+    assert np.abs(np.diff(here.slope_angle)).max() < 2 * np.diff(p).max()
+    assert [edge.end_name(side) for side in ("left", "right")] == ["where it is over", "where it stands upright"]
+
+
+@pytest.mark.parametrize(
+    ("contour", "x"), [(from_function(np.square, (-1, 2)), 0.5), (ShapeFree(KNOTS, KNOTS, 0.2, 0.3), 0.5)]
+)
+def test_a_contour_may_be_half_of_a_joined_one(contour, x):
+    y, slope = float(contour.height(x)), np.tan(contour.locate(contour.parameter_of_x(x)).slope_angle)
+    tail = Parabola(2.0, y - slope**2 / 8.0, x - slope / 4.0)
+    joined = Joined(contour, tail, x=x)
+    assert joined.knots[-1] == 0.0  # no edge
+    np.testing.assert_allclose(joined.height([0.3, 0.9]), [contour.height(0.3), tail.height(0.9)], rtol=1e-14)
+    x, _ = joined.point(np.array([-0.1, 0.4, 1.4]))
+    assert np.all(np.diff(x) > 0)
+
+
+def test_the_function_with_and_without_its_derivatives():
+    plain = from_function(lambda x: np.exp(x) - x, (-2, 1.5))
+    given = from_function(lambda x: np.exp(x) - x, (-2, 1.5), slope=lambda x: np.exp(x) - 1, curvature=np.exp)
+    alpha = np.linspace(-0.7, 1.2, 30)
+    np.testing.assert_allclose(plain.point(alpha), given.point(alpha), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(plain.radius_of_curvature(alpha), given.radius_of_curvature(alpha), rtol=1e-10)
+    assert np.isnan(plain.height([-2.01, 1.51])).all()
+    assert np.isnan(plain.point([-0.9, 1.3])).all()  # slopes that it does not have
+    assert repr(from_function(np.exp, (-1, 1))) == "from_function(exp, domain=(-1, 1))"
+
+
+def test_shape_free_finds_the_circle_and_the_parabola():
+    alpha = np.linspace(-1.2, 1.2, 40)
+    circle = ShapeFree(KNOTS, np.full(5, np.log(0.7)), *Circle(0.7, 0.3, 0.2).point(0.4), at=0.4)
+    np.testing.assert_allclose(circle.point(alpha), Circle(0.7, 0.3, 0.2).point(alpha), rtol=0, atol=2e-15)
+    parabola, errors = Parabola(0.6, 0.3, 0.2), []
+    for count in (21, 41, 81):  # the error of a cubic spline is of fourth order
+        knots = np.linspace(-1.3, 1.3, count)
+        free = ShapeFree(knots, np.log(parabola.radius_of_curvature(knots)), 0.2, 0.3)
+        errors.append(np.abs(np.subtract(free.point(0.5 * alpha), parabola.point(0.5 * alpha))).max())
+    assert errors[-1] < 1e-7
+    assert errors[0] > 12 * errors[1] > 100 * errors[2]
 
 
 # --- as the rod sees it ----------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-__all__ = ["coefficients", "derivative", "evaluate", "nodes", "polynomials", "tabulate"]
+__all__ = ["coefficients", "derivative", "evaluate", "integral", "nodes", "polynomials", "tabulate"]
 
 Floats = NDArray[np.float64]
 
@@ -57,3 +57,8 @@ def polynomials(count: int, z: Floats) -> Floats:
 def derivative(coefficients: Floats) -> Floats:
     """Coefficients of the derivatives by z."""
     return np.asarray(chebyshev.chebder(coefficients, scl=2.0), dtype=float)
+
+
+def integral(coefficients: Floats) -> Floats:
+    """Coefficients of the integrals from 0."""
+    return np.asarray(chebyshev.chebint(coefficients, lbnd=-1.0, scl=0.5), dtype=float)

@@ -1,10 +1,26 @@
 """Strictly convex contours by slope angle; one family a class on one small base."""
 
-from tactile_bayes.contours.base import Contour, Graph, Locus
+from tactile_bayes.contours.base import Contour, Graph, Locus, Single
 from tactile_bayes.contours.circle import Circle
+from tactile_bayes.contours.ellipse import Ellipse
+from tactile_bayes.contours.function import from_function
 from tactile_bayes.contours.joined import Joined
 from tactile_bayes.contours.paper import paper_profile
 from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.power_law import PowerLaw
+from tactile_bayes.contours.shape_free import ShapeFree
 
-__all__ = ["Circle", "Contour", "Graph", "Joined", "Locus", "Parabola", "PowerLaw", "paper_profile"]
+__all__ = [
+    "Circle",
+    "Contour",
+    "Ellipse",
+    "Graph",
+    "Joined",
+    "Locus",
+    "Parabola",
+    "PowerLaw",
+    "ShapeFree",
+    "Single",
+    "from_function",
+    "paper_profile",
+]

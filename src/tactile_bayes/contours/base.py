@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, NamedTuple, Self
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import ContourError
+from tactile_bayes.roots import falling_root
 
-__all__ = ["Contour", "Floats", "Graph", "Index", "Locus", "Parameter", "finite", "refuse_unless"]
+__all__ = ["Contour", "Floats", "Graph", "Index", "Locus", "Parameter", "Single", "finite", "refuse_unless"]
 
 Floats = NDArray[np.float64]
 Parameter = float | Floats
-Index = NDArray[np.intp]
+Index = NDArray[np.intp] | tuple[NDArray[np.intp], ...]
+
+_FARTHEST = 2.0**60
+"""Where the search for a slope or a place on an endless contour is given up."""
 
 
 class Locus(NamedTuple):
@@ -24,7 +29,7 @@ class Locus(NamedTuple):
     y: Floats
     slope_angle: Floats
     arclength_rate: Floats
-    """dσ/dp > 0, σ the arc length."""
+    """dσ/dp ≥ 0, σ the arc length; zero only in an edge, where the contour turns on the spot."""
     slope_rate: Floats
     """dα/dp ≥ 0; zero only where the radius of curvature is infinite."""
 
@@ -34,19 +39,31 @@ class Contour(ABC):
 
     A family is a frozen dataclass of its parameters, which are scalars or arrays that broadcast: one contour object may
     hold many contours. Its own parameter p may be whatever makes point and slope angle continuous functions of it.
-    A family says how to go from p to the point (`locate`), from slope angle to p (`parameter_of_slope`), how high the
-    contour is at x, and where it ends.
+    A family must say how to go from p to the point (`locate`) and where it ends (`domain`); everything else follows by
+    root search, and is overridden where there is a formula.
     """
 
     @abstractmethod
     def locate(self, parameter: ArrayLike) -> Locus:
         """Points at the contour's own parameter."""
 
+    @property
     @abstractmethod
+    def domain(self) -> tuple[Floats, Floats]:
+        """Least and greatest parameter; at a finite end the contour is over."""
+
+    def end_name(self, side: Literal["left", "right"]) -> str:
+        """What the end on one side is, for messages."""
+        return "where it is over"
+
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         """The contour's own parameter at a slope angle [rad]; NaN where the contour has no such slope."""
+        return self._parameter_where(slope_angle, lambda locus: (locus.slope_angle, locus.slope_rate))
 
-    @abstractmethod
+    def parameter_of_x(self, x: ArrayLike) -> Floats:
+        """The contour's own parameter at x, in the contour's unit of length; NaN beyond its ends."""
+        return self._parameter_where(x, lambda locus: (locus.x, locus.arclength_rate * np.cos(locus.slope_angle)))
+
     def height(self, x: ArrayLike) -> Floats:
         """Height of the contour at x; NaN beyond its ends.
 
@@ -55,11 +72,7 @@ class Contour(ABC):
         x : array_like
             In the contour's unit of length.
         """
-
-    @property
-    @abstractmethod
-    def domain(self) -> tuple[Floats, Floats]:
-        """Least and greatest parameter; at a finite end the contour is over."""
+        return self.locate(self.parameter_of_x(x)).y
 
     @property
     def knots(self) -> tuple[Floats, ...]:
@@ -109,17 +122,61 @@ class Contour(ABC):
         with np.errstate(divide="ignore"):
             return locus.arclength_rate / locus.slope_rate
 
+    def _parameter_where(self, wanted: ArrayLike, measure: Callable[[Locus], tuple[Floats, Floats]]) -> Floats:
+        """Parameters at which something that grows along the contour, given with its rate, is as wanted; else NaN."""
+        shape = np.broadcast_shapes(self.shape, np.shape(wanted))
+        goal = np.broadcast_to(np.asarray(wanted, dtype=float), shape).ravel()
+        many, place = self.broadcast_to(shape or (1,)), np.unravel_index(np.arange(goal.size), shape or (1,))
+
+        def short_of(i: NDArray[np.intp], parameter: Floats) -> tuple[Floats, Floats]:
+            value, rate = measure(many.take(tuple(axis[i] for axis in place)).locate(parameter))
+            return goal[i] - value, -rate
+
+        every = np.arange(goal.size)
+        lo, hi = (np.broadcast_to(end, shape).ravel().astype(float) for end in self.domain)
+        for end, outward in ((lo, -1.0), (hi, 1.0)):
+            open_ended, way = np.flatnonzero(~np.isfinite(end)), 1.0
+            while open_ended.size and way < _FARTHEST:
+                end[open_ended] = outward * way
+                inside = outward * short_of(open_ended, end[open_ended])[0] > 0.0
+                open_ended, way = open_ended[inside], 2.0 * way
+        with np.errstate(invalid="ignore"):
+            there = (short_of(every, lo)[0] >= 0.0) & (short_of(every, hi)[0] <= 0.0)
+        found = np.full(goal.size, np.nan)
+        at = np.flatnonzero(there)
+        found[at] = falling_root(lambda i, p: short_of(at[i], p), lo[at], hi[at])
+        return found.reshape(shape)
+
+
+class Single(Contour):
+    """A contour that stands alone, without parameters of a family."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return ()
+
+    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
+        return self
+
+    def take(self, index: Index) -> Self:
+        return self
+
 
 class Graph(Contour):
     """A contour that is easiest to give as the graph y = g(x): its parameter is x."""
 
     @abstractmethod
     def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """g(x), g'(x) and g''(x)."""
+        """g(x), g'(x) and g''(x), for x between the ends."""
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
         return np.asarray(-np.inf), np.asarray(np.inf)
+
+    def parameter_of_x(self, x: ArrayLike) -> Floats:
+        x, (lo, hi) = np.asarray(x, dtype=float), self.domain
+        with np.errstate(invalid="ignore"):
+            return np.where((x >= lo) & (x <= hi), x, np.nan)
 
     def locate(self, parameter: ArrayLike) -> Locus:
         x = np.asarray(parameter, dtype=float)
@@ -127,9 +184,6 @@ class Graph(Contour):
         x, g = np.broadcast_arrays(x, g)
         steepness = 1.0 + slope * slope
         return Locus(x, g, np.arctan(slope), np.sqrt(steepness), bend / steepness)
-
-    def height(self, x: ArrayLike) -> Floats:
-        return self.derivatives(np.asarray(x, dtype=float))[0]
 
 
 def refuse_unless(holds: Any, family: str, rule: str, **values: Parameter) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,8 +48,11 @@ class Circle(Contour):
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
-        upright = np.full(np.broadcast(self.r, self.q, self.x_c).shape, 0.5 * np.pi)
+        upright = np.full(self.shape, 0.5 * np.pi)
         return -upright, upright
+
+    def end_name(self, side: Literal["left", "right"]) -> str:
+        return "where it stands upright"
 
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = np.asarray(parameter, dtype=float)
@@ -61,6 +65,10 @@ class Circle(Contour):
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = np.asarray(slope_angle, dtype=float)
         return np.where(np.abs(alpha) <= 0.5 * np.pi, alpha, np.nan)
+
+    def parameter_of_x(self, x: ArrayLike) -> Floats:
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.arcsin((np.asarray(x, dtype=float) - self.x_c) / self.r))
 
     def height(self, x: ArrayLike) -> Floats:
         offset = np.asarray(x, dtype=float) - self.x_c

@@ -1,34 +1,41 @@
-"""Two halves joined at their vertex: profile IV of the paper."""
+"""Two contours joined, with an edge between them or without: profile IV of the paper."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Index, Locus
+from tactile_bayes.contours.base import Contour, Floats, Index, Locus, Parameter, refuse_unless
 from tactile_bayes.errors import ContourError
 
 __all__ = ["Joined"]
 
+_SAME_SLOPE = 1e-9
+"""Slope angles [rad] that differ by less are the same."""
+
 
 @dataclass(frozen=True)
 class Joined(Contour):
-    """The part of `left` that falls and the part of `right` that rises, joined where both are level.
+    """The part of `left` up to the joint, and the part of `right` from there on.
 
-    The radius of curvature may jump there; the slope may not.
+    The radius of curvature may jump at the joint. The slope may too, if it grows: the object then has an edge, an arc
+    of radius zero on which the rod turns on the spot.
 
     Parameters
     ----------
     left, right : Contour
-        Contours whose vertices coincide.
+        The halves; they meet at the joint.
+    x : array_like, optional
+        Where the joint is [length]; by default where both are level.
 
     Raises
     ------
     ContourError
-        If the vertices differ by more than rounding.
+        If the halves do not meet at the joint, or their slopes make a dent there.
 
     Examples
     --------
@@ -36,59 +43,115 @@ class Joined(Contour):
     >>> iv = Joined(Parabola(0.5, q=0.3), PowerLaw(1.0, 4, q=0.3))
     >>> iv.height([-1.0, 0.0, 1.0])
     array([0.8, 0.3, 1.3])
+
+    An edge, as of a roof upside down:
+
+    >>> edge = Joined(Parabola(0.2, q=0.3, x_c=1.0), Parabola(0.2, q=0.3, x_c=-1.0), x=0.0)
+    >>> edge.point([-0.2, 0.0, 0.2])[0].round(12), edge.radius_of_curvature(0.1)
+    (array([0., 0., 0.]), np.float64(0.0))
     """
 
     left: Contour
     right: Contour
+    x: Parameter | None = None
 
     def __post_init__(self) -> None:
-        (xl, yl), (xr, yr) = self.left.point(0.0), self.right.point(0.0)
-        scale = 1.0 + np.abs(xl) + np.abs(yl)
-        if not (np.all(np.abs(xl - xr) <= 1e-12 * scale) and np.all(np.abs(yl - yr) <= 1e-12 * scale)):
-            raise ContourError(
-                f"Joined: the left half is level at ({xl}, {yl}) and the right half at ({xr}, {yr}): "
-                "give both halves the same vertex"
-            )
+        shape = np.broadcast_shapes(self.left.shape, self.right.shape, () if self.x is None else np.shape(self.x))
+        ends = []
+        for half in (self.left, self.right):
+            parameter = half.parameter_of_slope(0.0) if self.x is None else half.parameter_of_x(self.x)
+            if np.any(np.isnan(parameter)):
+                where = "level anywhere" if self.x is None else f"there at x = {self.x}"
+                raise ContourError(f"Joined: {half} is not {where}: give an x at which both halves meet")
+            ends.append((parameter, half.locate(parameter)))
+        (before, left), (after, right) = ends
+        scale = 1.0 + np.abs(left.x) + np.abs(left.y)
+        meet = (np.abs(left.x - right.x) <= 1e-12 * scale) & (np.abs(left.y - right.y) <= 1e-12 * scale)
+        refuse_unless(
+            meet,
+            "Joined",
+            "the halves must meet at the joint: give both the same vertex, or an x where they cross",
+            **{"left x": left.x, "left y": left.y, "right x": right.x, "right y": right.y},
+        )
+        edge = right.slope_angle - left.slope_angle
+        refuse_unless(
+            edge >= -_SAME_SLOPE,
+            "Joined",
+            "the slope must not fall at the joint, else the object has a dent there",
+            **{"left slope": np.tan(left.slope_angle), "right slope": np.tan(right.slope_angle)},
+        )
+        joint = np.broadcast_arrays(before, after, np.where(edge > _SAME_SLOPE, edge, 0.0), np.empty(shape))
+        self.__dict__.update(zip(("_before", "_after", "_edge"), joint, strict=False))
 
     @property
-    def _levels(self) -> tuple[Floats, Floats]:
-        return self.left.parameter_of_slope(0.0), self.right.parameter_of_slope(0.0)
+    def _joint(self) -> tuple[Floats, Floats, Floats]:
+        """Parameter of the left half and of the right half at the joint, and the turn between them."""
+        return self.__dict__["_before"], self.__dict__["_after"], self.__dict__["_edge"]
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
-        level_left, level_right = self._levels
-        return self.left.domain[0] - level_left, self.right.domain[1] - level_right
+        before, after, edge = self._joint
+        return self.left.domain[0] - before, self.right.domain[1] - after + edge
+
+    def end_name(self, side: Literal["left", "right"]) -> str:
+        return (self.left if side == "left" else self.right).end_name(side)
 
     @property
     def knots(self) -> tuple[Floats, ...]:
-        return (np.zeros(()),)
+        before, after, edge = self._joint
+        inner = [knot - before for knot in self.left.knots], [knot - after + edge for knot in self.right.knots]
+        return (*(np.minimum(k, 0.0) for k in inner[0]), np.zeros(()), edge, *(np.maximum(k, edge) for k in inner[1]))
 
     def locate(self, parameter: ArrayLike) -> Locus:
         p = np.asarray(parameter, dtype=float)
-        level_left, level_right = self._levels
-        left = self.left.locate(np.minimum(p, 0.0) + level_left)
-        right = self.right.locate(np.maximum(p, 0.0) + level_right)
-        return Locus(*(np.where(p < 0.0, a, b) for a, b in zip(left, right, strict=True)))
+        before, after, edge = self._joint
+        left = self.left.locate(np.minimum(p, 0.0) + before)
+        right = self.right.locate(np.maximum(p - edge, 0.0) + after)
+        locus = Locus(*(np.where(p < 0.0, a, b) for a, b in zip(left, right, strict=True)))
+        turning = (p >= 0.0) & (p < edge)
+        if not np.any(turning):
+            return locus
+        return locus._replace(
+            slope_angle=np.where(turning, right.slope_angle - edge + p, locus.slope_angle),
+            arclength_rate=np.where(turning, 0.0, locus.arclength_rate),
+            slope_rate=np.where(turning, 1.0, locus.slope_rate),
+        )
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        alpha = np.asarray(slope_angle, dtype=float)
-        level_left, level_right = self._levels
-        return np.where(
-            alpha < 0.0,
-            self.left.parameter_of_slope(np.minimum(alpha, 0.0)) - level_left,
-            self.right.parameter_of_slope(np.maximum(alpha, 0.0)) - level_right,
-        )
+        before, after, edge = self._joint
+        last = self.left.locate(before).slope_angle
+        past = np.asarray(slope_angle, dtype=float) - last
+        left = self.left.parameter_of_slope(last + np.minimum(past, 0.0)) - before
+        right = self.right.parameter_of_slope(self.right.locate(after).slope_angle + np.maximum(past - edge, 0.0))
+        return np.where(past < 0.0, left, np.where(past < edge, past, right - after + edge))
+
+    def parameter_of_x(self, x: ArrayLike) -> Floats:
+        before, after, edge = self._joint
+        x, joint = np.asarray(x, dtype=float), self.right.locate(after).x
+        left = self.left.parameter_of_x(np.minimum(x, joint)) - before
+        right = self.right.parameter_of_x(np.maximum(x, joint)) - after + edge
+        return np.where(x < joint, left, right)
 
     def height(self, x: ArrayLike) -> Floats:
         x = np.asarray(x, dtype=float)
-        return np.where(x < self.left.point(0.0)[0], self.left.height(x), self.right.height(x))
+        return np.where(x < self.right.locate(self._joint[1]).x, self.left.height(x), self.right.height(x))
 
     @property
     def shape(self) -> tuple[int, ...]:
-        return np.broadcast_shapes(self.left.shape, self.right.shape)
+        return self._joint[0].shape
 
-    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
-        return type(self)(self.left.broadcast_to(shape), self.right.broadcast_to(shape))
+    def broadcast_to(self, shape: tuple[int, ...]) -> Joined:
+        return self._each(lambda half: half.broadcast_to(shape), lambda value: np.broadcast_to(value, shape))
 
-    def take(self, index: Index) -> Self:
-        return type(self)(self.left.take(index), self.right.take(index))
+    def take(self, index: Index) -> Joined:
+        return self._each(lambda half: half.take(index), lambda value: value[index])
+
+    def _each(self, of_half: Callable[[Contour], Contour], of_value: Callable[[Floats], Floats]) -> Joined:
+        other = object.__new__(type(self))  # the halves have been checked, and this is called in inner loops
+        other.__dict__.update(
+            left=of_half(self.left),
+            right=of_half(self.right),
+            x=self.x if self.x is None else of_value(np.asarray(self.x)),
+        )
+        other.__dict__.update((name, of_value(self.__dict__[name])) for name in ("_before", "_after", "_edge"))
+        return other

@@ -50,7 +50,7 @@ class Parabola(Contour):
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
-        steepest = np.full(np.broadcast(self.a, self.q, self.x_c).shape, np.nextafter(0.5 * np.pi, 0.0))
+        steepest = np.full(self.shape, np.nextafter(0.5 * np.pi, 0.0))
         return -steepest, steepest
 
     def locate(self, parameter: ArrayLike) -> Locus:
@@ -64,6 +64,9 @@ class Parabola(Contour):
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = np.asarray(slope_angle, dtype=float)
         return np.where(np.abs(alpha) < 0.5 * np.pi, alpha, np.nan)
+
+    def parameter_of_x(self, x: ArrayLike) -> Floats:
+        return np.asarray(np.arctan(2.0 * np.asarray(self.a) * (np.asarray(x, dtype=float) - self.x_c)))
 
     def height(self, x: ArrayLike) -> Floats:
         return np.asarray(self.a * (np.asarray(x, dtype=float) - self.x_c) ** 2 + self.q)

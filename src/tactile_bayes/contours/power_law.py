@@ -7,33 +7,41 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Floats, Graph, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finite, refuse_unless
 
 __all__ = ["PowerLaw"]
 
+_LEAST_EXPONENT = 1.1
+
 
 @dataclass(frozen=True)
-class PowerLaw(Graph):
-    """y = a |x − x_c|ⁿ + q with n ≥ 2; for n > 2 the curvature vanishes at the vertex, and only there.
+class PowerLaw(Contour):
+    """y = a |x − x_c|ⁿ + q.
+
+    For n > 2 the curvature vanishes at the vertex, and only there. For n < 2 it grows beyond all bounds there: the
+    radius of curvature is zero at the vertex, the slope is continuous all the same, and a rod slides past it. Toward
+    n = 1 the vertex becomes an edge; below 1.1 give that edge, as `Joined` does.
 
     Parameters
     ----------
     a : array_like
         Factor, > 0 [length^(1 − n)].
     n : array_like
-        Exponent, ≥ 2.
+        Exponent, ≥ 1.1.
     q, x_c : array_like
         Height and position of the vertex [length].
 
     Raises
     ------
     ContourError
-        If a is not positive, n is below 2, or a parameter is not finite.
+        If a is not positive, n is below 1.1, or a parameter is not finite.
 
     Examples
     --------
     >>> PowerLaw(1.0, 4, q=0.3).height([0.0, 0.5])
     array([0.3   , 0.3625])
+    >>> PowerLaw(1.0, 1.5, q=0.3).radius_of_curvature(0.0)
+    np.float64(0.0)
     """
 
     a: Parameter
@@ -47,25 +55,53 @@ class PowerLaw(Graph):
             (a > 0) & np.isfinite(a), "PowerLaw", "a must be positive, else the object is not strictly convex", a=a
         )
         refuse_unless(
-            (n >= 2) & np.isfinite(n),
+            (n >= _LEAST_EXPONENT) & np.isfinite(n),
             "PowerLaw",
-            "n must be at least 2: below, no radius of curvature at the vertex",
+            f"n must be at least {_LEAST_EXPONENT}: below, the vertex is as good as an edge, which Joined can give",
             n=n,
         )
         refuse_unless(finite(self.q, self.x_c), "PowerLaw", "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
-    def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        a, n = np.asarray(self.a, dtype=float), np.asarray(self.n, dtype=float)
-        offset = x - np.asarray(self.x_c)
-        size = np.abs(offset)
-        return (
-            np.asarray(self.q + a * size**n),
-            a * n * np.copysign(size ** (n - 1.0), offset),
-            a * n * (n - 1.0) * size ** (n - 2.0),
+    @property
+    def domain(self) -> tuple[Floats, Floats]:
+        return np.asarray(-np.inf), np.asarray(np.inf)
+
+    @property
+    def knots(self) -> tuple[Floats, ...]:
+        return (np.zeros(()),)
+
+    def _powers(self) -> tuple[Floats, Floats, Floats]:
+        """|x − x_c|, slope and y − q are these powers of |p|: p is the offset for n ≥ 2, else like the slope."""
+        n = np.asarray(self.n, dtype=float)
+        of_offset, of_slope = np.maximum(1.0, 1.0 / (n - 1.0)), np.maximum(1.0, n - 1.0)
+        return of_offset, of_slope, of_offset + of_slope
+
+    def locate(self, parameter: ArrayLike) -> Locus:
+        p, a, n = (np.asarray(v, dtype=float) for v in (parameter, self.a, self.n))
+        of_offset, of_slope, of_height = self._powers()
+        size = np.abs(p)
+        flat = size ** (of_offset - 1.0)
+        steep = size ** (of_slope - 1.0)
+        slope = a * n * steep * p
+        steepness = 1.0 + slope * slope
+        x, y, alpha, speed, bend = np.broadcast_arrays(
+            self.x_c + flat * p,
+            self.q + a * size**of_height,
+            np.arctan(slope),
+            of_offset * flat * np.sqrt(steepness),
+            a * n * of_slope * steep / steepness,
         )
+        return Locus(x, y, alpha, speed, bend)
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = np.asarray(slope_angle, dtype=float)
         a, n = np.asarray(self.a, dtype=float), np.asarray(self.n, dtype=float)
         slope = np.where(np.abs(alpha) < 0.5 * np.pi, np.tan(alpha), np.nan)
-        return np.asarray(self.x_c + np.copysign((np.abs(slope) / (a * n)) ** (1.0 / (n - 1.0)), slope))
+        return np.asarray(np.copysign((np.abs(slope) / (a * n)) ** (1.0 / self._powers()[1]), slope))
+
+    def parameter_of_x(self, x: ArrayLike) -> Floats:
+        offset = np.asarray(x, dtype=float) - self.x_c
+        return np.asarray(np.copysign(np.abs(offset) ** (1.0 / self._powers()[0]), offset))
+
+    def height(self, x: ArrayLike) -> Floats:
+        return np.asarray(self.q + self.a * np.abs(np.asarray(x, dtype=float) - self.x_c) ** np.asarray(self.n))

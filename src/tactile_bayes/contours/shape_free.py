@@ -1,0 +1,141 @@
+"""Contours of any shape: the radius of curvature over the slope angle, and one point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+
+from tactile_bayes import chebyshev
+from tactile_bayes.contours.base import Contour, Floats, Index, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.errors import ContourError
+
+__all__ = ["ShapeFree"]
+
+_ORDER = 18
+"""Chebyshev nodes a stretch between knots: for radii that change e²-fold there the rest is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeFree(Contour):
+    """Any strictly convex contour whose curvature is finite: log ρ(α) is a cubic spline, and one point is known.
+
+    The contour follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle. It is
+    strictly convex whatever the values are.
+
+    Parameters
+    ----------
+    slope_angles : array_like, shape (k,)
+        Knots of the spline, increasing in [−π/2, π/2], at least 4 [rad]; the first and the last are the contour's ends.
+    log_radius : array_like, shape (..., k)
+        Logarithm of the radius of curvature at the knots, in the unit of length that x and y have.
+    x, y : array_like, shape (...)
+        The point at slope angle `at` [length].
+    at : float
+        Slope angle of the known point, between the ends [rad].
+
+    Raises
+    ------
+    ContourError
+        If the knots are not increasing angles, there is not one value a knot, or a value is not finite.
+
+    Examples
+    --------
+    >>> circle = ShapeFree(np.linspace(-1.5, 1.5, 7), np.zeros(7), x=0.0, y=0.3)
+    >>> circle.point(1.0)[0].round(12), np.sin(1.0).round(12)
+    (np.float64(0.841470984808), np.float64(0.841470984808))
+    """
+
+    slope_angles: Floats
+    log_radius: Floats
+    x: Parameter
+    y: Parameter
+    at: float = 0.0
+
+    def __post_init__(self) -> None:
+        knots, values = np.asarray(self.slope_angles, dtype=float), np.asarray(self.log_radius, dtype=float)
+        if knots.ndim != 1 or knots.size < 4 or not np.all(np.diff(knots) > 0.0) or np.any(np.abs(knots) > 0.5 * np.pi):
+            raise ContourError("ShapeFree: slope_angles must be at least 4 increasing angles in [−π/2, π/2] radians")
+        if values.shape[-1:] != knots.shape:
+            raise ContourError(
+                f"ShapeFree: log_radius of shape {values.shape} has not one value for each of {knots.size} slope angles"
+            )
+        if not knots[0] <= self.at <= knots[-1]:
+            raise ContourError(f"ShapeFree: at = {self.at} is not among the slope angles {knots[0]:g} to {knots[-1]:g}")
+        refuse_unless(np.isfinite(values), "ShapeFree", "log_radius must be finite", log_radius=values)
+        refuse_unless(finite(self.x, self.y), "ShapeFree", "x and y must be finite", x=self.x, y=self.y)
+        shape = np.broadcast_shapes(values.shape[:-1], np.shape(self.x), np.shape(self.y))
+        self.__dict__.update(
+            slope_angles=knots,
+            log_radius=np.broadcast_to(values, (*shape, knots.size)),
+            x=np.broadcast_to(np.asarray(self.x, dtype=float), shape),
+            y=np.broadcast_to(np.asarray(self.y, dtype=float), shape),
+            _row=np.arange(math.prod(shape)).reshape(shape),
+        )
+        self.__dict__["_table"] = self._integrated()
+        x, y = self._evaluate(np.asarray(float(self.at)))[1:]
+        self.__dict__["_table"][..., 1:, 0] += np.stack([self.x - x, self.y - y], axis=-1).reshape(-1, 1, 2)
+
+    def _integrated(self) -> Floats:
+        """Chebyshev coefficients of log ρ, x and y on every stretch between knots: (row, stretch, 3, order + 1)."""
+        knots, width = self.slope_angles, np.diff(self.slope_angles)
+        alpha = knots[:-1, None] + width[:, None] * chebyshev.nodes(_ORDER)
+        log_radius = CubicSpline(knots, self.log_radius.reshape(-1, knots.size), axis=-1)(alpha)
+        radius = np.exp(log_radius)
+        rates = np.stack([radius * np.cos(alpha), radius * np.sin(alpha)], axis=2)  # (row, stretch, 2, order)
+        path = chebyshev.integral(chebyshev.coefficients(rates)) * width[:, None]
+        change = path.sum(axis=0)
+        path[0] += np.cumsum(change, axis=1) - change
+        spline = chebyshev.coefficients(log_radius)
+        spline = np.concatenate([spline, np.zeros_like(spline[:1])])
+        table = np.moveaxis(np.concatenate([spline[..., None], path], axis=-1), 0, -1)
+        return np.ascontiguousarray(table)
+
+    def _evaluate(self, alpha: Floats) -> tuple[Floats, Floats, Floats]:
+        """log ρ, x and y at slope angles."""
+        alpha, row = np.broadcast_arrays(alpha, self.__dict__["_row"])
+        stretch = np.clip(np.searchsorted(self.slope_angles, alpha, side="right") - 1, 0, self.slope_angles.size - 2)
+        z = (alpha - self.slope_angles[stretch]) / np.diff(self.slope_angles)[stretch]
+        basis = chebyshev.polynomials(_ORDER + 1, z)
+        log_radius, x, y = np.moveaxis((self.__dict__["_table"][row, stretch] @ basis[..., None])[..., 0], -1, 0)
+        return log_radius, x, y
+
+    @property
+    def domain(self) -> tuple[Floats, Floats]:
+        shape = self.shape
+        return np.full(shape, self.slope_angles[0]), np.full(shape, self.slope_angles[-1])
+
+    def end_name(self, side: Literal["left", "right"]) -> str:
+        return "the last slope angle for which a radius is given"
+
+    def locate(self, parameter: ArrayLike) -> Locus:
+        alpha = np.asarray(parameter, dtype=float)
+        log_radius, x, y = self._evaluate(alpha)
+        alpha = np.broadcast_to(alpha, x.shape)
+        return Locus(x, y, alpha, np.exp(log_radius), np.ones_like(alpha))
+
+    def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
+        alpha = np.asarray(slope_angle, dtype=float)
+        with np.errstate(invalid="ignore"):
+            return np.where((alpha >= self.slope_angles[0]) & (alpha <= self.slope_angles[-1]), alpha, np.nan)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return np.shape(self.x)
+
+    def broadcast_to(self, shape: tuple[int, ...]) -> ShapeFree:
+        return self._each(lambda value: np.broadcast_to(value, (*shape, *value.shape[len(self.shape) :])))
+
+    def take(self, index: Index) -> ShapeFree:
+        return self._each(lambda value: value[index])
+
+    def _each(self, change: Callable[[Floats], Floats]) -> ShapeFree:
+        other = object.__new__(type(self))  # the table stays one for all
+        other.__dict__.update(self.__dict__)
+        other.__dict__.update((name, change(self.__dict__[name])) for name in ("log_radius", "x", "y", "_row"))
+        return other
