@@ -1,9 +1,9 @@
-"""Prints the table of ratios: what a user would otherwise write beside what this package does, in one process."""
+"""Prints what SciPy alone costs beside what this package costs, in one process and one thread, and how costs grow."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,81 +11,154 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
-from benchmarks.shooting import contact_by_integration, sweep_by_shooting
+from benchmarks.shooting import contact_by_integration, sweep_by_collocation, sweep_by_shooting
+from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
+from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.path import trace
 from tactile_bayes.record import make_record
 
+CONTOUR = tb.contours.paper_profile("II", q=0.6)
+"""Its forward sweep is in tip, then tangential, then tip contact again."""
 
-def _best(job: Callable[[], Any], repeats: int = 5) -> float:
-    """Shortest of several times [s]: what the job costs when nothing disturbs it."""
-    job()
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        job()
-        times.append(time.perf_counter() - began)
-    return min(times)
+SLOPES = 0.54, 0.12
+"""From soon after first contact to just before snap-off."""
+
+ANGLES = np.radians(np.arange(180.0))
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+MANY = 100_000
+TIGHT = 1e-12
+"""Tolerance at which accuracy is judged; what is timed has 1e-9."""
 
 
 def main() -> None:
-    contour = tb.contours.paper_profile("II", q=0.3)
-    rows: list[tuple[str, float, float]] = []
-
-    slopes = np.linspace(0.6, 0.1, 40)
-    exact = tb.equilibria(contour, slopes)
-    first = float(exact.force_y[0] / np.cos(slopes[0])), float(exact.contact_arclength[0]), float(exact.drive_angle[0])
-    by_hand = sweep_by_shooting(contour, slopes, first)
-    error = np.max(np.abs(by_hand[:, 0] - exact.drive_angle.values))
-    shooting = _best(lambda: sweep_by_shooting(contour, slopes, first), 3) / slopes.size
-    for profile, q in (("II", 0.3), ("II", 0.5)):
-        many = np.linspace(0.05, 0.55, 100_000)
-        shape = tb.contours.paper_profile(profile, q=q)
-        closed = _best(lambda shape=shape, many=many: tb.equilibria(shape, many)) / many.size
-        rows.append((f"Step 1, one state of profile {profile}, q = {q}: shooting / equilibria", shooting, closed))
-
-    scan = tb.scan(contour, direction="forward").record
-    loaded = scan.isel(sample=np.flatnonzero(scan.truth_contact_phase.values != "none"))
-    samples = [
-        tuple(float(loaded[n][i]) for n in ("drive_angle", "holding_moment", "force_x", "force_y")) for i in range(40)
-    ]
-    integration = _best(lambda: [contact_by_integration(*sample) for sample in samples], 3) / len(samples)
-    repeated: dict[str, Any] = {
-        name: np.resize(loaded[name].values, 100_000) for name in ("holding_moment", "force_x", "force_y")
-    }
-    angle = np.resize(loaded["drive_angle"].values, 100_000)
-    order = np.argsort(angle, kind="stable")
-    record = make_record(
-        {"sweep": 0, "direction": "forward", "drive_angle": angle[order], **{k: v[order] for k, v in repeated.items()}}
-    )
-    step2 = _best(lambda: tb.reconstruct(record)) / 100_000
-    rows.append(("Step 2, one sample: integration with an event / reconstruct", integration, step2))
-
-    rows.append(
-        ("double sweep of 180 + 180 samples: shooting / scan", 2 * 180 * shooting, _best(lambda: tb.scan(contour)))
-    )
-
-    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-    grid = np.radians(np.arange(0.0, 180.0))
-    measured: xr.Dataset = cell.measure(tb.scan(contour, drive_angles=grid).record, seed=1)
-    likelihood = RecordLikelihood(measured, cell)
-    rng = np.random.default_rng(1)
-    walkers = Parabola(*(v + 1e-3 * rng.normal(size=64) for v in (0.5, 0.3, 0.0)))
     with threadpool_limits(1):
-        batch = _best(lambda: likelihood.log_likelihood(walkers)) / 64
-    rows.append(("log-likelihood of 2 × 180 samples, a walker of 64: shooting / ours", 2 * 180 * shooting, batch))
+        one, error_of_one = step_one()
+        two, error_of_two = step_two()
+        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two])
+        print(f"\n{error_of_one}\n{error_of_two}")
+        print("\nTime a piece, for ever more of them:")
+        print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
+        print_growth("sample, reconstruct", (1_000, 10_000, 100_000, 1_000_000), reconstruct)
+        print_growth("contour, trace and 180 drive angles", (10, 100, 1_000, 10_000), loads)
 
-    print(f"shooting agrees with the closed form to {error:.1e} in drive angle (its tolerance is 1e-9)\n")
-    print(f"{'':<76}{'otherwise':>12}{'here':>12}{'ratio':>9}")
-    for name, theirs, ours in rows:
-        print(f"{name:<76}{_time(theirs):>12}{_time(ours):>12}{theirs / ours:>9.0f}")
+
+def step_one() -> tuple[list[Row], str]:
+    """A state, at 40 slope angles by hand."""
+    slopes = np.linspace(*SLOPES, 40)
+    exact = states(slopes)
+    first = tuple(exact[0])
+    shooting = best_time(lambda: sweep_by_shooting(CONTOUR, slopes, first), 3) / slopes.size
+    collocation = best_time(lambda: sweep_by_collocation(CONTOUR, slopes, first), 3) / slopes.size
+    ours = best_time(equilibria(MANY)) / MANY
+    apart = np.abs(sweep_by_shooting(CONTOUR, slopes, first, TIGHT) - exact).max()
+    return [
+        Row("Step 1, a state: solve_ivp and root / equilibria", shooting, ours),
+        Row("Step 1, a state: solve_bvp / equilibria", collocation, ours),
+    ], (
+        f"Step 1: states with {np.mean(exact[:, 3] == 1.0):.0%} in tip contact, the others tangential; "
+        f"shooting at tolerance {TIGHT:g} and equilibria differ by at most {apart:.1e}"
+    )
 
 
-def _time(seconds: float) -> str:
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
+def step_two() -> tuple[list[Row], str]:
+    """A sample, of 60 by hand."""
+    clean = record(MANY)
+    some = clean.isel(sample=np.flatnonzero(clean.holding_moment > 0.0)[:: MANY // 120])
+    wrenches = [some[name].values for name in ("drive_angle", "holding_moment", "force_x", "force_y")]
+
+    def by_hand(rtol: float = 1e-9) -> np.ndarray:
+        return np.array([contact_by_integration(*wrench, rtol) for wrench in zip(*wrenches, strict=True)])
+
+    integration = best_time(by_hand, 3) / some.sizes["sample"]
+    records = {"without noise": clean, "with noise": CELL.measure(clean, seed=1)}
+    rows = []
+    for kind, measured in records.items():
+        ours = best_time(lambda measured=measured: tb.reconstruct(measured), 10) / measured.sizes["sample"]
+        rows.append(Row(f"Step 2, a sample {kind}: solve_ivp with an event / reconstruct", integration, ours))
+    contacts = tb.reconstruct(some)
+    apart = np.abs(by_hand(TIGHT) - np.stack([contacts.contact_x, contacts.contact_y], axis=1)).max()
+    phases = tb.reconstruct(clean).contact_phase
+    return rows, (
+        f"Step 2: {clean.sizes['sample']:,} samples in 2 sweeps, {float((phases == 'tip').mean()):.0%} in tip contact, "
+        f"the others tangential; integration at tolerance {TIGHT:g} and reconstruct differ by at most {apart:.1e}"
+    )
+
+
+def sweeps(by_hand: float) -> list[Row]:
+    """Whole sweeps; by hand they cost as much as their states in contact."""
+    scan = tb.scan(CONTOUR)
+    scanned = in_contact(scan.record)
+    observed = loads(1_000)
+    touching = float(np.mean(np.any(observed() != 0.0, axis=-1))) * ANGLES.size
+    measured = CELL.measure(tb.scan(CONTOUR, drive_angles=ANGLES).record, seed=1)
+    likelihood = RecordLikelihood(measured, CELL)
+    walkers = contours(64)
+    rows = [
+        (f"double scan at 1° and its events, {scanned} states", scanned, lambda: tb.scan(CONTOUR), 1),
+        (f"sweep at 1° along one of 1000 contours, {touching:.0f} states", touching, observed, 1_000),
+        (
+            f"log-likelihood of a double sweep for one of 64 contours, {in_contact(measured)} states",
+            in_contact(measured),
+            lambda: likelihood.log_likelihood(walkers),
+            64,
+        ),
+    ]
+    return [Row(f"{what}: solve_ivp and root / ours", n * by_hand, best_time(job) / of) for what, n, job, of in rows]
+
+
+def states(slopes: np.ndarray) -> np.ndarray:
+    """Drive angle, holding moment, force and arc length of the contact."""
+    found = tb.equilibria(CONTOUR, slopes)
+    force = np.hypot(found.force_x, found.force_y)
+    return np.stack([found.drive_angle, found.holding_moment, force, found.contact_arclength], axis=1)
+
+
+def in_contact(scanned: xr.Dataset) -> int:
+    return int(np.sum(scanned.truth_contact_phase.values != "none"))
+
+
+def contours(count: int) -> Parabola:
+    """Contours that differ as those of a broad posterior do."""
+    rng = np.random.default_rng(1)
+    return Parabola(rng.uniform(0.3, 0.7, count), rng.uniform(0.5, 0.7, count), rng.uniform(-0.1, 0.1, count))
+
+
+@cache
+def double_sweep() -> xr.Dataset:
+    """Of about `MANY` samples, but for some 60 in contact, as a load cell without noise gives them."""
+    events = tb.scan(CONTOUR).events.values()
+    angle = sum(abs(sweep.snap_off.drive_angle - sweep.first_contact.drive_angle) for sweep in events)
+    scanned = tb.scan(CONTOUR, drive_step=angle / (MANY - 60)).record
+    return scanned.drop_vars([name for name in scanned.data_vars if name.startswith("truth_")])
+
+
+def record(count: int) -> xr.Dataset:
+    """About so many samples of the double sweep, or several double sweeps."""
+    if count <= MANY:
+        return double_sweep().isel(sample=slice(None, None, MANY // count))
+    times, one = count // MANY, double_sweep()
+    columns: dict[str, Any] = {str(name): np.tile(column.values, times) for name, column in one.items()}
+    columns["sweep"] += 2 * np.repeat(np.arange(times), one.sizes["sample"])
+    return make_record(columns)
+
+
+def equilibria(count: int) -> Callable[[], Any]:
+    slopes = np.linspace(*SLOPES, count)
+    return lambda: tb.equilibria(CONTOUR, slopes)
+
+
+def reconstruct(count: int) -> Callable[[], Any]:
+    measured = record(count)
+    return lambda: tb.reconstruct(measured)
+
+
+def loads(count: int) -> Callable[[], Any]:
+    """As a likelihood asks for them."""
+    zero = np.zeros(count)
+    seen = SeenContour(contours(count), zero, zero, 1.0, 0.0, zero > 0.0)
+    return lambda: trace(seen, exact_events=False).observables(ANGLES)
 
 
 if __name__ == "__main__":

@@ -466,6 +466,32 @@ def test_shapes_broadcast():
     assert {v.shape for v in contact_from_wrench([], 0.5, 0.1, 1.0)} == {(0,)}
 
 
+def test_many_states_are_as_good_as_few():
+    """More than are worked on at a time; the tip's table may round differently in other company."""
+    few = wrench_from_contact(*np.transpose(CONTACTS))
+    times = 40_000 // len(CONTACTS)
+    many = wrench_from_contact(*np.tile(np.transpose(CONTACTS), times))
+    for name, values, alone in zip(few._fields, many, few, strict=True):
+        np.testing.assert_allclose(values, np.tile(alone, times), rtol=1e-9, atol=1e-13, err_msg=name)
+    back, alone = contact_from_wrench(*many[:4]), contact_from_wrench(*(column[:5] for column in many[:4]))
+    for values, first in zip(back, alone, strict=True):
+        assert values.shape == (times * len(CONTACTS),)
+        np.testing.assert_array_equal(values[:5], first)
+
+
+def test_a_phase_that_is_known_is_not_questioned():
+    x, y, alpha = np.array([0.2, 1.0]), np.array([0.6, 0.2]), 0.1
+    free = wrench_from_contact(x, y, alpha)
+    np.testing.assert_array_equal(free.phase, [TIP, NONE])
+    lying = wrench_from_contact(x, y, alpha, phase=TANGENTIAL)
+    np.testing.assert_array_equal(lying.phase, TANGENTIAL)
+    np.testing.assert_array_equal(lying.contact_arclength, free.tangential_arclength)
+    ending = wrench_from_contact(x, y, alpha, phase=[TIP, TIP])
+    np.testing.assert_array_equal(ending.phase, [TIP, NONE])
+    assert ending.drive_angle[0] == free.drive_angle[0]
+    assert np.isnan(ending.tangential_arclength).all()
+
+
 def test_backward_contacts_mirror_forward_ones_exactly():
     x, y, alpha, delta = np.transpose(CONTACTS)
     forward = wrench_from_contact(x, y, alpha, delta)

@@ -14,7 +14,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, make_record, rod_of
+from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
 
@@ -82,6 +82,63 @@ def test_against_an_independent_sum(rig):
                 error = SHARE[order] * np.abs(loads[:, present]).max(axis=0)
                 slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
                 assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
+
+
+def swept_in(rig):
+    true, other, rod, cell, bases, friction = RIGS[rig]
+    measured = cell.measure(swept(true, bases=bases, rod=rod, friction=friction), seed=3)
+    return measured, stack([true, other]), cell, friction
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_the_frame_of_the_load_cell_does_not_matter(rig):
+    """With noise of one size on both forces, turning data and prediction alike changes no density."""
+    measured, contours, cell, friction = swept_in(rig)
+    scale = np.array([1.0, 1.3])[:, None]
+    fixed = RecordLikelihood(measured, cell, friction)
+    turning = RecordLikelihood(in_frame(measured, "turning"), cell, friction)
+    for pointwise in (False, True):
+        expected = fixed.log_likelihood(contours, scale, pointwise=pointwise)
+        found = turning.log_likelihood(contours, scale, pointwise=pointwise)
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_predictions_are_in_the_frame_of_the_record(rig):
+    measured, contours, cell, friction = swept_in(rig)
+    likelihood = RecordLikelihood(in_frame(measured, "turning"), cell, friction, FINE_ORDER)
+    predicted, _ = likelihood.predict(contours)
+    true, rod = RIGS[rig][0], RIGS[rig][2]
+    load, angle = exact_loads(measured, true, friction), measured.drive_angle.values
+    exact = np.stack(
+        [
+            load[:, 0] / rod.moment_unit,
+            (load[:, 1] * np.cos(angle) + load[:, 2] * np.sin(angle)) / rod.force_unit,
+            (load[:, 2] * np.cos(angle) - load[:, 1] * np.sin(angle)) / rod.force_unit,
+        ],
+        axis=-1,
+    )
+    largest = np.abs(load / np.array([rod.moment_unit, rod.force_unit, rod.force_unit])).max(axis=0)
+    error = SHARE[FINE_ORDER] * np.array([largest[0], *[np.sum(largest[1:])] * 2])
+    assert np.all(np.abs(predicted[0] - exact) <= error)
+    np.testing.assert_array_equal(likelihood.measured[:, 0], measured.holding_moment.values / rod.moment_unit)
+
+
+@pytest.mark.parametrize("missing", [("force_x", "force_y"), ("force_x",), ("force_y",), ("holding_moment", "force_y")])
+def test_channels_may_be_missing_where_the_load_cell_turns(missing):
+    """A single force is compared along its own axis, which the record alone could not be turned out of."""
+    measured, contours, cell, _ = swept_in("dimensionless")
+    turning = without(in_frame(measured, "turning"), *missing)
+    likelihood = RecordLikelihood(turning, cell)
+    whole, _ = RecordLikelihood(in_frame(measured, "turning"), cell).predict(contours)
+    present = [k for k, name in enumerate(CHANNELS) if name not in missing]
+    densities = stats.norm.logpdf(
+        np.stack([turning[CHANNELS[k]].values for k in present], axis=-1), whole[..., present], DEVIATIONS[present]
+    )
+    np.testing.assert_allclose(likelihood.log_likelihood(contours), densities.sum(axis=(1, 2)), rtol=1e-11)
+    if missing == ("force_x", "force_y"):
+        fixed = RecordLikelihood(without(measured, *missing), cell)
+        np.testing.assert_array_equal(likelihood.log_likelihood(contours), fixed.log_likelihood(contours))
 
 
 def test_truth_is_more_likely_than_what_is_a_little_off():

@@ -11,7 +11,7 @@ from scipy import stats
 
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, make_record, present_channels, to_dimensionless
+from tactile_bayes.record import CHANNELS, frame_of, in_frame, make_record, present_channels, to_dimensionless
 from tactile_bayes.rod import Rod
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -101,6 +101,23 @@ def test_measuring_twice_keeps_the_first_truth_and_adds_variances():
     assert twice.attrs["load_cell_force_noise"] == pytest.approx(0.13, rel=1e-15)
     assert twice.attrs["load_cell_moment_noise"] == 0.02
     np.testing.assert_array_equal(twice["holding_moment"], once["holding_moment"])
+
+
+def test_a_cell_that_turns_has_its_noise_on_what_it_measures():
+    """The same numbers on axial and transversal force as on horizontal and vertical; turning leaves their law alone."""
+    record = ideal()
+    fixed, turning = CELL.measure(record, seed=1), CELL.measure(in_frame(record, "turning"), seed=1)
+    assert frame_of(turning) == "turning"
+    for name in CHANNELS:
+        noise = fixed[name] - record[name]
+        np.testing.assert_allclose(turning[name] - in_frame(record, "turning")[name], noise, rtol=0, atol=1e-15)
+        np.testing.assert_array_equal(turning[f"truth_{name}"], in_frame(record, "turning")[name])
+    assert turning["truth_force_x"].attrs["long_name"] == "true axial support reaction"
+    back = in_frame(turning, "fixed")
+    np.testing.assert_allclose(back["truth_force_y"], record["force_y"], rtol=0, atol=1e-15)
+    size = np.hypot(turning["force_x"] - turning["truth_force_x"], turning["force_y"] - turning["truth_force_y"])
+    turned_size = np.hypot(back["force_x"] - back["truth_force_x"], back["force_y"] - back["truth_force_y"])
+    np.testing.assert_allclose(turned_size, size, rtol=1e-13)
 
 
 def test_a_cell_without_noise_changes_nothing():

@@ -20,9 +20,10 @@ from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.plotting import posteriors
-from tactile_bayes.record import CHANNELS, make_record
+from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
+from tactile_bayes.uncertainty.predictive import predictive_interval
 
 ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)
 STEP = np.radians(4.0)
@@ -160,6 +161,33 @@ def test_lines_of_a_scan_run_from_event_to_event(plain):
     assert set(labels(axes[0])[4:]) == {"first contact", "phase change", "snap-off"}
 
 
+def test_forces_of_a_load_cell_that_turns_are_axial_and_transversal(plain):
+    """Also those of the events, which a scan has in the frame that is fixed."""
+    axes = plotting.observables(in_frame(plain.record, "turning"), events=plain.events)
+    first_lines = [ax.get_ylabel().splitlines()[0] for ax in axes]
+    assert first_lines[0] == plotting.observables(plain.record)[0].get_ylabel().splitlines()[0]
+    assert first_lines[1].startswith("axial force ")
+    assert first_lines[2].startswith("transversal force ")
+    forward = plain.events["forward"]
+    (change,) = forward.transitions
+    for ax, component in zip(axes[1:], (0, 1), strict=True):
+        (tip,) = (line for line in lines_of(ax, "tip") if line.get_linestyle() == "-")
+        expected = turned(change.force_x, change.force_y, change.drive_angle)[component]
+        assert tip.get_ydata()[-1] == pytest.approx(expected, abs=1e-12)
+        markers = [line for line in lines_of(ax, "change") if line.get_marker() == "X"]
+        snap = forward.snap_off
+        expected = turned(snap.force_x, snap.force_y, snap.drive_angle)[component]
+        assert markers[0].get_ydata()[0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_missing_force_is_labelled_in_its_frame(noisy):
+    record = in_frame(noisy, "turning").drop_vars("truth_force_x")
+    record["force_x"] = record["force_x"] * np.nan
+    axes = plotting.observables(record)
+    assert axes[1].texts[0].get_text() == "not measured"
+    assert axes[1].get_ylabel().startswith("axial force ")
+
+
 def test_noise_is_drawn_as_points_over_the_truth(noisy, plain):
     axes = plotting.observables(noisy, events=plain.events)
     for ax, name in zip(axes, CHANNELS, strict=True):
@@ -208,6 +236,18 @@ def test_predicted_interval_is_filled_where_there_is_one(noisy):
     assert "predicted" in labels(axes[0])
     with pytest.raises(ParameterError, match="every sample"):
         plotting.predictive(noisy, predicted.isel(sample=slice(3)))
+
+
+def test_an_interval_goes_with_records_of_its_frame_only(noisy):
+    draws = xr.Dataset({"force_x": (("chain", "draw", "sample"), np.zeros((1, 2, noisy.sizes["sample"])))})
+    tree = xr.DataTree.from_dict({"posterior_predictive": draws})
+    assert "load_cell_frame" not in predictive_interval(tree).attrs
+    tree.attrs["load_cell_frame"] = "turning"
+    interval = predictive_interval(tree)
+    assert interval.attrs["load_cell_frame"] == "turning"
+    assert len(plotting.predictive(in_frame(noisy, "turning"), interval)[1].collections) == 2
+    with pytest.raises(ParameterError, match=r"predicted in the turning frame, .* give in_frame\(record, 'turning'\)"):
+        plotting.predictive(noisy, interval)
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])

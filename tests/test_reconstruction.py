@@ -14,7 +14,7 @@ from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
-from tactile_bayes.record import make_record
+from tactile_bayes.record import in_frame, make_record
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
 
@@ -93,6 +93,24 @@ def test_what_identifies_a_sample_is_kept(swept):
         assert (contacts[name].values == swept[name].values).all()
 
 
+@pytest.mark.parametrize("rod", [None, WIRE])
+def test_forces_may_have_been_measured_in_the_turning_frame(rod):
+    record = scan(Parabola(2.5, 0.1) if rod else CONTOUR, rod=rod, drive_step=0.1).record
+    contacts, turning = reconstruct(record), reconstruct(in_frame(record, "turning"))
+    assert (turning.status == contacts.status).all()
+    for name in NUMBERS:
+        np.testing.assert_allclose(turning[name], contacts[name], rtol=1e-10, atol=1e-12)
+
+
+def test_sweeps_may_be_interleaved(swept):
+    """Two sweeps of as many samples, one after the other or taking turns."""
+    rows = np.concatenate([np.flatnonzero(swept.sweep == number)[:40] for number in (0, 1)])
+    one_by_one = swept.isel(sample=rows)
+    turns = np.arange(80).reshape(2, 40).T.ravel()
+    taking_turns = reconstruct(one_by_one.isel(sample=turns))
+    assert taking_turns.identical(reconstruct(one_by_one).isel(sample=turns))
+
+
 def test_friction_that_is_left_out_turns_the_slope_by_its_angle():
     record = scan(Parabola(0.5, 0.3), friction=0.3, drive_step=0.1).record
     on = record.truth_contact_phase.values != "none"
@@ -150,6 +168,14 @@ def test_a_contact_beyond_the_tip_keeps_its_numbers():
     assert contacts.status.item() == "beyond the tip"
     assert contacts.contact_arclength.item() > 1.0
     assert contacts.contact_x.item() == pytest.approx(1.0)  # the lever m0/f of a vertical force
+
+
+def test_a_load_beyond_all_numbers_has_no_zero_of_curvature():
+    """In SI units it is a number, in those of the rod it is none."""
+    columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2, 1.2], "holding_moment": [1e300, 1e-5]}
+    contacts = reconstruct(make_record({**columns, "force_x": 0.0, "force_y": 1e-3}, rod=Rod(0.1, 1e-12)))
+    assert contacts.status.values[0] == "no zero of curvature"
+    assert_statuses_tell_the_truth(contacts)
 
 
 magnitudes = st.floats(-100, 100).map(lambda power: 10.0**power) | st.just(0.0)

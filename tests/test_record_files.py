@@ -14,6 +14,7 @@ from hypothesis.extra import numpy as hnp
 from helpers.record_tables import WIRE, columns, refused
 from tactile_bayes.record import (
     CHANNELS,
+    FRAMES,
     column_of,
     make_record,
     present_channels,
@@ -60,7 +61,8 @@ def records(draw):
             table[name] = xr.DataArray(np.arange(6.0), dims="sample", attrs={"units": unit, "long_name": long_name})
     attrs = draw(st.dictionaries(names, words | st.floats(allow_nan=False) | st.integers(-(2**63), 2**63 - 1)))
     attrs = {name: value for name, value in attrs.items() if name != "units" and not name.startswith(("rod_", "load_"))}
-    return make_record(table, rod=draw(st.sampled_from([None, WIRE, Rod(0.1, 1e-300)])), attrs=attrs)
+    rod, frame = draw(st.sampled_from([None, WIRE, Rod(0.1, 1e-300)])), draw(st.sampled_from([None, *FRAMES]))
+    return make_record(table, rod=rod, attrs=attrs, load_cell_frame=frame)
 
 
 def awkward_record():

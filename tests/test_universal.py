@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from helpers.exact_rod import mp
 from helpers.legendre import HALF, piece, theta_of
-from tactile_bayes.arc import arc_to
+from tactile_bayes.arc import arc_at, arc_to
 from tactile_bayes.universal import tangential_arcs, tip_arcs
 
 EPS = np.finfo(float).eps
@@ -17,6 +18,26 @@ FRICTION = (0.0, 0.05, 0.3, 0.7)
 def amplitude(theta: float, m: float) -> float:
     """tan χ = cot θ / √(1 − m)."""
     return float(np.arctan2(np.cos(theta), np.sqrt(1 - m) * np.sin(theta)))
+
+
+@pytest.mark.parametrize("m", [1e-9, 0.02, 0.5, 0.82, 0.9])
+def test_arcs_against_legendre(m):
+    """In a hundred digits, on both sides of the amplitude at which quadrature gives way, and up to where maps end."""
+    chi = np.array([1e-6, 0.1, 0.6, 0.999, 1.001, 1.5, HALF, 1.6, 2.2, 3.0, 3.14, 3.2])
+    arc, _ = arc_to(chi, np.full(chi.size, m))
+    c = 2 * mp.sqrt(mp.mpf(m) * (1 - mp.mpf(m)))
+    for i, x in enumerate(map(mp.mpf, chi)):
+        F, s, w = mp.ellipf(x, m), mp.sin(x), mp.sin(x / 2) ** 2
+        D, d = (F - mp.ellipe(x, m)) / m, mp.sqrt(1 - m * s * s)
+        P, Q = F - s / d, 2 * w * s / d - D
+        exact = F, 2 * m * (P - (1 - 2 * mp.mpf(m)) * Q), c * (P + 2 * m * Q), 2 * mp.atan2(c * w, 1 - 2 * m * w)
+        for name, value in zip(arc._fields, map(float, exact), strict=True):
+            # What a closed form loses is less than rounding of the length.
+            atol = 16 * EPS * (arc.length[i] if chi[i] > 1.0 else abs(value))
+            assert abs(getattr(arc, name)[i] - value) <= atol, (name, chi[i])
+    told = arc_at(np.sin(chi[:-1]), np.cos(chi[:-1]), np.full(chi.size - 1, m))
+    for values, by_sine in zip(arc, told, strict=True):
+        np.testing.assert_allclose(by_sine, values[:-1], rtol=0, atol=32 * EPS)
 
 
 @pytest.mark.parametrize("delta", FRICTION)

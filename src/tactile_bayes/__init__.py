@@ -26,6 +26,7 @@ _HOMES = {
     "contour_band": "uncertainty.band",
     "equilibria": "scanning",
     "gap": "uncertainty.gap",
+    "in_frame": "record",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
     "make_record": "record",
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.result import write_result as write_result
     from tactile_bayes.load_cell import LoadCell as LoadCell
     from tactile_bayes.reconstruction import reconstruct as reconstruct
+    from tactile_bayes.record import in_frame as in_frame
     from tactile_bayes.record import make_record as make_record
     from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record

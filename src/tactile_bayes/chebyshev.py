@@ -49,8 +49,10 @@ def polynomials(count: int, z: Floats) -> Floats:
     out[0] = 1.0
     if count > 1:
         out[1] = x
+    twice = 2.0 * x
     for k in range(2, count):
-        out[k] = 2.0 * x * out[k - 1] - out[k - 2]
+        np.multiply(twice, out[k - 1], out=out[k, ...])
+        out[k] -= out[k - 2]
     return np.moveaxis(out, 0, -1)
 
 

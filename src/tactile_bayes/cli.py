@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperGroup
@@ -96,6 +96,10 @@ def infer(
     missing: Annotated[
         list[str] | None, typer.Option(help="Channel without a column, like force_x; give it again for another.")
     ] = None,
+    load_cell_frame: Annotated[
+        Literal["fixed", "turning"] | None,
+        typer.Option(help="Axes of the forces, if the file does not say: the world's, or turning with the drive."),
+    ] = None,
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)] = 0.0,
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
@@ -115,7 +119,7 @@ def infer(
     if diameter and length is None:
         raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
     rod = None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
-    measured = read_record(record, rod=rod, missing=missing or ())
+    measured = read_record(record, rod=rod, missing=missing or (), load_cell_frame=load_cell_frame)
     cell = None
     if force_noise is not None or moment_noise is not None:
         cell = LoadCell(force_noise=force_noise or 0.0, moment_noise=moment_noise or 0.0)

@@ -11,18 +11,20 @@ All contacts are forward ones (holding moment ≥ 0); `side=-1` mirrors a backwa
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.arc import Arc, ArcSlopes, arc_and_slopes, arc_to, chord_angle, slack, slack_slope
+from tactile_bayes.arc import SHORT_COSINE, Arc, ArcSlopes, arc_and_slopes, arc_at, chord_angle, slack, slack_slope
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.universal import tangential_arcs, tangential_numbers, tip_arcs, tip_numbers
 
 __all__ = [
     "MAX_FRICTION_ANGLE",
     "NONE",
+    "PHASE_NAMES",
     "TANGENTIAL",
     "TIP",
     "Contact",
@@ -36,12 +38,19 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+Result = TypeVar("Result", bound=tuple[NDArray[Any], ...])
 
 NONE, TIP, TANGENTIAL = 0, 1, 2
 """Codes of the contact phase: no contact, Phase A (the tip touches), Phase B (the rod touches tangentially)."""
 
+PHASE_NAMES = ("none", "tip", "tangential")
+"""Words for the contact phases, by code."""
+
 MAX_FRICTION_ANGLE = 0.7
 """Largest friction angle δ [rad]: 2 E(m) > K(m) must hold for m = (1 + sin δ)/2, else the map of Phase B folds."""
+
+_BLOCK = 16384
+"""States worked on at a time, so that intermediate results stay in the processor's cache."""
 
 
 class Wrench(NamedTuple):
@@ -95,6 +104,15 @@ def _refuse_friction(friction_angle: Floats) -> None:
         )
 
 
+def _in_blocks(work: Callable[..., Result], make: type[Result], *given: NDArray[Any]) -> Result:
+    """What `work` makes of arguments that broadcast, given to it flat and a block at a time."""
+    columns = np.broadcast_arrays(*given)
+    shape, flat = columns[0].shape, [column.reshape(-1) for column in columns]
+    begins = range(0, max(flat[0].size, 1), _BLOCK)
+    blocks = [work(*(column[begin : begin + _BLOCK] for column in flat)) for begin in begins]
+    return make(*(np.concatenate(parts).reshape(shape) for parts in zip(*blocks, strict=True)))
+
+
 class _Touch(NamedTuple):
     """Tangential contact at points of a contour, however long the rod."""
 
@@ -112,7 +130,7 @@ def _touch(x: Floats, y: Floats, alpha: Floats, delta: Floats, wanted: NDArray[n
     along, across = x * cos + y * sin, y * cos - x * sin
     angle, limit = np.arctan2(across, along), 0.5 * np.pi + delta
     with np.errstate(invalid="ignore"):
-        index = np.flatnonzero((across >= 0.0) & (angle <= limit + 1e-12) & (np.abs(alpha) <= 0.5 * np.pi))
+        index = np.flatnonzero(wanted & (across >= 0.0) & (angle <= limit + 1e-12) & (np.abs(alpha) <= 0.5 * np.pi))
     angle, limit = angle[index], limit[index]
     m = 0.5 * (1.0 + np.sin(delta[index]))
     chi, arc, by_chi = tangential_arcs(np.minimum(angle, limit), m)
@@ -180,16 +198,17 @@ def wrench_from_contact(
     >>> w.phase, w.drive_angle.round(6)
     (array([1, 2], dtype=int8), array([2.901776, 2.923367]))
     """
-    x, y, alpha, delta, sign = np.broadcast_arrays(
-        *(np.asarray(a, dtype=float) for a in (contact_x, contact_y, slope_angle, friction_angle, side))
-    )
-    _refuse_friction(delta)
-    shape = x.shape
-    x, alpha = (sign * x).ravel(), (sign * alpha).ravel()
-    y, delta, sign = y.ravel(), delta.ravel(), sign.ravel()
+    given = [np.asarray(a, dtype=float) for a in (contact_x, contact_y, slope_angle, friction_angle, side)]
+    _refuse_friction(given[3])
+    return _in_blocks(_wrench, Wrench, *given, *(() if phase is None else (np.asarray(phase),)))
 
-    known = None if phase is None else np.broadcast_to(np.asarray(phase), shape).ravel()
+
+def _wrench(
+    x: Floats, y: Floats, alpha: Floats, delta: Floats, sign: Floats, known: NDArray[Any] | None = None
+) -> Wrench:
+    x, alpha = sign * x, sign * alpha
     beta = alpha + delta
+    sin_beta, cos_beta = np.sin(beta), np.cos(beta)
 
     touch = _touch(x, y, alpha, delta, True if known is None else known == TANGENTIAL)
     lies = touch.length <= 1.0 if known is None else np.ones(touch.where.size, dtype=bool)
@@ -209,11 +228,11 @@ def wrench_from_contact(
 
     drive_angle = tip_angle + turn
     mirrored = sign < 0
-    wrench = Wrench(
+    return Wrench(
         drive_angle=np.where(mirrored, np.pi - drive_angle, drive_angle),
-        holding_moment=sign * force * (x * np.cos(beta) + y * np.sin(beta)),
-        force_x=-sign * force * np.sin(beta),
-        force_y=force * np.cos(beta),
+        holding_moment=sign * force * (x * cos_beta + y * sin_beta),
+        force_x=-sign * force * sin_beta,
+        force_y=force * cos_beta,
         contact_arclength=arclength,
         tip_angle=np.where(mirrored, np.pi - tip_angle, tip_angle),
         phase=found,
@@ -221,7 +240,6 @@ def wrench_from_contact(
         by_distance=sign * by_distance,
         tangential_arclength=tangential_arclength,
     )
-    return Wrench(**{name: column.reshape(shape) for name, column in wrench._asdict().items()})
 
 
 def _lying(touch: _Touch, alpha: Floats) -> Floats:
@@ -343,50 +361,46 @@ def contact_from_wrench(
     moment = np.asarray(holding_moment, dtype=float)
     if side is None:
         side = np.where(moment < 0.0, -1.0, 1.0)
-    phi0, moment, fx, fy, delta, sign = np.broadcast_arrays(
-        *(np.asarray(a, dtype=float) for a in (drive_angle, moment, force_x, force_y, friction_angle, side))
-    )
+    delta = np.asarray(friction_angle, dtype=float)
     _refuse_friction(delta)
-    shape = phi0.shape
-    phi0, moment, fx, fy, delta, sign = (a.ravel() for a in (phi0, moment, fx, fy, delta, sign))
-    mirrored = sign < 0
+    given = (drive_angle, moment, force_x, force_y, delta, side)
+    return _in_blocks(_contact, Contact, *(np.asarray(a, dtype=float) for a in given))
+
+
+def _contact(phi0: Floats, moment: Floats, fx: Floats, fy: Floats, delta: Floats, sign: Floats) -> Contact:
+    mirrored = sign < 0.0
     phi0 = np.where(mirrored, np.pi - phi0, phi0)
     moment, fx = sign * moment, sign * fx
-
-    force = np.hypot(fx, fy)
-    beta = np.arctan2(-fx, fy)
-    psi0 = phi0 - beta
-    psi0 = psi0 - 2.0 * np.pi * np.floor((psi0 + 0.5 * np.pi) / (2.0 * np.pi))
-    a, a_cos = np.sin(0.25 * np.pi - 0.5 * psi0), np.sin(0.25 * np.pi + 0.5 * psi0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        b = 0.5 * moment / np.sqrt(force)
-        modulus = a * a + b * b
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        force = np.sqrt(fx * fx + fy * fy)
+        root = np.sqrt(force)
+        beta = np.arctan2(-fx, fy)
+        psi0 = phi0 - beta
+        quarter = 0.25 * np.pi - 0.5 * (psi0 - 2.0 * np.pi * np.floor((psi0 + 0.5 * np.pi) / (2.0 * np.pi)))
+        a, a_cos, b = np.sin(quarter), np.cos(quarter), 0.5 * moment / root
+        modulus = np.where(force > 0.0, a * a + b * b, np.nan)
         complement = (a_cos - b) * (a_cos + b)
-        usable = (force > 0.0) & (complement > 0.0) & (moment >= 0.0)
-        chi = np.where(usable, np.arctan2(b, a * np.sqrt(np.where(usable, complement, 1.0))), np.nan)
-        usable &= chi > 0.0  # a force without moment passes through the pivot of a straight rod: it may be anywhere
-        arc, _ = arc_to(np.where(usable, chi, np.nan), np.where(usable, modulus, 0.5))
-        arclength = arc.length / np.sqrt(force)
-        shortfall, offset = arclength * (arc.shortfall / arc.length), arclength * (arc.offset / arc.length)
-        turn = arc.turn
-    tip_angle = np.where(usable, phi0 - turn, np.nan)
-    sin_t, cos_t = np.sin(tip_angle), np.cos(tip_angle)
-    x = (arclength - shortfall) * cos_t - offset * sin_t
-    y = (arclength - shortfall) * sin_t + offset * cos_t
-    # In a rod bent far round, m0 = f u keeps more digits; the rest of the contact lies along the force.
-    bent = chi > 1.0
-    if np.any(bent):
-        psi1 = (psi0 - turn)[bent]
-        u = moment[bent] / force[bent]
-        v = (arclength - shortfall)[bent] * np.sin(psi1) + offset[bent] * np.cos(psi1)
-        sin_b, cos_b = np.sin(beta[bent]), np.cos(beta[bent])
-        x[bent], y[bent] = u * cos_b - v * sin_b, u * sin_b + v * cos_b
-    contact = Contact(
+        # A force without moment passes through the pivot of a straight rod: it may be anywhere.
+        usable = (complement > 0.0) & (modulus > 0.0) & ((b > 0.0) | ((b == 0.0) & (a < 0.0))) & (force < np.inf)
+
+        # θ0 = atan2(a, b) is linked to χ by tan χ = cot θ0 / √(1 − m).
+        width = a_cos * np.sqrt(np.where(usable, modulus, np.nan))
+        sin_chi, cos_chi = b / width, a * np.sqrt(complement) / width
+        arc = arc_at(sin_chi, cos_chi, modulus)
+        arclength, along, across = arc.length / root, (arc.length - arc.shortfall) / root, arc.offset / root
+        tip_angle = phi0 - arc.turn
+        cos, sin = np.cos(tip_angle), np.sin(tip_angle)
+        # In a rod bent far round, m0 = f u keeps more digits; the rest of the contact lies along the force.
+        bent = cos_chi < SHORT_COSINE
+        sin_psi1, cos_psi1 = 1.0 - 2.0 * modulus, 2.0 * np.sqrt(modulus) * np.sqrt(complement)
+        u, v = moment / force, along * sin_psi1 + across * cos_psi1
+        x = np.where(bent, (u * fy + v * fx) / force, along * cos - across * sin)
+        y = np.where(bent, (v * fy - u * fx) / force, along * sin + across * cos)
+    return Contact(
         sign * x,
         y,
         sign * np.where(usable, beta - delta, np.nan),
         arclength,
         np.where(mirrored, np.pi - tip_angle, tip_angle),
-        np.where(force > 0.0, modulus, np.nan),
+        modulus,
     )
-    return Contact(*(column.reshape(shape) for column in contact))

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.record import CHANNELS, column_of, present_channels, validate
+from tactile_bayes.record import CHANNELS, column_of, frame_of, present_channels, validate
 from tactile_bayes.rod import Rod
 
 __all__ = ["LoadCell", "rough_noise"]
@@ -29,9 +29,9 @@ class LoadCell:
     ----------
     force_noise : float
         Standard deviation of the noise on force_x and force_y, in the unit of the record that the cell is used
-        on [N, or EI/L²]. What a data sheet calls force resolution or noise floor at the sampling rate; a good
-        six-axis cell has some mN, where a rod of 0.1 m and 1e-5 N m² has EI/L² = 1 mN, so soft rods need
-        cells for µN. If bands come out too narrow, it is too small. Default 0, an ideal sensor.
+        on [N, or EI/L²]; the same in either frame. What a data sheet calls force resolution or noise floor at the
+        sampling rate; a good six-axis cell has some mN, where a rod of 0.1 m and 1e-5 N m² has EI/L² = 1 mN, so soft
+        rods need cells for µN. If bands come out too narrow, it is too small. Default 0, an ideal sensor.
     moment_noise : float
         Standard deviation of the noise on the holding moment [N m, or EI/L]. Typically 0.001 to 0.05 of EI/L for a
         cell that suits the rod. Default 0.
@@ -114,6 +114,8 @@ class LoadCell:
     def measure(self, record: xr.Dataset, *, seed: int | np.random.Generator) -> xr.Dataset:
         """The record as this load cell gives it: with noise on every channel that is present.
 
+        For a load cell that turns with the drive, give the record in that frame: `in_frame(record, "turning")`.
+
         Parameters
         ----------
         record : xr.Dataset
@@ -153,7 +155,7 @@ class LoadCell:
             ideal = measured[channel]
             truth = column_of(f"truth_{channel}")
             if truth is not None and truth.name not in measured:
-                attrs = {"units": ideal.attrs["units"], "long_name": truth.long_name}
+                attrs = {"units": ideal.attrs["units"], "long_name": truth.long_name_in(frame_of(measured))}
                 measured[truth.name] = ("sample", ideal.values.copy(), attrs)
             noisy = ideal.values + self.standard_deviations[channel] * noise[:, index]
             measured[channel] = ("sample", noisy, ideal.attrs)
@@ -174,7 +176,8 @@ class LoadCell:
         measured : array, shape (n_samples, 3)
             Channels in the order of `CHANNELS`, in the units of the load cell. A missing channel is NaN throughout.
         predicted : array, shape (..., n_samples, 3)
-            What an ideal sensor would have given. Missing channels are ignored; NaN elsewhere gives NaN.
+            What an ideal sensor would have given, in the same frame. Missing channels are ignored; NaN elsewhere gives
+            NaN.
         noise_scale : array, broadcastable to shape (..., 3)
             Factor on the standard deviation of each channel, positive; for a cell that is noisier than its data sheet.
         pointwise : bool

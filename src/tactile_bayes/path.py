@@ -21,7 +21,16 @@ from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.elastica import TANGENTIAL, TIP, QuickWrench, Wrench, quick_wrench, wrench_from_contact
 from tactile_bayes.reach import CLEARANCE, Reach, limits, seen_frame
 from tactile_bayes.roots import falling_root
-from tactile_bayes.segments import Segments, cut_path, first_of_lane, last_of_lane, polish_changes
+from tactile_bayes.segments import (
+    BRIEF,
+    Segments,
+    cut_path,
+    first_of_lane,
+    last_of_lane,
+    polish_changes,
+    resolved,
+    whole,
+)
 
 __all__ = ["CHANNELS", "CLEARANCE", "Paths", "Reach", "SnapOff", "States", "trace"]
 
@@ -30,12 +39,11 @@ Index = NDArray[np.intp]
 
 CHANNELS = ("holding_moment", "force_x", "force_y")
 
+_RESOLVED, _ROUGHLY_RESOLVED = 1e-8, 1e-3
+"""Share of the change of the drive angle on a segment by which an interpolant may miss it."""
+
 _LAST_STEP = 1e-6
 """Newton step on an interpolant, as a share of the segment, whose square is below the interpolation's error."""
-
-_BRIEF = 1e-6
-"""Stretch of tip contact after its onset, in the contour's parameter, so short that the slope of the drive angle would
-be lost in rounding; it rises there."""
 
 
 class SnapOff(IntEnum):
@@ -124,11 +132,22 @@ class Paths:
         way = chebyshev.evaluate(self.coefficients[:, 0, segment], self._turn(segment, angles[sample]))
         parameter = np.full(angles.size, np.nan)
         parameter[sample] = self._polish(segment, way, angles[sample])
-        return self.states_at(lane, parameter)
+        states = self.states_at(lane, parameter)
+        # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
+        rest = self._interpolated(segment, angles[sample])
+        rest -= self._interpolated(segment, states.wrench.drive_angle[sample])
+        columns = {name: getattr(states.wrench, name).copy() for name in CHANNELS}
+        for column, change in zip(columns.values(), rest, strict=True):
+            column[sample] += change
+        return states._replace(wrench=states.wrench._replace(**columns))
 
     def states_at(self, lane: Index, parameter: Floats) -> States:
         """Exact states at the contour's parameters, whether on the path or beyond its end."""
         return _states(self.seen, lane, parameter, self.friction_angle)
+
+    def _interpolated(self, segment: Index, angle: Floats) -> Floats:
+        """Loads at drive angles, shape (3, n)."""
+        return chebyshev.evaluate(self.coefficients[:, 1:, segment], self._turn(segment, angle))
 
     def _loaded(self, angles: Floats) -> tuple[Index, Index]:
         """Pairs of segment and sample such that the sample's angle, shape (lanes, k), lies in the segment."""
@@ -152,14 +171,18 @@ class Paths:
         chosen = self.segments.take(segment)
         begin, end, steady = self.begin_angle[segment], self.end_angle[segment], self.steadiness[segment]
         target = self._turn(segment, angle)
-        way = np.clip(way, 0.0, 1.0)
-        for _ in range(3):
+        way = 1.0 - np.abs(1.0 - np.maximum(way, 0.0))  # beyond a fold the drive angle is less again
+        pace = chebyshev.evaluate(chebyshev.derivative(self.coefficients[:, 0, segment]), target)
+        for _ in range(4):
             parameter, parameter_rate = chosen.along(way)
             state = self.states_at(chosen.lane, parameter)
             turn = self._turn(segment, state.wrench.drive_angle)
             with np.errstate(divide="ignore", invalid="ignore"):
                 rate = _angle_rate(self.seen, chosen.lane, state) * parameter_rate / (end - begin)
-                step = (turn - target) * (steady + 2.0 * (1.0 - steady) * (1.0 - turn)) / rate
+                newton = (steady + 2.0 * (1.0 - steady) * (1.0 - turn)) / rate
+                # Much nearer to the end than the goal is, the rate may be zero or rounding: the interpolant's serves.
+                sound = (1.0 - turn > 0.5 * (1.0 - target)) & (newton > 0.0)
+                step = (turn - target) * np.where(sound, newton, pace)
             way = np.clip(np.where(np.isfinite(step), way - step, way), 0.0, 1.0)
         return chosen.along(way)[0]
 
@@ -179,17 +202,23 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
         good as the interpolation, which is what a likelihood needs and several times faster.
     """
     bounds = limits(seen, friction_angle)
-    segments = cut_path(seen, bounds, friction_angle, order)
+    tolerance = _RESOLVED if exact_events else _ROUGHLY_RESOLVED
+    segments = cut_path(seen, bounds, friction_angle, order, tolerance)
     if exact_events:
         segments = polish_changes(seen, segments, friction_angle)
 
     # Over the way along the contour: drive angle and its first maximum.
-    ways = np.broadcast_to(chebyshev.nodes(order), (segments.lane.size, order))
-    sampled = _sample(seen, segments, ways, friction_angle, exact_events)
-    angle = chebyshev.coefficients(sampled.drive_angle)
+    def sample(some: Segments, ways: Floats) -> Floats:
+        return _sample(seen, some, ways, friction_angle, exact_events)
+
+    segments, series = resolved(segments, sample, order, tolerance)
+    angle = series[..., 0]
     keep, stop, kind = _first_maximum(segments, angle)
-    loads = [chebyshev.coefficients(getattr(sampled, name))[:, keep] for name in CHANNELS]
-    segments, angle = segments.take(keep), angle[:, keep]
+    runs_out = bounds.runs_out[segments.lane[keep]] & (kind == SnapOff.THRUST)
+    bounds.reach[segments.lane[keep][runs_out]] = Reach.RUNS_OUT
+    there = bounds.reach[segments.lane[keep]] == Reach.TOUCHES
+    keep, stop, kind = keep[there], stop[there], kind[there]
+    segments, angle, loads = segments.take(keep), angle[:, keep], series[:, keep, 1:]
     folds = kind == SnapOff.FOLD
     if exact_events:
         stop = np.where(folds, _polish_fold(seen, segments, angle, stop, friction_angle), stop)
@@ -209,7 +238,9 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     ahead, steady = 1.0 - node, steadiness[:, None]
     wanted = end_angle[:, None] - (end_angle - begin_angle)[:, None] * ahead * (steady + (1.0 - steady) * ahead)
     way = _invert(angle, stop, wanted)
-    curves = np.concatenate([way[..., None], chebyshev.polynomials(order, way) @ np.stack(loads).T], axis=-1)
+    segments = segments._replace(end=end_parameter)
+    share = way / stop[:, None]
+    curves = np.concatenate([share[..., None], chebyshev.polynomials(order, way) @ loads.swapaxes(0, 1)], axis=-1)
 
     def per_lane(values: Floats, of: NDArray[np.bool_]) -> Floats:
         out = np.full(seen.lanes, np.nan)
@@ -249,17 +280,18 @@ def _states(
     return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
 
 
-def _sample(
-    seen: SeenContour, segments: Segments, ways: Floats, friction_angle: float, exactly: bool
-) -> Wrench | QuickWrench:
-    """Wrenches at ways, shape (segments, k), along the segments."""
+def _sample(seen: SeenContour, segments: Segments, ways: Floats, friction_angle: float, exactly: bool) -> Floats:
+    """Drive angle, holding moment and forces, shape (segments, 4, k), at ways, shape (segments, k)."""
     parameter, _ = segments.take(np.s_[:, None]).along(ways)
     lane, tip = segments.lane[:, None], segments.tip[:, None]
+    wrench: Wrench | QuickWrench
     if exactly or friction_angle:
         phase = np.where(tip, TIP, TANGENTIAL)
-        return _states(seen, lane, parameter, friction_angle, phase=phase).wrench
-    locus = seen.locate(lane, parameter)
-    return quick_wrench(locus.x, locus.y, locus.slope_angle, tip)
+        wrench = _states(seen, lane, parameter, friction_angle, phase=phase).wrench
+    else:
+        locus = seen.locate(lane, parameter)
+        wrench = quick_wrench(locus.x, locus.y, locus.slope_angle, tip)
+    return np.stack([wrench.drive_angle, *(getattr(wrench, name) for name in CHANNELS)], axis=1)
 
 
 def _angle_rate(seen: SeenContour, lane: Index, state: States) -> Floats:
@@ -279,7 +311,8 @@ def _first_maximum(segments: Segments, angle: Floats) -> tuple[Index, Floats, ND
     grid = np.linspace(0.0, 1.0, 2 * angle.shape[0] + 1)
     falls = chebyshev.tabulate(slope, grid) <= 0.0
     falls[first_of_lane(segments.lane), 0] = False  # it always rises from first contact
-    falls[segments.rooted & ~last_of_lane(segments.lane) & (segments.begin - segments.end < _BRIEF)] = False
+    begin, end = whole(segments)
+    falls[(begin - segments.end < BRIEF * (begin - end)) & ~last_of_lane(segments.lane)] = False  # lost in rounding
     any_fall, cell = falls.any(axis=1), falls.argmax(axis=1)
     fold = any_fall & (cell > 0)
     before: Index = np.cumsum(any_fall) - any_fall
@@ -296,9 +329,8 @@ def _first_maximum(segments: Segments, angle: Floats) -> tuple[Index, Floats, ND
     stop = np.ones(keep.size)
     stop[kept_fold] = falling_root(rate, grid[cell[at] - 1], grid[cell[at]])
     kind = np.full(keep.size, SnapOff.NEVER, dtype=np.int8)
-    last = last_of_lane(segments.lane[keep])
-    whole = last_of_lane(segments.lane)[keep]
-    kind[last] = np.where(whole, SnapOff.THRUST, SnapOff.CORNER)[last]
+    ends = last_of_lane(segments.lane[keep])
+    kind[ends] = np.where(last_of_lane(segments.lane)[keep], SnapOff.THRUST, SnapOff.CORNER)[ends]
     kind[kept_fold] = SnapOff.FOLD
     return keep, stop, kind
 

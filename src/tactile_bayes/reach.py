@@ -32,9 +32,11 @@ class Reach(IntEnum):
     CUTS_PIVOT = 2
     """The pivot is not below the contour."""
     ENDS = 3
-    """The rod would first touch beyond an end of the contour."""
+    """The rod would first touch beyond the end of the contour that it comes from."""
     TOO_CLOSE = 4
     """The pivot is nearer to the contour than `CLEARANCE`."""
+    RUNS_OUT = 5
+    """The rod would still touch at the other end of the contour."""
 
 
 class Limits(NamedTuple):
@@ -46,9 +48,11 @@ class Limits(NamedTuple):
     begin: Floats
     """First contact."""
     end: Floats
-    """Where the line of force passes through the pivot."""
+    """Where the line of force passes through the pivot, or the rod's length is used up again, or the contour ends."""
     tip_first: NDArray[np.bool_]
     """Whether the tip touches first, or a tangent line from the pivot."""
+    runs_out: NDArray[np.bool_]
+    """Whether it is the contour that ends."""
 
 
 def seen_frame(locus: Locus) -> tuple[Floats, Floats]:
@@ -62,45 +66,56 @@ def limits(seen: SeenContour, friction_angle: float) -> Limits:
     lanes = np.arange(seen.lanes)
     lo, hi = seen.domain()
 
-    def thrust(tilt: float) -> Callable[[Index, Floats], tuple[Floats, Floats]]:
-        """Lever arm of a force that is turned by `tilt` from the normal."""
-        cos, sin = np.cos(tilt), np.sin(tilt)
-
-        def lever(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
-            locus = seen.locate(lane, parameter)
-            along, facing = seen_frame(locus)
-            along_rate = locus.arclength_rate + facing * locus.slope_rate
-            return cos * along + sin * facing, cos * along_rate - sin * along * locus.slope_rate
-
-        return lever
-
-    def facing_root(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
+    def lever(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
         locus = seen.locate(lane, parameter)
         along, facing = seen_frame(locus)
-        return facing, -along * locus.slope_rate
+        return along, locus.arclength_rate + facing * locus.slope_rate
 
-    def within_root(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
+    def turned_less_than(limit: float) -> Callable[[Index, Floats], tuple[Floats, Floats]]:
+        """How much less than `limit` the line from the pivot is turned from the contour's direction.
+
+        The farther to the left the more it is turned, as long as the contour faces the pivot.
+        """
+
+        def remaining(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
+            locus = seen.locate(lane, parameter)
+            _, facing = seen_frame(locus)
+            bearing = np.arctan2(-locus.x, locus.y) + 0.5 * np.pi  # it jumps below the pivot, where no contour is
+            rate = facing * locus.arclength_rate / (locus.x**2 + locus.y**2) + locus.slope_rate
+            return limit - (bearing - locus.slope_angle), rate
+
+        return remaining
+
+    def within(lane: Index, parameter: Floats) -> tuple[Floats, Floats]:
         locus = seen.locate(lane, parameter)
         along, _ = seen_frame(locus)
         return 1.0 - locus.x**2 - locus.y**2, -2.0 * along * locus.arclength_rate
 
-    lever = thrust(0.0)
-    straddles = (lever(lanes, hi)[0] > 0.0) & (lever(lanes, lo)[0] < 0.0)
-    ends = np.where(lever(lanes, hi)[0] > 0.0, lo, hi)
-    nearest = np.where(straddles, falling_root(lever, np.where(straddles, hi, lo), lo), ends)
+    right_of_hi, left_of_lo = lever(lanes, hi)[0] <= 0.0, lever(lanes, lo)[0] >= 0.0
+    nearest = falling_root(lever, hi, lo)
+    nearest = np.where(right_of_hi, hi, np.where(left_of_lo, lo, nearest))
     locus = seen.locate(lanes, nearest)
     distance, below = np.hypot(locus.x, locus.y), seen_frame(locus)[1] > 0.0
 
-    end = falling_root(thrust(friction_angle), hi, nearest) if friction_angle else nearest
-    tangent = falling_root(facing_root, end, hi)
-    at_hi, at_tangent, at_end = (seen.locate(lanes, p) for p in (hi, tangent, end))
+    tangent = falling_root(turned_less_than(0.0), hi, nearest)
+    at_hi, at_tangent = seen.locate(lanes, hi), seen.locate(lanes, tangent)
     tip_first = np.hypot(at_tangent.x, at_tangent.y) > 1.0
-    begin = np.where(tip_first, falling_root(within_root, end, tangent), tangent)
-    open_end = (seen_frame(at_hi)[1] > 0.0) & (np.hypot(at_hi.x, at_hi.y) <= 1.0)
+    begin = np.where(tip_first, falling_root(within, nearest, tangent), tangent)
+
+    # A force that friction turns passes through the pivot only beyond the nearest point, if not out of reach.
+    end = nearest
+    if friction_angle:
+        thrust = turned_less_than(0.5 * np.pi + friction_angle)
+        end = np.where(thrust(lanes, lo)[0] >= 0.0, lo, falling_root(thrust, nearest, lo))
+        at_end = seen.locate(lanes, end)
+        out = np.hypot(at_end.x, at_end.y) > 1.0
+        end = np.where(out, falling_root(within, nearest, end), end)
 
     reach = np.full(seen.lanes, Reach.TOUCHES, dtype=np.int8)
-    reach[~straddles | open_end] = Reach.ENDS
-    reach[(distance >= 1.0) | (np.hypot(at_end.x, at_end.y) >= 1.0)] = Reach.TOO_FAR
+    open_end = (seen_frame(at_hi)[1] > 0.0) & (np.hypot(at_hi.x, at_hi.y) <= 1.0)
+    reach[right_of_hi | open_end] = Reach.ENDS
+    reach[distance >= 1.0] = Reach.TOO_FAR
     reach[distance < CLEARANCE] = Reach.TOO_CLOSE
     reach[~below] = Reach.CUTS_PIVOT
-    return Limits(reach, distance, begin, end, tip_first)
+    reach[~below & left_of_lo & ~right_of_hi] = Reach.RUNS_OUT
+    return Limits(reach, distance, begin, end, tip_first, end == lo)

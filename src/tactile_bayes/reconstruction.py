@@ -7,20 +7,20 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
-from tactile_bayes.elastica import Contact, contact_from_wrench
+from tactile_bayes.elastica import PHASE_NAMES, TANGENTIAL, TIP, Contact, contact_from_wrench
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell, rough_noise
-from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, rod_of, to_dimensionless, validate
+from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, in_frame, present_channels, rod_of, validate
 from tactile_bayes.rod import Rod
 
 __all__ = ["FALSE_ALARM", "STATUSES", "contact_sides", "loaded_samples", "reconstruct", "with_rod"]
 
 Floats = NDArray[np.float64]
 
-STATUSES = ("ok", "no contact", "no zero of curvature", "beyond the tip")
-"""What can become of a sample."""
+STATUSES = ("no contact", "no zero of curvature", "ok", "beyond the tip")
+"""What can become of a sample: load, a contact, and one beyond the tip take it a step further each."""
 
 FALSE_ALARM = 1e-3
 """Share of unloaded samples that noise makes look loaded."""
@@ -99,30 +99,39 @@ def reconstruct(
             f"Step 2 needs all of {', '.join(CHANNELS)}, and {', '.join(absent)} was not measured: infer_contour works "
             "without"
         )
-    record = to_dimensionless(measured)
+    if frame_of(measured) == "turning":
+        measured = in_frame(measured, "fixed")
     rod = rod_of(measured)
+
+    def unit(name: str) -> float:
+        scale = COLUMNS[name].scale
+        return getattr(rod, scale) if scale else 1.0
+
     loaded = loaded_samples(measured, load_cell)
-    side = contact_sides(record)
-    moment, force_x, force_y = (np.where(loaded, record[name].values, 0.0) for name in CHANNELS)
-    contact = contact_from_wrench(record.drive_angle.values, moment, force_x, force_y, np.arctan(friction), side=side)
+    with np.errstate(over="ignore"):  # a load beyond all numbers has no zero of curvature
+        moment, force_x, force_y = (np.where(loaded, measured[name].values, 0.0) / unit(name) for name in CHANNELS)
+    angle, side = measured.drive_angle.values, contact_sides(measured)
+    contact = contact_from_wrench(angle, moment, force_x, force_y, np.arctan(friction), side=side)
     status, phase = _status(contact, loaded)
-    usable = np.isin(status, ("ok", "beyond the tip"))
-    standoff = 0.5 * rod.diameter / rod.length_unit
+    x, y = contact.contact_x * rod.length_unit, contact.contact_y * rod.length_unit
+    if rod.diameter:
+        x -= 0.5 * rod.diameter * np.sin(contact.slope_angle)
+        y += 0.5 * rod.diameter * np.cos(contact.slope_angle)
     columns = {
-        "contact_x": record.base_x.values + contact.contact_x - standoff * np.sin(contact.slope_angle),
-        "contact_y": record.base_y.values + contact.contact_y + standoff * np.cos(contact.slope_angle),
-        "contact_arclength": contact.contact_arclength,
+        "contact_x": measured.base_x.values + x,
+        "contact_y": measured.base_y.values + y,
+        "contact_arclength": contact.contact_arclength * rod.length_unit,
         "slope_angle": contact.slope_angle,
     }
-    out = measured[list(_KEPT)].drop_attrs(deep=False)
-    for name, values in columns.items():
-        column = COLUMNS[name]
-        scale = getattr(rod, column.scale) if column.scale else 1.0
-        attrs = {"units": column.unit_in(measured.attrs["units"]), "long_name": column.long_name}
-        out[name] = ("sample", np.where(usable, values * scale, np.nan), attrs)
-    out["contact_phase"] = ("sample", phase, {"units": "1", "long_name": "phase of the contact"})
-    out["status"] = ("sample", status, {"units": "1", "long_name": "what became of the sample"})
-    return out.assign_attrs(method=method, friction=friction, units=measured.attrs["units"])
+    units = measured.attrs["units"]
+    variables = {
+        name: ("sample", values, {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name})
+        for name, values in columns.items()
+    }
+    variables["contact_phase"] = ("sample", phase, {"units": "1", "long_name": "phase of the contact"})
+    variables["status"] = ("sample", status, {"units": "1", "long_name": "what became of the sample"})
+    kept = measured[list(_KEPT)].drop_attrs(deep=False)
+    return kept.assign(variables).assign_attrs(method=method, friction=friction, units=units)
 
 
 def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> NDArray[np.bool_]:
@@ -149,7 +158,7 @@ def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> N
             noisy += 1
         else:
             loaded |= measured[name].values != 0.0
-    return loaded | (surprise > chi2.isf(FALSE_ALARM, noisy)) if noisy else loaded
+    return loaded | (surprise > chdtri(noisy, FALSE_ALARM)) if noisy else loaded
 
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
@@ -169,12 +178,16 @@ def contact_sides(record: xr.Dataset) -> Floats:
     It is the sign of a sweep's total holding moment, so that a drive may also turn back in contact; the direction of
     the drive decides where the moment is missing, or sums to no more than six standard errors of its noise.
     """
-    side = np.where(record.direction.values == "backward", -1.0, 1.0)
-    for sweep in np.unique(record.sweep.values):
-        chosen = record.sweep.values == sweep
-        moment = record.holding_moment.values[chosen]
-        if abs(moment.sum()) > 6.0 * rough_noise(moment) * np.sqrt(moment.size):
-            side[chosen] = np.sign(moment.sum())
+    sweep, moment = record.sweep.values, record.holding_moment.values
+    side = np.empty(sweep.size)
+    order = np.argsort(sweep, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1):
+        of_sweep = moment[rows]
+        total = of_sweep.sum()
+        if abs(total) > 6.0 * rough_noise(of_sweep) * np.sqrt(rows.size):
+            side[rows] = np.sign(total)
+        else:
+            side[rows] = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
     return side
 
 
@@ -185,6 +198,6 @@ def _status(contact: Contact, loaded: NDArray[np.bool_]) -> tuple[NDArray[np.str
         # In tangential contact the rod lies along the contour, in tip contact it ends there: which holds more nearly?
         lift = np.abs(np.sin(contact.tip_angle - contact.slope_angle))
         tip = np.abs(1.0 - contact.contact_arclength) < lift
-    status = np.select([~loaded, ~found, beyond], ["no contact", "no zero of curvature", "beyond the tip"], "ok")
-    phase = np.select([~loaded | ~found, tip], ["none", "tip"], "tangential")
-    return status, phase
+    status = loaded.astype(np.int8) + found + beyond
+    phase = found * np.where(tip, np.int8(TIP), np.int8(TANGENTIAL))
+    return np.array(STATUSES).take(status), np.array(PHASE_NAMES).take(phase)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, Wrench, wrench_from_contact
+from tactile_bayes.elastica import PHASE_NAMES, TANGENTIAL, TIP, Wrench, wrench_from_contact
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.path import CLEARANCE, Paths, Reach, SnapOff, States, trace
 from tactile_bayes.record import COLUMNS, make_record
@@ -22,9 +22,6 @@ __all__ = ["Event", "Scan", "SweepEvents", "equilibria", "scan", "sweep_paths"]
 
 Direction = Literal["forward", "backward"]
 Floats = NDArray[np.float64]
-
-PHASE_NAMES = {NONE: "none", TIP: "tip", TANGENTIAL: "tangential"}
-"""Words for the contact phases."""
 
 _ORDER = 32
 _MARGIN = 15
@@ -307,7 +304,7 @@ def _columns(seen: SeenContour, states: States, rod: Rod) -> dict[str, NDArray[A
         "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
         "force_y": wrench.force_y * rod.force_unit,
         "contact_arclength": wrench.contact_arclength * rod.length_unit,
-        "contact_phase": np.array([PHASE_NAMES[int(phase)] for phase in wrench.phase]),
+        "contact_phase": np.array(PHASE_NAMES)[wrench.phase],
         "contact_x": seen.base_x[0] + sign * x * rod.length_unit,
         "contact_y": seen.base_y[0] + y * rod.length_unit,
         "tip_angle": turned(wrench.tip_angle),

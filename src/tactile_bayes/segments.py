@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +14,16 @@ from tactile_bayes.elastica import quick_tangential_arclength, tangential_arclen
 from tactile_bayes.reach import Limits, Reach
 from tactile_bayes.roots import falling_root
 
-__all__ = ["Segments", "cut_path", "first_of_lane", "last_of_lane", "polish_changes"]
+__all__ = ["BRIEF", "Segments", "cut_path", "first_of_lane", "last_of_lane", "polish_changes", "resolved", "whole"]
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
+
+BRIEF = 1e-6
+"""Share of a path so short that what changes on it may be lost in rounding."""
+
+_HALVINGS = 8
+"""How often a stretch is halved at most; where something is not smooth at its end that is never enough."""
 
 
 class Segments(NamedTuple):
@@ -40,8 +47,57 @@ class Segments(NamedTuple):
         parameter = self.begin + span * np.where(self.rooted, way * way, way)
         return parameter, span * np.where(self.rooted, 2.0 * way, 1.0)
 
+    def halved(self, chosen: NDArray[np.bool_]) -> tuple[Segments, NDArray[np.bool_]]:
+        """With the chosen ones in two halves each, in their place; and which of all are halves."""
+        middle, _ = self.along(np.full(self.lane.size, 0.5))
+        origin = np.repeat(np.arange(self.lane.size), np.where(chosen, 2, 1))
+        first, second = origin[:-1] == origin[1:], origin[1:] == origin[:-1]
+        first, second = np.append(first, False), np.append(False, second)
+        lane, begin, end, tip, rooted = self.take(origin)
+        begin, end = np.where(second, middle[origin], begin), np.where(first, middle[origin], end)
+        return Segments(lane, begin, end, tip, rooted & ~second), first | second
 
-def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: int) -> Segments:
+
+def resolved(
+    segments: Segments, sample: Callable[[Segments, Floats], Floats], order: int, tolerance: float
+) -> tuple[Segments, Floats]:
+    """Segments halved until polynomials follow what is sampled along them, and those polynomials.
+
+    Parameters
+    ----------
+    segments : Segments
+    sample : callable
+        From segments and ways, shape (segments, k), to what is wanted there, shape (segments, ..., k); of several
+        things the first must be smooth.
+    order : int
+        Number of Chebyshev nodes on a segment.
+    tolerance : float
+        Share of the change on a segment that the last two coefficients may reach.
+
+    Returns
+    -------
+    Segments, ndarray of shape (order, segments, ...)
+    """
+
+    def fit(some: Segments) -> Floats:
+        return chebyshev.coefficients(sample(some, np.broadcast_to(chebyshev.nodes(order), (some.lane.size, order))))
+
+    series = fit(segments)
+    for _ in range(_HALVINGS):
+        size = np.abs((series if series.ndim == 2 else series[..., 0])[1:])
+        begin, end = whole(segments)
+        long = segments.begin - segments.end > BRIEF * (begin - end)
+        rough = long & (size[-2:].max(axis=0) > tolerance * size.max(axis=0))
+        if not np.any(rough):
+            break
+        segments, halves = segments.halved(rough)
+        kept = series[:, ~rough]
+        series = np.empty((order, halves.size, *series.shape[2:]))
+        series[:, ~halves], series[:, halves] = kept, fit(segments.take(halves))
+    return segments, series
+
+
+def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: int, tolerance: float) -> Segments:
     """Cut the paths that there are at knots, and where tangential contact takes exactly the rod's length."""
     lanes = np.flatnonzero(limits.reach == Reach.TOUCHES)
     begin, end = limits.begin, limits.end
@@ -50,16 +106,17 @@ def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: in
     start, stop = bounds[:-1].T.ravel(), bounds[1:].T.ravel()
     lane = np.repeat(lanes, bounds.shape[0] - 1)
     some = start - stop > 1e-13 * (begin[lane] - end[lane])
-    lane, start, stop = lane[some], start[some], stop[some]
+    unknown = np.zeros(np.count_nonzero(some), dtype=bool)
+    pieces = Segments(lane[some], start[some], stop[some], unknown, unknown)
 
-    node = chebyshev.nodes(order)
-    locus = seen.locate(lane[:, None], start[:, None] + (stop - start)[:, None] * node)
-    if friction_angle:
-        length = tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle)
-    else:
-        length = quick_tangential_arclength(locus.x, locus.y, locus.slope_angle)
-    excess = chebyshev.coefficients(length - 1.0)
-    grid = np.concatenate([[0.0], node, [1.0]])
+    def excess_of(some: Segments, ways: Floats) -> Floats:
+        locus = seen.locate(some.lane[:, None], some.take(np.s_[:, None]).along(ways)[0])
+        if friction_angle:
+            return tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0
+        return quick_tangential_arclength(locus.x, locus.y, locus.slope_angle) - 1.0
+
+    pieces, excess = resolved(pieces, excess_of, order, tolerance)
+    grid = np.concatenate([[0.0], chebyshev.nodes(order), [1.0]])
     beyond = chebyshev.tabulate(excess, grid) > 0.0
     piece, cell = np.nonzero(beyond[:, :-1] != beyond[:, 1:])
     sign = np.where(beyond[piece, cell], 1.0, -1.0)
@@ -70,21 +127,16 @@ def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: in
         return sign[i] * chebyshev.evaluate(excess[:, at], z), sign[i] * chebyshev.evaluate(slope[:, at], z)
 
     change = falling_root(signed, grid[cell], grid[cell + 1])
-    owner = np.concatenate([np.arange(lane.size), piece])
-    cut = np.concatenate([np.zeros(lane.size), change])
+    owner = np.concatenate([np.arange(pieces.lane.size), piece])
+    cut = np.concatenate([np.zeros(pieces.lane.size), change])
     order_of = np.lexsort((cut, owner))
     owner, cut = owner[order_of], cut[order_of]
     following = np.where(last_of_lane(owner), 1.0, np.append(cut[1:], 1.0)[: cut.size])
     tip = chebyshev.evaluate(excess[:, owner], 0.5 * (cut + following)) > 0.0
-    span = (stop - start)[owner]
-    lane = lane[owner]
-    return Segments(
-        lane,
-        start[owner] + cut * span,
-        start[owner] + following * span,
-        tip,
-        tip & limits.tip_first[lane] & first_of_lane(lane),
-    )
+    lane, begin, end, _, _ = pieces.take(owner)
+    span = end - begin
+    rooted = tip & limits.tip_first[lane] & first_of_lane(lane)
+    return Segments(lane, begin + cut * span, begin + following * span, tip, rooted)
 
 
 def polish_changes(seen: SeenContour, segments: Segments, friction_angle: float) -> Segments:
@@ -109,6 +161,14 @@ def polish_changes(seen: SeenContour, segments: Segments, friction_angle: float)
     begin, end = segments.begin.copy(), segments.end.copy()
     begin[inner] = end[inner - 1] = now
     return segments._replace(begin=begin, end=end)
+
+
+def whole(segments: Segments) -> tuple[Floats, Floats]:
+    """Where the path of which a segment is part begins and ends, for every segment."""
+    count = np.arange(segments.lane.size)
+    first = np.maximum.accumulate(np.where(first_of_lane(segments.lane), count, 0))
+    last = np.minimum.accumulate(np.where(last_of_lane(segments.lane), count, count.size)[::-1])[::-1]
+    return segments.begin[first], segments.end[last]
 
 
 def first_of_lane(lane: Index) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ from tactile_bayes.contours.function import from_function
 from tactile_bayes.contours.joined import Joined
 from tactile_bayes.contours.paper import paper_profile
 from tactile_bayes.contours.parabola import Parabola
+from tactile_bayes.contours.points import MeasuredContour, from_points
 from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.contours.shape_free import ShapeFree
 
@@ -17,10 +18,12 @@ __all__ = [
     "Graph",
     "Joined",
     "Locus",
+    "MeasuredContour",
     "Parabola",
     "PowerLaw",
     "ShapeFree",
     "Single",
     "from_function",
+    "from_points",
     "paper_profile",
 ]

@@ -17,8 +17,8 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["ShapeFree"]
 
-_ORDER = 18
-"""Chebyshev nodes a stretch between knots: for radii that change e²-fold there the rest is rounding."""
+_ORDER = 32
+"""Chebyshev nodes a stretch between knots: what radii that change twentyfold there leave is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +109,10 @@ class ShapeFree(Contour):
     def domain(self) -> tuple[Floats, Floats]:
         shape = self.shape
         return np.full(shape, self.slope_angles[0]), np.full(shape, self.slope_angles[-1])
+
+    @property
+    def knots(self) -> tuple[Floats, ...]:
+        return tuple(self.slope_angles[1:-1])
 
     def end_name(self, side: Literal["left", "right"]) -> str:
         return "the last slope angle for which a radius is given"

@@ -22,7 +22,7 @@ from tactile_bayes.inference.start import best_optimum, gather
 from tactile_bayes.load_cell import LoadCell, rough_noise
 from tactile_bayes.path import Reach
 from tactile_bayes.reconstruction import loaded_samples, reconstruct, with_rod
-from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, record_hash, rod_of, validate
+from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, present_channels, record_hash, rod_of, validate
 from tactile_bayes.rod import Rod
 
 __all__ = ["contours_of", "default_priors", "infer_contour"]
@@ -169,6 +169,7 @@ def infer_contour(
         friction=friction,
         priors=json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
         units=measured.attrs["units"],
+        load_cell_frame=frame_of(measured),
         **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
         load_cell_force_noise=noise.cell.force_noise,
         load_cell_moment_noise=noise.cell.moment_noise,

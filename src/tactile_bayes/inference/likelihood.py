@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Paths, Reach, trace
 from tactile_bayes.reconstruction import contact_sides
-from tactile_bayes.record import CHANNELS, rod_of, to_dimensionless
+from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, turned
 
 __all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood"]
 
@@ -38,7 +38,8 @@ class RecordLikelihood:
     """The record as a function of contour and noise.
 
     Contours are in the record's unit of length, loads inside in EI/L and EI/L². Because loads drop to zero at snap-off,
-    contours that would have let go earlier or held on longer than the record shows are told apart by it.
+    contours that would have let go earlier or held on longer than the record shows are told apart by it. Predicted
+    forces are turned into the record's frame, not measured ones out of it: one of the two may be missing.
 
     Parameters
     ----------
@@ -62,6 +63,7 @@ class RecordLikelihood:
         self.load_cell = load_cell.dimensionless(self.rod)
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         angle = record.drive_angle.values
+        self._turn = angle if frame_of(record) == "turning" else None
         backward = contact_sides(record) < 0.0
         place = np.stack([measured.base_x.values, measured.base_y.values, backward], axis=-1)
         kinds, which = np.unique(place, axis=0, return_inverse=True)
@@ -91,7 +93,10 @@ class RecordLikelihood:
         return trace(seen, friction_angle=self.friction_angle, order=self.order, exact_events=exact_events)
 
     def predict(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
-        """Noise-free loads, shape (n, samples, 3), and which contours every stroke can reach, shape (n,)."""
+        """Noise-free loads, shape (n, samples, 3), and which contours every stroke can reach, shape (n,).
+
+        Forces are in the record's frame.
+        """
         count = contours.shape[0]
         paths = self.paths(contours)
         reached = (paths.reach == Reach.TOUCHES).reshape(-1, count).all(axis=0)
@@ -100,6 +105,8 @@ class RecordLikelihood:
         for k, stroke in enumerate(self.strokes):
             sign = np.array([-1.0, -1.0, 1.0]) if stroke.backward else 1.0
             predicted[:, stroke.samples] = sign * loads[k * count : (k + 1) * count, : stroke.samples.size]
+        if self._turn is not None:
+            predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], self._turn)
         return predicted, reached
 
     def log_likelihood(self, contours: Contour, noise_scale: Any = 1.0, *, pointwise: bool = False) -> Floats:

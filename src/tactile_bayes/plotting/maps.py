@@ -20,7 +20,7 @@ from tactile_bayes.plotting.axes import (
     set_unit,
     single_axes,
 )
-from tactile_bayes.record import CHANNELS, rod_of
+from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.shape import rod_shape
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def rods(
         raise ParameterError(f"the scan has no {direction} sweep: choose from {', '.join(scan.events)}")
     if count < 1:
         raise ParameterError(f"count is {count!r}: at least one rod must be drawn")
-    record, events, rod = scan.record, scan.events[direction], rod_of(scan.record)
+    record, events, rod = in_frame(scan.record, "fixed"), scan.events[direction], rod_of(scan.record)
     in_contact = (record["direction"].values == direction) & (record["truth_contact_phase"].values != "none")
     samples = np.flatnonzero(in_contact)
     samples = (

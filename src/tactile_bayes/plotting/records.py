@@ -21,7 +21,7 @@ from tactile_bayes.plotting.axes import (
     legend_entry,
     set_unit,
 )
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.record import CHANNELS, Frame, frame_of, turned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,6 +32,11 @@ __all__ = ["observables", "predictive"]
 
 _LINES = {"forward": "-", "backward": "--"}
 _SAMPLES = {"forward": "o", "backward": "^"}
+_TURNING_LABELS = {
+    **LABELS,
+    "force_x": r"axial force $f_{\mathrm{A}\parallel}$",
+    "force_y": r"transversal force $f_{\mathrm{A}\perp}$",
+}
 
 
 def observables(
@@ -40,14 +45,15 @@ def observables(
     """Holding moment and support reaction over the drive angle, like Figures 3 to 6 of Merker et al. 2018.
 
     Doi 10.1155/2018/1613945. A record without noise, as `scan` gives it, is drawn as lines coloured by contact phase;
-    any other as points, with its truth, where it has one, as thin lines.
+    any other as points, with its truth, where it has one, as thin lines. Forces are drawn in the frame of the record.
 
     Parameters
     ----------
     record : xr.Dataset
         A record.
     events : mapping of str to SweepEvents, optional
-        By direction, as a scan has them; first contact, phase changes and snap-off are marked.
+        By direction, as a scan has them, in whatever frame the record is; first contact, phase changes and snap-off are
+        marked.
     axes : sequence of 3 Axes, optional
         One for each of holding_moment, force_x and force_y.
 
@@ -87,7 +93,7 @@ def predictive(
         A record.
     predicted : xr.Dataset
         Over "sample" as the record: for a channel, say force_x, the interval is force_x_lower to force_x_upper, in the
-        units of the record. Channels without an interval are drawn without.
+        units and the frame of the record. Channels without an interval are drawn without.
     axes : sequence of 3 Axes, optional
         One for each of holding_moment, force_x and force_y.
     label : str
@@ -101,7 +107,7 @@ def predictive(
     Raises
     ------
     ParameterError
-        If there are not three axes, or `predicted` has not the samples of the record.
+        If there are not three axes, or `predicted` has not the samples of the record, or states another frame.
 
     Examples
     --------
@@ -118,6 +124,12 @@ def predictive(
         raise ParameterError(
             f"predicted has {predicted.sizes.get('sample', 'no')} samples and the record {record.sizes['sample']}: "
             "give the prediction for every sample of this record"
+        )
+    frame = predicted.attrs.get("load_cell_frame", frame_of(record))
+    if frame != frame_of(record):
+        raise ParameterError(
+            f"forces are predicted in the {frame} frame, and those of the record are in the {frame_of(record)} one: "
+            f"give in_frame(record, {frame!r})"
         )
     panels, own = channel_panels(axes)
     _draw_observables(panels, record, None, with_truth=False)
@@ -173,16 +185,18 @@ def _legend_order(label: str) -> int:
 def _draw_observables(
     panels: AxesArray, record: xr.Dataset, events: Mapping[str, SweepEvents] | None, *, with_truth: bool
 ) -> None:
+    frame = frame_of(record)
+    labels = LABELS if frame == "fixed" else _TURNING_LABELS
     for panel, channel in zip(panels, CHANNELS, strict=True):
         if np.isnan(record[channel].values).all():
-            _not_measured(panel, channel)
+            _not_measured(panel, f"{labels[channel]}\n")
             continue
         panel.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
         for sweep in _sweeps(record):
             direction = str(sweep["direction"].values[0])
             of_sweep = events.get(direction) if events is not None else None
             if _is_exact(sweep, channel):
-                _draw_line(panel, sweep, channel, channel, of_sweep, linewidth=1.6)
+                _draw_line(panel, sweep, channel, channel, of_sweep, frame, linewidth=1.6)
                 legend_entry(panel, direction, color="0.35", linestyle=_LINES[direction], linewidth=1.6)
             else:
                 style = {"marker": _SAMPLES[direction], "markersize": 2.6, "color": PALETTE["sample"]}
@@ -190,11 +204,11 @@ def _draw_observables(
                 panel.plot(_degrees(sweep["drive_angle"].values), sweep[channel].values, **style)
                 legend_entry(panel, f"measured {direction}", **style)
                 if with_truth and f"truth_{channel}" in sweep:
-                    _draw_line(panel, sweep, f"truth_{channel}", channel, of_sweep, linewidth=1.0)
+                    _draw_line(panel, sweep, f"truth_{channel}", channel, of_sweep, frame, linewidth=1.0)
             if of_sweep is not None:
-                _draw_events(panel, of_sweep, channel)
+                _draw_events(panel, of_sweep, channel, frame)
         values = record[channel].values
-        set_unit(panel.yaxis, f"{LABELS[channel]}\n", channel, record[channel].attrs, values)
+        set_unit(panel.yaxis, f"{labels[channel]}\n", channel, record[channel].attrs, values)
 
 
 def _sweeps(record: xr.Dataset) -> Iterator[xr.Dataset]:
@@ -211,7 +225,14 @@ def _is_exact(sweep: xr.Dataset, channel: str) -> bool:
 
 
 def _draw_line(
-    ax: Axes, sweep: xr.Dataset, column: str, channel: str, events: SweepEvents | None, *, linewidth: float
+    ax: Axes,
+    sweep: xr.Dataset,
+    column: str,
+    channel: str,
+    events: SweepEvents | None,
+    frame: Frame,
+    *,
+    linewidth: float,
 ) -> None:
     """A channel without noise, coloured by phase, and complete up to the events."""
     angle_column = "truth_drive_angle" if "truth_drive_angle" in sweep else "drive_angle"
@@ -227,7 +248,7 @@ def _draw_line(
         marked = [events.first_contact, *events.transitions, events.snap_off]
         following = [event.kind.split(" → ")[-1] for event in marked[:-1]]
         angle = np.append(angle, [event.drive_angle for event in marked])
-        value = np.append(value, [getattr(event, channel) for event in marked])
+        value = np.append(value, [_load(event, channel, frame) for event in marked])
         phase = np.append(phase, [*following, following[-1]])
         order = np.argsort(angle if direction == "forward" else -angle, kind="stable")
         angle, value, phase = angle[order], value[order], phase[order]
@@ -243,7 +264,7 @@ def _draw_line(
             legend_entry(ax, prefix + PHASES[name], color=PALETTE[name], linewidth=linewidth)
 
 
-def _draw_events(ax: Axes, events: SweepEvents, channel: str) -> None:
+def _draw_events(ax: Axes, events: SweepEvents, channel: str, frame: Frame) -> None:
     styles: list[tuple[tuple[Event, ...], str, dict[str, Any]]] = [
         ((events.first_contact,), "first contact", {"marker": "o", "markerfacecolor": "white", "markersize": 4.5}),
         (events.transitions, "phase change", {"marker": "D", "markersize": 4.0}),
@@ -252,14 +273,22 @@ def _draw_events(ax: Axes, events: SweepEvents, channel: str) -> None:
     for marked, label, style in styles:
         if marked:
             angles = _degrees([event.drive_angle for event in marked])
-            values = [getattr(event, channel) for event in marked]
+            values = [_load(event, channel, frame) for event in marked]
             ax.plot(angles, values, color=PALETTE["change"], linestyle="none", zorder=4, label=label, **style)
 
 
-def _not_measured(ax: Axes, channel: str) -> None:
+def _load(event: Event, channel: str, frame: Frame) -> float:
+    """A load of an event in the frame of a record; events are in the fixed one."""
+    loads = {name: getattr(event, name) for name in CHANNELS}
+    if frame == "turning":
+        loads["force_x"], loads["force_y"] = turned(event.force_x, event.force_y, event.drive_angle)
+    return float(loads[channel])
+
+
+def _not_measured(ax: Axes, label: str) -> None:
     ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", va="center", color=PALETTE["none"])
     ax.set_yticks([])
-    ax.set_ylabel(f"{LABELS[channel]}\n")
+    ax.set_ylabel(label)
 
 
 def _degrees(angle: ArrayLike) -> Floats:

@@ -1,20 +1,25 @@
-"""The record of a tactile sensor: its schema, its validation, its units, and its files (CSV and NetCDF)."""
+"""The record of a tactile sensor: its schema, its validation, its units, its frame, and its files (CSV and NetCDF)."""
 
 from tactile_bayes.record.channels import present_channels
 from tactile_bayes.record.construction import make_record
 from tactile_bayes.record.files import read_record, write_record
+from tactile_bayes.record.frame import frame_of, in_frame, turned
 from tactile_bayes.record.identity import record_hash
-from tactile_bayes.record.schema import CHANNELS, COLUMNS, MEASURED, REQUIRED, Column, column_of
+from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, Column, Frame, column_of
 from tactile_bayes.record.units import rod_of, to_dimensionless, to_si
 from tactile_bayes.record.validation import validate
 
 __all__ = [
     "CHANNELS",
     "COLUMNS",
+    "FRAMES",
     "MEASURED",
     "REQUIRED",
     "Column",
+    "Frame",
     "column_of",
+    "frame_of",
+    "in_frame",
     "make_record",
     "present_channels",
     "read_record",
@@ -22,6 +27,7 @@ __all__ = [
     "rod_of",
     "to_dimensionless",
     "to_si",
+    "turned",
     "validate",
     "write_record",
 ]

@@ -1,4 +1,4 @@
-"""The attributes of a record: its units, its rod, the data sheet of its load cell, and remarks."""
+"""The attributes of a record: its units, its rod, data sheet and frame of its load cell, and remarks."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.cell import number_in
-from tactile_bayes.record.schema import ATTRIBUTE_UNITS, UNITS
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
 from tactile_bayes.record.table import Source
 from tactile_bayes.rod import Rod
 
-__all__ = ["checked_attributes", "completed_attributes", "rod_attributes", "same_rod", "stated_rod"]
+__all__ = ["checked_attributes", "completed_attributes", "rod_attributes", "same_rod", "stated_frame", "stated_rod"]
 
 
 def rod_attributes(rod: Rod) -> dict[str, float]:
@@ -57,15 +57,36 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
     return rod
 
 
+def stated_frame(attrs: Mapping[str, Any], source: Source) -> Frame:
+    """The frame of the load cell that the attributes of a record state, "fixed" if they state none."""
+    frame = attrs.get("load_cell_frame", "fixed")
+    if not (isinstance(frame, str) and frame in FRAMES):
+        raise source.error(
+            f"attribute 'load_cell_frame' is {frame!r}: write 'fixed' for a load cell that measures along the axes of "
+            "the world, or 'turning' for one that turns with the drive and measures along the rod and across it"
+        )
+    return frame
+
+
 def same_rod(one: Rod, other: Rod) -> bool:
     """Whether two rods are equal up to the rounding of a few operations."""
     pairs = zip(rod_attributes(one).values(), rod_attributes(other).values(), strict=True)
     return all(math.isclose(*pair, rel_tol=1e-12) for pair in pairs)
 
 
-def completed_attributes(attrs: Mapping[str, Any], rod: Rod | None, source: Source) -> dict[str, Any]:
-    """The attributes with the units and the rod that are stated, given beside them, or else assumed."""
+def completed_attributes(
+    attrs: Mapping[str, Any], rod: Rod | None, frame: Frame | None, source: Source
+) -> dict[str, Any]:
+    """The attributes with units, rod and frame that are stated, given beside them, or else assumed."""
     completed = dict(attrs)
+    if frame is not None:
+        completed = {"load_cell_frame": frame, **completed}
+        stated_in = stated_frame(completed, source)
+        if stated_in != frame:
+            raise source.error(
+                f"the record states load_cell_frame {stated_in!r}, but {frame!r} was given: leave out the one that is "
+                "wrong; to convert a record use in_frame(record, frame)"
+            )
     if "units" not in completed:
         of_the_rod = [name for name in attrs if name in rod_attributes(Rod())]
         if of_the_rod:
@@ -91,6 +112,7 @@ def completed_attributes(attrs: Mapping[str, Any], rod: Rod | None, source: Sour
 def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, Any]:
     """The attributes as strings and numbers, units and rod first, or the reason why they are none of a record."""
     rod = stated_rod(attrs, source)
+    stated_frame(attrs, source)
     checked: dict[str, Any] = {"units": attrs["units"], **rod_attributes(rod)}
     for name, value in attrs.items():
         if name in checked:

@@ -12,7 +12,7 @@ import xarray as xr
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.attributes import completed_attributes
 from tactile_bayes.record.cell import number_in
-from tactile_bayes.record.schema import CHANNELS
+from tactile_bayes.record.schema import CHANNELS, Frame
 from tactile_bayes.record.table import Cells, Source, Table
 from tactile_bayes.record.validation import checked_record
 from tactile_bayes.rod import Rod
@@ -26,6 +26,7 @@ def make_record(
     rod: Rod | None = None,
     attrs: Mapping[str, Any] | None = None,
     missing: Collection[str] = (),
+    load_cell_frame: Frame | None = None,
 ) -> xr.Dataset:
     """Record from a mapping of columns.
 
@@ -45,6 +46,10 @@ def make_record(
         data sheet of the sensor in the record's units; others are kept as they are.
     missing : collection of str, optional
         Channels that the rig does not measure.
+    load_cell_frame : {"fixed", "turning"}, optional
+        Whether force_x and force_y are along the axes of the world, or the load cell turns with the drive: then they
+        are along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0), φ0 the drive angle. By
+        default as `attrs` state, else "fixed".
 
     Returns
     -------
@@ -78,15 +83,15 @@ def make_record(
         elif values.shape != shape:
             expected = f"others have {shape}" if lengths else "(n_samples,) is wanted"
             raise source.error(f"column {name!r} has shape {values.shape}, where {expected}: give one value per sample")
-    return completed_record(Table(cells, attrs or {}, source), rod, missing)
+    return completed_record(Table(cells, attrs or {}, source), rod, missing, load_cell_frame)
 
 
-def completed_record(table: Table, rod: Rod | None, missing: Collection[str]) -> xr.Dataset:
-    """The record that a table makes with the rod and the missing channels that were given beside it."""
+def completed_record(table: Table, rod: Rod | None, missing: Collection[str], frame: Frame | None) -> xr.Dataset:
+    """The record that a table makes with the rod, the missing channels and the frame that were given beside it."""
     return checked_record(
         Table(
             _with_missing(table, missing),
-            completed_attributes(table.attrs, rod, table.source),
+            completed_attributes(table.attrs, rod, frame, table.source),
             table.source,
         )
     )

@@ -13,6 +13,7 @@ from tactile_bayes.files import write_atomically
 from tactile_bayes.record.construction import completed_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf_format import read_netcdf, write_netcdf
+from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.validation import validate
 from tactile_bayes.rod import Rod
 
@@ -22,12 +23,18 @@ _READERS = {".csv": read_csv, ".nc": read_netcdf}
 _WRITERS = {".csv": write_csv, ".nc": write_netcdf}
 
 
-def read_record(path: str | os.PathLike[str], *, rod: Rod | None = None, missing: Collection[str] = ()) -> xr.Dataset:
+def read_record(
+    path: str | os.PathLike[str],
+    *,
+    rod: Rod | None = None,
+    missing: Collection[str] = (),
+    load_cell_frame: Frame | None = None,
+) -> xr.Dataset:
     """Read a record from a CSV or a NetCDF file.
 
     A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
     sample; `write_record` shows the form. The header may be absent: then the numbers are dimensionless, or SI if
-    `rod` is given.
+    `rod` is given. A load cell that turns with the drive is stated by `# load_cell_frame: turning`.
 
     Parameters
     ----------
@@ -37,6 +44,8 @@ def read_record(path: str | os.PathLike[str], *, rod: Rod | None = None, missing
         The rod, if the file does not state it.
     missing : collection of str, optional
         Channels that the file has no column for, because the rig does not measure them.
+    load_cell_frame : {"fixed", "turning"}, optional
+        The frame of the forces, if the file does not state it; see `make_record`.
 
     Returns
     -------
@@ -47,7 +56,8 @@ def read_record(path: str | os.PathLike[str], *, rod: Rod | None = None, missing
     ------
     RecordError
         If the content is not a record, see `validate` (the message names line and column); if the file is SI
-        and no rod is stated, or states another rod than `rod`; if the suffix is another one.
+        and no rod is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if the
+        suffix is another one.
 
     Examples
     --------
@@ -61,7 +71,7 @@ def read_record(path: str | os.PathLike[str], *, rod: Rod | None = None, missing
     """
     path = Path(path)
     table = _READERS[_suffix(path)](path)
-    record = completed_record(table, rod, missing)
+    record = completed_record(table, rod, missing, load_cell_frame)
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"
     return record

@@ -7,6 +7,7 @@ import hashlib
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.record.frame import frame_of
 from tactile_bayes.record.schema import COLUMNS, MEASURED
 from tactile_bayes.record.units import rod_of
 from tactile_bayes.record.validation import validate
@@ -15,7 +16,7 @@ __all__ = ["record_hash"]
 
 
 def record_hash(record: xr.Dataset) -> str:
-    """SHA-256 of what was measured: names, values and units of the columns of `MEASURED`, and the rod.
+    """SHA-256 of what was measured: names, values and units of the columns of `MEASURED`, their frame, and the rod.
 
     Columns of truth and other further columns, the order of columns, and other attributes do not matter. A record
     has the same hash before and after it was written to a file.
@@ -52,6 +53,8 @@ def record_hash(record: xr.Dataset) -> str:
     rod = rod_of(record)
     add(str(record.attrs["units"]).encode())
     add(np.array([rod.length, rod.flexural_rigidity, rod.diameter], dtype="<f8").tobytes())
+    if frame_of(record) != "fixed":  # which is what records were before they stated it
+        add(frame_of(record).encode())
     for name in MEASURED:
         values = record[name].values
         add(f"{name} [{record[name].attrs['units']}]".encode())

@@ -14,16 +14,19 @@ __all__ = [
     "CHANNELS",
     "COLUMNS",
     "DIRECTIONS",
+    "FRAMES",
     "MEASURED",
     "REQUIRED",
     "UNITS",
     "Column",
+    "Frame",
     "Kind",
     "Scale",
     "column_of",
     "same_unit",
 ]
 
+Frame = Literal["fixed", "turning"]
 Kind = Literal["integer", "number", "text"]
 Scale = Literal["length_unit", "moment_unit", "force_unit"]
 
@@ -44,11 +47,15 @@ class Column:
         The property of `Rod` that a dimensionless value is multiplied with to be SI; None where both are the same.
     long_name : str
         What it is, in words.
+    turning_name : str, optional
+        What it is where the load cell turns with the drive, if that is something else.
 
     Examples
     --------
     >>> COLUMNS["force_x"].unit, COLUMNS["force_x"].unit_in("dimensionless")
     ('N', '1')
+    >>> COLUMNS["force_x"].long_name_in("fixed"), COLUMNS["force_x"].long_name_in("turning")
+    ('horizontal support reaction', 'axial support reaction')
     """
 
     name: str
@@ -56,10 +63,15 @@ class Column:
     unit: str
     scale: Scale | None
     long_name: str
+    turning_name: str | None = None
 
     def unit_in(self, units: str) -> str:
         """Unit of the column in a record of the given units, "SI" or "dimensionless"."""
         return "1" if units == "dimensionless" and self.scale else self.unit
+
+    def long_name_in(self, frame: Frame) -> str:
+        """What the column is, in words, where the load cell is fixed, or turning."""
+        return self.turning_name if frame == "turning" and self.turning_name else self.long_name
 
 
 CHANNELS = ("holding_moment", "force_x", "force_y")
@@ -81,8 +93,8 @@ COLUMNS: Mapping[str, Column] = MappingProxyType(
             Column("base_y", "number", "m", "length_unit", "vertical position of the pivot"),
             Column("drive_angle", "number", "rad", None, "slope of the rod at the pivot"),
             Column("holding_moment", "number", "N m", "moment_unit", "moment that the drive must hold"),
-            Column("force_x", "number", "N", "force_unit", "horizontal support reaction"),
-            Column("force_y", "number", "N", "force_unit", "vertical support reaction"),
+            Column("force_x", "number", "N", "force_unit", "horizontal support reaction", "axial support reaction"),
+            Column("force_y", "number", "N", "force_unit", "vertical support reaction", "transversal support reaction"),
             Column("slope_angle", "number", "rad", None, "slope angle of the contour at the contact"),
             Column("tip_angle", "number", "rad", None, "slope of the rod at the contact"),
             Column("contact_x", "number", "m", "length_unit", "horizontal position of the contact"),
@@ -96,6 +108,10 @@ COLUMNS: Mapping[str, Column] = MappingProxyType(
 
 DIRECTIONS = ("forward", "backward")
 """Senses of the drive: slopes that grow, and slopes that shrink."""
+
+FRAMES: tuple[Frame, Frame] = ("fixed", "turning")
+"""What the attribute `load_cell_frame` of a record can be: force_x and force_y along the axes x and y of the world, or
+along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0)."""
 
 UNITS = ("SI", "dimensionless")
 """What the attribute `units` of a record can be."""
@@ -130,7 +146,8 @@ def column_of(name: str) -> Column | None:
     known = COLUMNS.get(name.removeprefix("truth_"))
     if known is None or known.name == name:
         return known
-    return replace(known, name=name, long_name=f"true {known.long_name}")
+    turning_name = known.turning_name and f"true {known.turning_name}"
+    return replace(known, name=name, long_name=f"true {known.long_name}", turning_name=turning_name)
 
 
 def same_unit(one: str, other: str) -> bool:

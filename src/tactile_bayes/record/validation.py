@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.attributes import checked_attributes
+from tactile_bayes.record.attributes import checked_attributes, stated_frame
 from tactile_bayes.record.cell import integer_in, number_in
-from tactile_bayes.record.schema import CHANNELS, COLUMNS, MEASURED, REQUIRED, Kind, column_of, same_unit
+from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, Kind, column_of, same_unit
 from tactile_bayes.record.sweep import refuse_impossible_sweeps
 from tactile_bayes.record.table import Cells, Source, Table, table_of
 
@@ -42,7 +42,8 @@ def validate(record: xr.Dataset) -> xr.Dataset:
         is NaN throughout is a missing channel, and allowed); every channel is missing; a direction is neither
         "forward" nor "backward"; drive angles look like degrees (more than a turn, 2π); one sweep has two
         directions or two pivots, or a drive angle that runs against its direction; units are unknown, or differ
-        from column to column; the rod is not stated; there are no samples.
+        from column to column; the rod is not stated; the frame of the load cell is neither "fixed" nor "turning";
+        there are no samples.
 
     Notes
     -----
@@ -85,7 +86,7 @@ def checked_record(table: Table) -> xr.Dataset:
     _refuse_gaps(values, source)
     refuse_impossible_sweeps(values, source)
     variables = {
-        name: ("sample", values[name], _checked_column_attributes(name, filled[name][1], attributes["units"], source))
+        name: ("sample", values[name], _checked_column_attributes(name, filled[name][1], attributes, source))
         for name in order
     }
     return xr.Dataset(variables, attrs=attributes)
@@ -101,10 +102,13 @@ def _is_storable(name: Any) -> bool:
     )
 
 
-def _checked_column_attributes(name: str, attrs: Mapping[str, Any], units: str, source: Source) -> dict[str, Any]:
+def _checked_column_attributes(
+    name: str, attrs: Mapping[str, Any], of_record: Mapping[str, Any], source: Source
+) -> dict[str, Any]:
     column = column_of(name)
     if column is None:
         return {"units": "unknown", "long_name": name, **attrs}
+    units = of_record["units"]
     expected = column.unit_in(units)
     stated = str(attrs.get("units", expected))
     if not same_unit(stated, expected):
@@ -112,7 +116,10 @@ def _checked_column_attributes(name: str, attrs: Mapping[str, Any], units: str, 
             f"column {name!r} is in [{stated}], but the record is {units}: convert the column to [{expected}], or "
             "state the units that the record is in, and for SI the rod"
         )
-    return {"long_name": column.long_name, **attrs, "units": expected}
+    long_name = column.long_name_in(stated_frame(of_record, source))
+    own_words = [column.long_name_in(frame) for frame in FRAMES]  # those of another frame go with it
+    kept = {key: value for key, value in attrs.items() if not (key == "long_name" and value in own_words)}
+    return {"long_name": long_name, **kept, "units": expected}
 
 
 def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:

@@ -25,7 +25,8 @@ def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr
     Returns
     -------
     xr.Dataset
-        Over "sample", for every channel that was measured: its name with _lower and with _upper.
+        Over "sample", for every channel that was measured: its name with _lower and with _upper; in the units and the
+        frame of the record.
 
     Raises
     ------
@@ -47,4 +48,5 @@ def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr
         for bound, level in levels.items():
             edge = np.quantile(values.values, level, axis=(0, 1))
             out[f"{name}_{bound}"] = ("sample", edge, values.attrs)
-    return xr.Dataset(out, attrs={"probability": probability})
+    frame = {name: posterior.attrs[name] for name in ("load_cell_frame",) if name in posterior.attrs}
+    return xr.Dataset(out, attrs={"probability": probability, **frame})

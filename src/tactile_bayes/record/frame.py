@@ -1,0 +1,150 @@
+"""The frame of a record: whether its forces are along the axes of the world, or turn with the drive."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.record.attributes import stated_frame
+from tactile_bayes.record.schema import CHANNELS, FRAMES, Frame
+from tactile_bayes.record.table import Source
+from tactile_bayes.record.validation import validate
+
+__all__ = ["frame_of", "in_frame", "turned"]
+
+Floats = NDArray[np.float64]
+
+
+def frame_of(record: xr.Dataset) -> Frame:
+    """The frame of a record's forces, "fixed" or "turning"; "fixed" where the record states none.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+
+    Raises
+    ------
+    RecordError
+        If its attribute `load_cell_frame` is something else.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import make_record
+    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "holding_moment": 0.5, "force_x": 0.1}
+    >>> frame_of(make_record(columns, missing="force_y", load_cell_frame="turning"))
+    'turning'
+    """
+    return stated_frame(record.attrs, Source())
+
+
+def in_frame(record: xr.Dataset, frame: Frame) -> xr.Dataset:
+    """The same record with its forces in a frame: along the axes of the world, or along the rod and across it.
+
+    A load cell that turns with the drive measures the support reaction (fAx, fAy) as
+
+        force_x =  fAx cos φ0 + fAy sin φ0,  along the rod at the pivot,
+        force_y = −fAx sin φ0 + fAy cos φ0,  across it,
+
+    φ0 being the drive angle, in both directions of the sweep. Without friction the first is half the square of the
+    holding moment in tangential contact, in units of the rod, and greater in tip contact.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record. If it is in the frame already it is returned unchanged.
+    frame : {"fixed", "turning"}
+        The frame that is wanted.
+
+    Returns
+    -------
+    xr.Dataset
+        The record with `force_x`, `force_y` and, where it has them, `truth_force_x` and `truth_force_y` in the frame,
+        which its attribute `load_cell_frame` states. Forces are turned by the drive angle as it was recorded, their
+        truth by `truth_drive_angle` where there is one.
+
+    Raises
+    ------
+    RecordError
+        If `record` is not a record, or has only one of the two forces: a force in the one frame takes both of the
+        other. (Where both are missing, nothing is lost.)
+    ParameterError
+        If the frame is none of the two.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> record = in_frame(scan(paper_profile("II", q=0.5)).record, "turning")
+    >>> excess = (record.force_x - record.holding_moment**2 / 2).where(record.truth_contact_phase == "tangential")
+    >>> float(abs(excess).max()) < 1e-12
+    True
+    """
+    if frame not in FRAMES:
+        raise ParameterError(f"frame is {frame!r}: choose 'fixed' or 'turning'")
+    converted = validate(record)
+    if frame_of(converted) == frame:
+        return record
+    sense = 1.0 if frame == "turning" else -1.0
+    for prefix in ("", "truth_"):
+        names = f"{prefix}force_x", f"{prefix}force_y"
+        present = [name for name in names if name in converted]
+        if not present:
+            continue
+        forces = _values(converted, names[0]), _values(converted, names[1])
+        _refuse_half_a_force(names, forces, frame)
+        angle = _values(converted, f"{prefix}drive_angle" if f"{prefix}drive_angle" in converted else "drive_angle")
+        with np.errstate(over="ignore"):  # refused below, with the sample that it happened in
+            forces = turned(*forces, sense * angle)
+        for name in present:
+            converted[name].values = forces[names.index(name)]
+    converted.attrs["load_cell_frame"] = frame
+    return validate(converted)
+
+
+def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
+    """Components of forces along axes that are turned counter-clockwise by an angle.
+
+    Parameters
+    ----------
+    force_x, force_y : array_like
+        Components along the axes before, in any unit.
+    angle : array_like
+        [rad]; broadcast with the forces.
+
+    Examples
+    --------
+    >>> along, across = turned(0.0, 2.0, np.pi / 6)
+    >>> round(float(along), 6), round(float(across), 6)
+    (1.0, 1.732051)
+    """
+    x, y = np.asarray(force_x, dtype=np.float64), np.asarray(force_y, dtype=np.float64)
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.asarray(x * cos + y * sin), np.asarray(y * cos - x * sin)
+
+
+def _values(record: xr.Dataset, name: str) -> Floats:
+    """A column, NaN if there is none."""
+    return np.asarray(record[name].values) if name in record else np.full(record.sizes["sample"], np.nan)
+
+
+def _refuse_half_a_force(names: tuple[str, str], forces: tuple[Floats, Floats], frame: Frame) -> None:
+    """Refuse samples in which one component of the force is known, and the other is not."""
+    for (name, values), (other, others) in permutations(zip(names, forces, strict=True)):
+        lacks = np.isnan(values) & ~np.isnan(others)
+        if not lacks.any():
+            continue
+        if name in CHANNELS:
+            raise RecordError(
+                f"{name} was not measured, and a force in the {frame} frame takes both of the other frame, so "
+                f"{other} would be lost too: keep the record in the frame in which it was measured; infer_contour "
+                "takes it as it is"
+            )
+        raise RecordError(
+            f"sample {int(np.argmax(lacks))} has a {other}, but no {name}, and a force in the {frame} frame takes both "
+            f"of the other frame: complete {name}, or remove {other}"
+        )

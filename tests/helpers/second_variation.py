@@ -1,0 +1,118 @@
+"""The second variation of the rod's energy: the textbook test of stability, which knows nothing of paths.
+
+The rod's slope φ(s) is varied by η(s) with the drive held, η(0) = 0. Its energy is ∫ φ'²/2 ds over its length 1, and it
+must stay outside the object. Let d(r) be the distance of a point r from the object, negative inside; the object's
+boundary has slope angle α and radius of curvature ρ at the contact, t = (cos α, sin α) lies along it and
+n = (sin α, −cos α) points out of it. There ∇d = n and ∇∇d = t tᵀ/ρ. To second order the point at s moves by
+
+    δr = ∫₀ˢ η (−sin φ, cos φ) ds,     δ²r = −∫₀ˢ η² (cos φ, sin φ) ds.
+
+With ψ = φ − α and
+
+    N = −n·δr = ∫₀ˢ¹ η cos ψ ds,    T = t·δr = −∫₀ˢ¹ η sin ψ ds,    n·δ²r = ∫₀ˢ¹ η² sin ψ ds
+
+the constraint and the form Q = δ²(energy) − f δ²(constraint), with the contact force f ≥ 0 as its multiplier, are:
+
+*Tip contact*, constraint d(r(1)) ≥ 0. Its first variation is −N, and its second n·δ²r + T²/ρ:
+
+    Q = ∫ η'² ds − f [∫ η² sin ψ ds + T²/ρ]          on all η with η(0) = 0 and N = 0.
+
+*Tangential contact* at s1, constraint min over s of d(r(s)) ≥ 0. As s is free there, the first variation is again −N.
+In the second, the contact slides: with G(s, ε) = d(r + ε δr + …) it is G_εε − G_sε²/G_ss, where
+G_ss = 1/ρ (the rod has no curvature at its contact), G_sε = T/ρ − η(s1) (the rod turns, and meets a turned boundary)
+and G_εε = n·δ²r + T²/ρ. What is left has no 1/ρ any more, and so holds in an edge as well, where ρ = 0:
+
+    Q = ∫ η'² ds − f [∫ η² sin ψ ds + 2 η(s1) T − ρ η(s1)²]          on [0, s1]; the free end does not take part.
+
+(For ρ → ∞ the last term only says η(s1) = 0: the rod lies on a flat.) An equilibrium is stable if Q is positive, and
+that its lowest eigenvalue vanishes just where the drive angle is stationary along a path of equilibria is seen so:
+the change of φ(s) from one equilibrium on the path to the next obeys the linearised equations of equilibrium, which are
+those of Q, and the constraint; it is a variation with the drive held just where the drive does not change.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh, null_space
+
+Floats = NDArray[np.float64]
+
+
+class Held(NamedTuple):
+    """An equilibrium seen from the pivot in a forward sweep."""
+
+    drive_angle: float
+    holding_moment: float
+    force: float
+    slope_angle: float
+    """α."""
+    radius: float
+    """ρ of the contour at the contact; zero in an edge."""
+    arclength: float
+    """s1."""
+    tip: bool
+
+
+def held(contour, state, radius: float | None = None) -> Held:
+    """One state, a row of `equilibria` of a forward sweep; the radius is the contour's own if not given."""
+    alpha = float(state.slope_angle)
+    return Held(
+        float(state.drive_angle),
+        float(state.holding_moment),
+        float(np.hypot(state.force_x, state.force_y)),
+        alpha,
+        float(contour.radius_of_curvature(alpha)) if radius is None else radius,
+        float(state.contact_arclength),
+        str(state.contact_phase.values) == "tip",
+    )
+
+
+def shape(rod: Held, arclengths: Floats) -> Floats:
+    """Slope φ of the rod at arc lengths, increasing: φ'' = f cos(φ − α) integrated from the pivot."""
+
+    def bend(_s: float, z: Floats) -> list[float]:
+        return [z[1], rod.force * np.cos(z[0] - rod.slope_angle)]
+
+    start = [rod.drive_angle, -rod.holding_moment]
+    solution = solve_ivp(
+        bend, (0.0, rod.arclength), start, method="DOP853", t_eval=arclengths, rtol=1e-13, atol=1e-14, max_step=0.05
+    )
+    return solution.y[0]
+
+
+def eigenvalues(rod: Held, terms: int = 24) -> Floats:
+    """Eigenvalues of Q over ∫ η² ds, increasing.
+
+    η is s times a polynomial, in Legendre's basis with `terms` terms; the integrals are Gauss's, and the constraint is
+    kept by working in the null space of N. A tip on the point of an edge can leave it downhill to both sides, to first
+    order: the lowest eigenvalue is −∞, and the others are those with T = 0.
+    """
+    node, weight = legendre.leggauss(2 * terms)
+    node, weight = 0.5 * (node + 1.0), 0.5 * rod.arclength * weight
+    values = legendre.legvander(2.0 * node - 1.0, terms - 1)
+    slopes = 2.0 * values[:, :-1] @ legendre.legder(np.eye(terms))
+    eta = node[:, None] * values
+    eta_rate = (values + node[:, None] * slopes) / rod.arclength
+    eta_end = np.ones(terms)  # every Legendre polynomial is 1 at 1
+
+    psi = shape(rod, node * rod.arclength) - rod.slope_angle
+    sin, cos = weight * np.sin(psi), weight * np.cos(psi)
+    along = -(eta.T @ sin)
+    pull = eta.T @ (sin[:, None] * eta)
+    bound = [eta.T @ cos]
+    if rod.tip and rod.radius > 0.0:
+        pull += np.outer(along, along) / rod.radius
+    elif rod.tip:
+        bound.append(along)
+    else:
+        pull += np.outer(eta_end, along) + np.outer(along, eta_end) - rod.radius * np.outer(eta_end, eta_end)
+    form = eta_rate.T @ (weight[:, None] * eta_rate) - rod.force * pull
+    free = null_space(np.array(bound))
+    mass = eta.T @ (weight[:, None] * eta)
+    found = eigh(free.T @ form @ free, free.T @ mass @ free, eigvals_only=True)
+    return found if len(bound) == 1 else np.append(-np.inf, found)
