@@ -31,6 +31,9 @@ from tactile_bayes.elastica import NONE, tangential_arclength
 from tactile_bayes.path import CHANNELS, SnapOff
 from tactile_bayes.scanning import equilibria, scan
 
+# Some of these objects are met again after snap-off, which is no concern of the path up to there.
+pytestmark = pytest.mark.filterwarnings("ignore::tactile_bayes.errors.ClearanceWarning")
+
 ACCURACY, SNAP_OFF = 1e-9, 1e-14
 ULPS = 8
 ONE = np.zeros(1, dtype=np.intp)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
@@ -273,7 +274,7 @@ def test_rods_are_coloured_by_phase_and_end_at_their_contacts(unit, direction, r
 
 def test_rods_of_a_noisy_record_are_the_true_ones(plain, noisy):
     """A scan whose record has been through a load cell."""
-    ax = plotting.rods(type(plain)(noisy, plain.events, plain.contour), count=5)
+    ax = plotting.rods(replace(plain, record=noisy), count=5)
     expected = plotting.rods(plain, count=5)
     np.testing.assert_array_equal(lines_of(ax, "tip")[0].get_data(), lines_of(expected, "tip")[0].get_data())
 

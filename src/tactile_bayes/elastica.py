@@ -31,6 +31,7 @@ __all__ = [
     "QuickWrench",
     "Wrench",
     "contact_from_wrench",
+    "largest_curvature",
     "quick_tangential_arclength",
     "quick_wrench",
     "tangential_arclength",
@@ -404,3 +405,22 @@ def _contact(phi0: Floats, moment: Floats, fx: Floats, fy: Floats, delta: Floats
         np.where(mirrored, np.pi - tip_angle, tip_angle),
         modulus,
     )
+
+
+def largest_curvature(wrench: Wrench) -> Floats:
+    """Largest curvature of the rod between pivot and contact, in 1/L: its bending moment in EI/L.
+
+    Along the rod κ²/2 = f (sin ψ − sin ψ1), which is greatest where ψ = π/2 if the rod comes past there, else at the
+    pivot, where it is the holding moment.
+
+    Examples
+    --------
+    >>> tangential = wrench_from_contact(0.2, 0.6, [0.1, 0.2])
+    >>> largest_curvature(tangential).round(6) - abs(tangential.holding_moment).round(6)
+    array([0., 0.])
+    """
+    cos, sin = np.cos(wrench.drive_angle), np.sin(wrench.drive_angle)
+    along, across = wrench.force_x * cos + wrench.force_y * sin, wrench.force_y * cos - wrench.force_x * sin
+    inflated = 2.0 * (np.hypot(wrench.force_x, wrench.force_y) - along)
+    bent_round = np.where(wrench.holding_moment < 0.0, -across, across) < 0.0
+    return np.sqrt(wrench.holding_moment**2 + np.where(bent_round, inflated, 0.0))

@@ -1,14 +1,17 @@
-"""The family of errors: each says what was wrong, where, and what to do."""
+"""The family of errors and warnings: each says what was wrong, where, and what to do."""
 
 from __future__ import annotations
 
 __all__ = [
+    "ClearanceWarning",
     "ContourError",
     "InferenceError",
     "ParameterError",
     "ReachError",
     "RecordError",
+    "StrainWarning",
     "TactileBayesError",
+    "TactileBayesWarning",
 ]
 
 
@@ -34,3 +37,15 @@ class RecordError(TactileBayesError, ValueError):
 
 class InferenceError(TactileBayesError, RuntimeError):
     """A posterior cannot be set up or sampled."""
+
+
+class TactileBayesWarning(UserWarning):
+    """Base of every warning of this package."""
+
+
+class ClearanceWarning(TactileBayesWarning):
+    """After snap-off a straight rod would cut the object."""
+
+
+class StrainWarning(TactileBayesWarning):
+    """A rod is bent beyond its elastic limit."""

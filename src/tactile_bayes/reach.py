@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from tactile_bayes.contours.base import Locus
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.roots import falling_root
 
-__all__ = ["CLEARANCE", "Limits", "Reach", "limits", "seen_frame"]
+__all__ = ["CLEARANCE", "Limits", "Reach", "clear_angle", "limits", "seen_frame"]
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -119,3 +120,13 @@ def limits(seen: SeenContour, friction_angle: float) -> Limits:
     reach[~below] = Reach.CUTS_PIVOT
     reach[~below & left_of_lo & ~right_of_hi] = Reach.RUNS_OUT
     return Limits(reach, distance, begin, end, tip_first, end == lo)
+
+
+def clear_angle(seen: SeenContour) -> Floats:
+    """Drive angle of every lane from which on a straight rod is past the contour, as far as that is known.
+
+    There the opposite sweep would first touch.
+    """
+    opposite = replace(seen, mirrored=~seen.mirrored)
+    locus = opposite.locate(np.arange(seen.lanes), limits(opposite, 0.0).begin)
+    return np.pi - np.arctan2(locus.y, locus.x)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from tactile_bayes.errors import ParameterError
 
@@ -26,11 +26,15 @@ class Rod:
     diameter : float
         Diameter of a rod of circular cross-section [m]. The rod touches with its surface, half a diameter beside
         its centreline; 0 (the default) is a rod without thickness.
+    elastic_strain : float, optional
+        Largest bending strain that the material takes without staying bent: about 0.002 for mild steel, 0.005 for
+        spring steel, 0.05 for nitinol. `scan` warns where a rod with a diameter is bent beyond it.
 
     Raises
     ------
     ParameterError
-        If length or flexural rigidity is not positive and finite, or the diameter is negative.
+        If length or flexural rigidity is not positive and finite, the diameter is negative, or the elastic strain is
+        not positive.
 
     Examples
     --------
@@ -42,6 +46,7 @@ class Rod:
     length: float = 1.0
     flexural_rigidity: float = 1.0
     diameter: float = 0.0
+    elastic_strain: float | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -50,9 +55,15 @@ class Rod:
                 raise ParameterError(f"the rod's {name} is {value!r}: give a positive number [{unit}]")
         if not (math.isfinite(self.diameter) and self.diameter >= 0):
             raise ParameterError(f"the rod's diameter is {self.diameter!r}: give zero or a positive number [m]")
+        if self.elastic_strain is not None and not self.elastic_strain > 0.0:
+            raise ParameterError(
+                f"the rod's elastic strain is {self.elastic_strain!r}: give a positive number, or none"
+            )
 
     @classmethod
-    def circular(cls, length: float, diameter: float, youngs_modulus: float) -> Rod:
+    def circular(
+        cls, length: float, diameter: float, youngs_modulus: float, elastic_strain: float | None = None
+    ) -> Rod:
         """Rod of solid circular cross-section: EI = E π d⁴ / 64.
 
         Parameters
@@ -61,6 +72,8 @@ class Rod:
             Length and diameter [m].
         youngs_modulus : float
             Young's modulus E [Pa].
+        elastic_strain : float, optional
+            As of `Rod`.
 
         Examples
         --------
@@ -71,7 +84,7 @@ class Rod:
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
             if not (math.isfinite(value) and value > 0):
                 raise ParameterError(f"the rod's {name} is {value!r}: give a positive number")
-        return cls(length, youngs_modulus * math.pi * diameter**4 / 64, diameter)
+        return cls(length, youngs_modulus * math.pi * diameter**4 / 64, diameter, elastic_strain)
 
     @property
     def is_dimensionless(self) -> bool:

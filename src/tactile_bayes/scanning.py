@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -12,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import PHASE_NAMES, TANGENTIAL, TIP, Wrench, wrench_from_contact
-from tactile_bayes.errors import ContourError, ParameterError, ReachError
+from tactile_bayes.elastica import PHASE_NAMES, TANGENTIAL, TIP, Wrench, largest_curvature, wrench_from_contact
+from tactile_bayes.errors import ClearanceWarning, ContourError, ParameterError, ReachError, StrainWarning
 from tactile_bayes.path import CLEARANCE, Paths, Reach, SnapOff, States, trace
+from tactile_bayes.reach import clear_angle
 from tactile_bayes.record import COLUMNS, make_record
 from tactile_bayes.rod import Rod
 
@@ -24,6 +27,9 @@ Direction = Literal["forward", "backward"]
 Floats = NDArray[np.float64]
 
 _ORDER = 32
+_STRAINED = 65
+"""States on each stretch of a path of which the largest strain is taken."""
+
 _MARGIN = 15
 """Steps of the drive before first contact and after snap-off."""
 
@@ -59,11 +65,38 @@ class Event:
 
 @dataclass(frozen=True)
 class SweepEvents:
-    """Where contact begins, changes its phase and ends in one sweep."""
+    """Where contact begins, changes its phase and ends in one sweep.
 
+    Attributes
+    ----------
+    direction : str
+        "forward" or "backward".
+    base : (float, float)
+        The pivot.
+    first_contact, snap_off : Event
+    transitions : tuple of Event
+        Changes of the phase, in the order in which they happen.
+    clear : bool
+        Whether the straight rod is free of the object after snap-off. If it is not, the rod comes to rest in another
+        contact, which no sweep leads to.
+    largest_strain : float
+        Largest bending strain of the rod up to snap-off, to about 1e-5 of it; 0 for a rod without thickness.
+    """
+
+    direction: str
+    base: tuple[float, float]
     first_contact: Event
     transitions: tuple[Event, ...]
     snap_off: Event
+    clear: bool
+    largest_strain: float
+
+
+class _ByDirection(dict[str, SweepEvents]):
+    def __missing__(self, direction: str) -> SweepEvents:
+        have = ", ".join(map(repr, self))
+        hint = f"choose from {have}" if have else "there are several bases, so take scan.sweeps[number] instead"
+        raise ParameterError(f"the scan has no events of direction {direction!r}: {hint}")
 
 
 @dataclass(frozen=True)
@@ -74,15 +107,22 @@ class Scan:
     ----------
     record : xr.Dataset
         The record, dimension "sample", with `truth_` columns for what the base cannot feel.
+    sweeps : tuple of SweepEvents
+        The events of each sweep, by its number in the record.
     events : mapping of str to SweepEvents
-        By direction.
+        The same by direction, where there is one base only.
     contour : Contour
         What was scanned.
     """
 
     record: xr.Dataset
-    events: Mapping[str, SweepEvents]
+    sweeps: tuple[SweepEvents, ...]
     contour: Contour
+
+    @property
+    def events(self) -> Mapping[str, SweepEvents]:
+        one_base = len({sweep.base for sweep in self.sweeps}) == 1
+        return _ByDirection({sweep.direction: sweep for sweep in self.sweeps} if one_base else {})
 
 
 def equilibria(
@@ -157,7 +197,7 @@ def scan(
     contour: Contour,
     *,
     direction: Literal["both", "forward", "backward"] = "both",
-    base: tuple[float, float] = (0.0, 0.0),
+    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
     drive_step: float = float(np.radians(1.0)),
     drive_angles: ArrayLike | None = None,
     rod: Rod | None = None,
@@ -171,8 +211,9 @@ def scan(
         In metres if `rod` is given in SI, else in rod lengths.
     direction : {"both", "forward", "backward"}
         Which sweeps; "both" is a forward sweep (number 0), then a backward one (number 1).
-    base : (float, float)
-        The pivot, in the contour's unit of length. The contour must lie above it.
+    base : (float, float) or sequence of them
+        The pivot, in the contour's unit of length. The contour must lie above it. With several pivots (a support that
+        is moved, or an array of whiskers) each is visited in turn, and the sweeps are numbered through.
     drive_step : float
         Step of the drive [rad]; the grid consists of its multiples, and reaches 15 steps beyond contact on both sides,
         as far as a turn goes.
@@ -187,6 +228,14 @@ def scan(
     -------
     Scan
         Outside contact the load is zero and the `truth_` columns are NaN, their phase "none".
+
+    Warns
+    -----
+    ClearanceWarning
+        If the straight rod would cut the object after snap-off: what it does then is not known, and the samples are
+        left out.
+    StrainWarning
+        If the rod is bent beyond its elastic strain.
 
     Raises
     ------
@@ -212,21 +261,56 @@ def scan(
     if grid is not None and not (grid.size and np.all(np.isfinite(grid)) and np.all(np.abs(grid) <= 2.0 * np.pi)):
         raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
 
-    sweeps: list[dict[str, NDArray[np.generic]]] = []
-    events: dict[str, SweepEvents] = {}
-    for number, sense in enumerate(directions):
-        paths = sweep_paths(contour, base=base, direction=sense, rod=rod, friction=friction)
-        events[sense] = _events(paths, rod)
+    columns: list[dict[str, NDArray[np.generic]]] = []
+    sweeps: list[SweepEvents] = []
+    for pivot, sense in product(_pivots(base), directions):
+        paths = sweep_paths(contour, base=pivot, direction=sense, rod=rod, friction=friction)
+        sweep = _events(paths, sense, pivot, rod)
+        _warn_of(sweep, rod)
         if grid is None:
-            first, snap = np.sort([events[sense].first_contact.drive_angle, events[sense].snap_off.drive_angle])
+            first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
             steps = np.arange(np.floor(first / drive_step) - _MARGIN, np.ceil(snap / drive_step) + _MARGIN + 1)
             angles = steps * drive_step
             angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a record knows none beyond
         else:
             angles = grid
-        sweeps.append(_sweep(paths, angles[:: 1 if sense == "forward" else -1], number, sense, base, rod))
-    columns = {name: np.concatenate([sweep[name] for sweep in sweeps]) for name in sweeps[0]}
-    return Scan(make_record(columns, rod=rod), events, contour)
+        if not sweep.clear:
+            onward = 1.0 if sense == "forward" else -1.0
+            angles = angles[onward * (sweep.snap_off.drive_angle - angles) >= 0.0]
+        columns.append(_sweep(paths, angles[:: 1 if sense == "forward" else -1], len(sweeps), sense, pivot, rod))
+        sweeps.append(sweep)
+    record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
+    return Scan(make_record(record, rod=rod), tuple(sweeps), contour)
+
+
+def _pivots(base: tuple[float, float] | Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    try:
+        pivots = np.asarray(base, dtype=float)
+    except (TypeError, ValueError):
+        pivots = np.empty(0)
+    if pivots.shape == (2,):
+        pivots = pivots[None]
+    if pivots.ndim != 2 or pivots.shape[1] != 2 or not pivots.size or not np.all(np.isfinite(pivots)):
+        raise ParameterError(f"base is {base!r}: give a pivot (x, y), or several: [(x, y), (x, y)]")
+    return [(float(x), float(y)) for x, y in pivots]
+
+
+def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
+    where = f"in the {sweep.direction} sweep from ({sweep.base[0]:g}, {sweep.base[1]:g})"
+    if not sweep.clear:
+        warnings.warn(
+            f"{where} the rod snaps at {sweep.snap_off.drive_angle:.6g} rad, but straight it would still cut the "
+            "object: it comes to rest in another contact, which no sweep leads to; the samples after that are left out",
+            ClearanceWarning,
+            stacklevel=3,
+        )
+    if rod.elastic_strain is not None and sweep.largest_strain > rod.elastic_strain:
+        warnings.warn(
+            f"{where} the rod is strained by {sweep.largest_strain:.3g}, more than the {rod.elastic_strain:g} that it "
+            "takes elastically: it would stay bent; take a thinner or longer rod, or stop the drive earlier",
+            StrainWarning,
+            stacklevel=3,
+        )
 
 
 def sweep_paths(
@@ -268,12 +352,22 @@ def sweep_paths(
                 "rod's length): move one of them away"
             )
         case Reach.ENDS:
-            side = "right" if direction == "forward" else "left"
             raise ContourError(
-                f"in a {direction} sweep the rod would first touch beyond the contour's {side} end, where nothing is "
-                "known of the object: extend the contour, or move the pivot"
+                f"in a {direction} sweep the rod would first touch beyond {_end(contour, direction == 'forward')}, "
+                "and nothing is known of the object there: extend the contour, or move the pivot"
+            )
+        case Reach.RUNS_OUT:
+            raise ContourError(
+                f"in a {direction} sweep the rod would still touch at {_end(contour, direction == 'backward')}, and "
+                "nothing is known of the object beyond: extend the contour, or move the pivot"
             )
     return paths
+
+
+def _end(contour: Contour, at_right: bool) -> str:
+    side: Literal["left", "right"] = "right" if at_right else "left"
+    locus = contour.locate(contour.domain[1 if at_right else 0])
+    return f"the contour's {side} end at ({float(locus.x):.6g}, {float(locus.y):.6g}), {contour.end_name(side)}"
 
 
 def _seen(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SeenContour:
@@ -333,7 +427,7 @@ def _sweep(
     return sweep
 
 
-def _events(paths: Paths, rod: Rod) -> SweepEvents:
+def _events(paths: Paths, direction: Direction, base: tuple[float, float], rod: Rod) -> SweepEvents:
     segments = paths.segments
     inner = np.flatnonzero(segments.tip[1:] != segments.tip[:-1])
     parameters = np.concatenate([paths.first_parameter, segments.end[inner], paths.snap_parameter])
@@ -349,7 +443,18 @@ def _events(paths: Paths, rod: Rod) -> SweepEvents:
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]
     found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
-    return SweepEvents(found[0], tuple(found[1:-1]), found[-1])
+    clear = bool(paths.snap_angle[0] > clear_angle(paths.seen)[0])
+    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, _largest_strain(paths, rod))
+
+
+def _largest_strain(paths: Paths, rod: Rod) -> float:
+    """Largest bending strain up to snap-off: that of the outer fibre, from the curvature on the nodes of the path."""
+    if not rod.diameter:
+        return 0.0
+    ways = np.broadcast_to(np.linspace(0.0, 1.0, _STRAINED), (paths.segments.lane.size, _STRAINED))
+    parameter, _ = paths.segments.take(np.s_[:, None]).along(ways)
+    wrench = paths.states_at(np.zeros(parameter.size, dtype=np.intp), parameter.ravel()).wrench
+    return float(np.nanmax(largest_curvature(wrench))) * 0.5 * rod.diameter / rod.length
 
 
 def _at_rest_first(states: States, tip: bool) -> Wrench:

@@ -78,8 +78,9 @@ def _descend(residuals: Residuals, start: Floats, middle: Floats, spread: Floats
         return np.concatenate([(values[: point.size] - values[point.size :]).T / 2e-4, np.eye(point.size)])
 
     solution = least_squares(one, start / spread, jacobian, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)
-    slope = np.asarray(solution.jac)
-    covariance = np.linalg.inv(slope.T @ slope) * np.outer(spread, spread)
+    _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
+    axes = axes / sizes[:, None] * spread
+    covariance = axes.T @ axes
     return Optimum(solution.x * spread, covariance, one(solution.x)[: -spread.size], float(solution.cost))
 
 
@@ -89,7 +90,7 @@ class Cloud:
 
     centre: Floats
     root: Floats
-    """Cholesky factor of the covariance."""
+    """Times its transpose it is the covariance."""
     floor: float
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
@@ -117,7 +118,7 @@ def gather(
     """
     size = centre.size
     for _ in range(_ROUNDS):
-        root = np.linalg.cholesky(np.asarray(covariance, dtype=np.float64))
+        root = _square_root(covariance)
         cloud = Cloud(centre, _WIDER * root, -np.inf)
         points = cloud.draw(rng, 60 * size)
         values = log_probability(points)
@@ -131,3 +132,10 @@ def gather(
         else:
             covariance = 0.25 * covariance
     return replace(cloud, floor=float(min(floor, np.quantile(values, 0.8, method="lower"))))
+
+
+def _square_root(covariance: Floats) -> Floats:
+    """R with R Rᵀ the covariance, also where rounding has left that without an inverse."""
+    scale = np.sqrt(np.diag(covariance))
+    values, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return scale[:, None] * axes * np.sqrt(np.maximum(values, np.finfo(float).eps))

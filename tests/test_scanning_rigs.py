@@ -1,0 +1,226 @@
+"""Rigs: several bases, ends of contours, what happens after snap-off, strain, and units."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from tactile_bayes import Rod, reconstruct, scan
+from tactile_bayes.contours import (
+    Circle,
+    Ellipse,
+    Joined,
+    Parabola,
+    PowerLaw,
+    from_function,
+    from_points,
+    paper_profile,
+)
+from tactile_bayes.errors import ClearanceWarning, ContourError, ParameterError, StrainWarning
+
+LOADS = ("holding_moment", "force_x", "force_y")
+
+
+def test_several_bases_are_the_single_ones_in_one_record():
+    bases = [(0.0, 0.0), (0.35, -0.05), (-0.3, 0.1)]
+    contour = paper_profile("II", q=0.5)
+    several = scan(contour, base=bases)
+    assert [(s.base, s.direction) for s in several.sweeps] == [(b, d) for b in bases for d in ("forward", "backward")]
+    assert np.unique(several.record.sweep).tolist() == list(range(6))
+    for number, base in enumerate(bases):
+        alone = scan(contour, base=base)
+        for sweep, direction in enumerate(("forward", "backward")):
+            ours = several.record.isel(sample=several.record.sweep.values == 2 * number + sweep)
+            theirs = alone.record.isel(sample=alone.record.sweep.values == sweep)
+            for name in ("base_x", "base_y", "drive_angle", *LOADS, "truth_contact_x", "truth_contact_phase"):
+                np.testing.assert_array_equal(ours[name], theirs[name])
+            assert several.sweeps[2 * number + sweep] == alone.events[direction] == alone.sweeps[sweep]
+    with pytest.raises(
+        ParameterError, match=r"no events of direction 'forward': there are several bases.*scan\.sweeps"
+    ):
+        several.events["forward"]
+    with pytest.raises(ParameterError, match="no events of direction 'backward': choose from 'forward'"):
+        scan(contour, direction="forward").events["backward"]
+
+
+@pytest.mark.parametrize(("name", "q"), [("I", 0.4), ("II", 0.5), ("III", 0.5), ("IV", 0.4)])
+def test_more_bases_close_the_gap_of_one(name, q):
+    contour = paper_profile(name, q=q)
+
+    def widest_hole(bases):
+        contacts = reconstruct(scan(contour, base=bases, drive_step=np.radians(0.5)).record)
+        x = np.sort(contacts.contact_x.values[contacts.status.values == "ok"])
+        x = x[np.abs(x) < 0.3]
+        return np.diff(x).max()
+
+    one, three = widest_hole((0.0, 0.0)), widest_hole([(-0.25, 0.0), (0.0, 0.0), (0.25, 0.0)])
+    assert one > 0.04
+    assert three < 0.5 * one
+
+
+@pytest.mark.parametrize("base", ["here", (0.0,), [], [(0.0, np.nan)], (0.0, 0.0, 0.0), [(0, 0), (1,)]])
+def test_a_base_that_is_none_is_refused(base):
+    with pytest.raises(ParameterError, match=r"base is .*: give a pivot \(x, y\), or several: \[\(x, y\), \(x, y\)\]"):
+        scan(Parabola(0.5, 0.5), base=base)
+
+
+HALF = np.linspace(0.1, 0.9, 30)
+
+
+@pytest.mark.parametrize(
+    ("contour", "base", "direction", "message"),
+    [
+        (
+            Circle(0.3, 0.3),
+            (0.6, 0.2),
+            "forward",
+            r"first touch beyond .* right end at \(0\.3, 0\.6\), where it stands up",
+        ),
+        (
+            Circle(0.3, 0.3),
+            (-0.6, 0.2),
+            "backward",
+            r"first touch beyond .* left end at \(-0\.3, 0\.6\), where it stands",
+        ),
+        (Ellipse(0.3, 0.2, 0.3), (0.6, 0.2), "forward", r"right end at \(0\.3, 0\.5\), where it stands upright"),
+        (
+            from_function(lambda x: 0.3 + 0.5 * x**2, (-0.9, 0.5)),
+            (0.0, 0.0),
+            "forward",
+            r"beyond the contour's right end at \(0\.5, 0\.425\), the end of the function's domain",
+        ),
+        (
+            from_points(HALF, 0.3 + 0.5 * HALF**2),
+            (0.0, 0.0),
+            "forward",
+            r"still touch at the contour's left end at \(0\.1, 0\.305\), the first point measured, and nothing",
+        ),
+        (
+            Joined(Circle(0.4, 0.3), Parabola(0.5, 0.3)),
+            (-0.7, 0.25),
+            "backward",
+            r"the contour's left end at \(-0\.4, 0\.7\), where it stands upright",
+        ),
+    ],
+)
+def test_contact_beyond_an_end_is_refused_with_its_name(contour, base, direction, message):
+    with pytest.raises(ContourError, match=message):
+        scan(contour, base=base, direction=direction)
+
+
+def test_half_a_contour_will_do_if_the_rod_lets_go_before_its_end():
+    whole = scan(Parabola(0.5, 0.5), direction="forward")
+    half = scan(from_function(lambda x: 0.5 + 0.5 * x**2, (0.0, 2.0)), direction="forward")
+    np.testing.assert_allclose(half.record.holding_moment, whole.record.holding_moment, rtol=0, atol=1e-12)
+
+
+def test_a_rod_that_would_be_stopped_again_is_said_so():
+    """A tip slips over the sharp vertex of a nearly flat object, whose other flank is still in the rod's way."""
+    contour = PowerLaw(0.0954, 1.549, 0.33, 0.892)
+    with pytest.warns(
+        ClearanceWarning, match=r"forward sweep from \(0, 0\) the rod snaps at 1\.04795 rad, but straight"
+    ):
+        result = scan(contour, direction="forward", drive_step=0.01)
+    sweep = result.sweeps[0]
+    assert not sweep.clear
+    along = np.linspace(0.01, 1.0, 100)
+    height = contour.height(along * np.cos(sweep.snap_off.drive_angle))
+    assert np.any(along * np.sin(sweep.snap_off.drive_angle) > height)  # the straight rod would be inside
+    last = result.record.drive_angle.values[-1]
+    assert sweep.snap_off.drive_angle - 0.01 <= last <= sweep.snap_off.drive_angle
+    assert result.record.force_y.values[-1] > 0.0
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.sampled_from(["I", "II", "III", "IV"]),
+    st.floats(0.25, 0.8),
+    st.floats(-0.2, 0.2),
+    st.sampled_from(["forward", "backward"]),
+)
+def test_clear_means_that_the_straight_rod_is_outside(name, q, x, direction):
+    contour = paper_profile(name, q=q)
+    result = scan(contour, base=(x, 0.0), direction=direction, drive_step=0.1)
+    sweep = result.sweeps[0]
+    assert sweep.clear
+    for angle in np.linspace(sweep.snap_off.drive_angle, np.pi if direction == "forward" else 0.0, 5):
+        along = np.linspace(0.0, 1.0, 400)
+        height = contour.height(x + along * np.cos(angle))
+        assert not np.any(along * np.sin(angle) > height)  # NaN beyond an end
+
+
+WIRE = Rod.circular(length=0.2, diameter=0.5e-3, youngs_modulus=206e9, elastic_strain=0.02)
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+@pytest.mark.parametrize("q", [0.06, 0.1])
+def test_the_largest_strain_against_integration(direction, q):
+    """Half the diameter times the greatest curvature of any state, found by integrating the rod from its base."""
+    contour = Parabola(2.5, q)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StrainWarning)
+        result = scan(contour, direction=direction, rod=WIRE, drive_step=np.radians(0.5))
+    record, greatest = result.record, 0.0
+    for i in np.flatnonzero(record.truth_contact_phase.values != "none"):
+        moment, fx, fy, angle, length = (
+            float(record[name][i]) for name in (*LOADS, "drive_angle", "truth_contact_arclength")
+        )
+
+        def bend(_, state, fx=fx, fy=fy):
+            return [state[1], (fy * np.cos(state[0]) - fx * np.sin(state[0])) / WIRE.flexural_rigidity]
+
+        rod = solve_ivp(
+            bend, (0.0, length), [angle, -moment / WIRE.flexural_rigidity], rtol=1e-9, max_step=length / 100
+        )
+        greatest = max(greatest, float(np.abs(rod.y[1]).max()))
+    strain = result.sweeps[0].largest_strain
+    # On the grid of half a degree the greatest is a little less than on the whole path, which is sampled, too.
+    assert greatest * 0.5 * WIRE.diameter * (1 - 1e-4) <= strain <= 1.05 * greatest * 0.5 * WIRE.diameter
+
+
+def test_a_rod_bent_beyond_its_limit_is_warned_of():
+    with pytest.warns(StrainWarning, match=r"strained by 0\.00\d+, more than the 0\.001 that it takes elastically"):
+        scan(Parabola(2.5, 0.1), rod=Rod.circular(0.2, 0.5e-3, 206e9, elastic_strain=0.001), direction="forward")
+    assert scan(Parabola(2.5, 0.1), rod=WIRE, direction="forward").sweeps[0].largest_strain < 0.02  # and no warning
+    assert scan(Parabola(0.5, 0.5)).sweeps[0].largest_strain == 0.0
+    with pytest.raises(ParameterError, match=r"the rod's elastic strain is -0\.1: give a positive number, or none"):
+        Rod(elastic_strain=-0.1)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.floats(0.01, 10.0),
+    st.floats(1e-6, 10.0),
+    st.floats(0.0, 0.02),
+    st.sampled_from(["forward", "backward"]),
+    st.floats(0.0, 0.5),
+)
+def test_scale_of_length_and_stiffness_leaves_the_dimensionless_answer_alone(length, rigidity, diameter, direction, mu):
+    plain = Rod(diameter=diameter)
+    scaled = Rod(length, rigidity, diameter * length)
+    one = scan(Ellipse(0.8, 0.6, 0.4, 0.1), base=(0.05, -0.1), direction=direction, rod=plain, friction=mu)
+    other = scan(
+        Ellipse(0.8 * length, 0.6 * length, 0.4 * length, 0.1 * length),
+        base=(0.05 * length, -0.1 * length),
+        direction=direction,
+        rod=scaled,
+        friction=mu,
+    )
+    for event in ("first_contact", "snap_off"):
+        a, b = (getattr(result.sweeps[0], event) for result in (one, other))
+        assert a.kind == b.kind
+        assert abs(a.drive_angle - b.drive_angle) < 1e-13
+        assert abs(a.contact_x * length - b.contact_x) < 1e-7 * length  # at a fold the contact is known to √ε
+    assert abs(one.sweeps[0].largest_strain - other.sweeps[0].largest_strain) <= 1e-9
+    grid = one.record.drive_angle.values
+    far = np.abs(grid - one.sweeps[0].snap_off.drive_angle) > 1e-6
+    units = {"holding_moment": rigidity / length, "force_x": rigidity / length**2, "force_y": rigidity / length**2}
+    for name, unit in units.items():
+        largest = np.abs(one.record[name]).max().item()
+        miss = np.abs(one.record[name].values - other.record[name].values / unit)[far]
+        assert miss.max() <= 1e-9 * largest
