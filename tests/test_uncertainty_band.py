@@ -43,9 +43,10 @@ def test_a_pointwise_band_is_made_of_quantiles(probability):
 
 @pytest.mark.parametrize("which", ["made", "inferred"])
 def test_a_simultaneous_band_holds_whole_contours(which):
-    """Its share of whole contours is the stated one, up to one contour; pointwise bands hold fewer."""
+    """Its share of whole contours is the stated one, up to one contour (walkers repeat); pointwise bands hold fewer."""
     posterior_ = made() if which == "made" else posterior()
     heights = contour_heights(posterior_, X)
+    _, repeats = np.unique(heights, axis=0, return_counts=True)
 
     def share(band):
         slack = 1e-12
@@ -57,7 +58,7 @@ def test_a_simultaneous_band_holds_whole_contours(which):
     np.testing.assert_array_equal(whole["median"], pointwise["median"])
     assert np.all(whole.lower < pointwise.lower)
     assert np.all(whole.upper > pointwise.upper)
-    assert share(whole) == pytest.approx(0.9, abs=2.0 / len(heights))
+    assert share(whole) == pytest.approx(0.9, abs=2.0 * repeats.max() / len(heights))
     assert share(pointwise) < 0.9
 
 
