@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import re
 
 import numpy as np
@@ -209,8 +208,6 @@ def test_the_points_are_kept_as_they_were_and_the_text_is_short():
     assert contour.scatter == 0.002
     assert contour.residual_rms == pytest.approx(np.sqrt(np.mean((np.array(y) - contour.height(x)) ** 2)))
     assert len(repr(contour)) < 120
-    again = pickle.loads(pickle.dumps(contour))
-    assert again.height(0.1) == contour.height(0.1)
     with pytest.raises(ValueError, match="read-only"):
         contour.x[0] = 1.0
 

@@ -415,9 +415,9 @@ def largest_curvature(wrench: Wrench) -> Floats:
 
     Examples
     --------
-    >>> tangential = wrench_from_contact(0.2, 0.6, [0.1, 0.2])
-    >>> largest_curvature(tangential).round(6) - abs(tangential.holding_moment).round(6)
-    array([0., 0.])
+    >>> bent = wrench_from_contact(0.2, 0.6, [0.1, 0.8])
+    >>> bent.holding_moment.round(6), largest_curvature(bent).round(6)
+    (array([2.18262 , 3.400363]), array([4.000574, 3.400363]))
     """
     cos, sin = np.cos(wrench.drive_angle), np.sin(wrench.drive_angle)
     along, across = wrench.force_x * cos + wrench.force_y * sin, wrench.force_y * cos - wrench.force_x * sin
