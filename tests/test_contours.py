@@ -230,6 +230,7 @@ def BATH_CURVATURE(x):
         (lambda: ShapeFree([0.0, 0.1, 0.1, 0.2], np.zeros(4), 0, 0.3), r"ShapeFree: .*increasing angles"),
         (lambda: ShapeFree(KNOTS, np.zeros(4), 0, 0.3), r"ShapeFree: log_radius of shape \(4,\).*each of 5"),
         (lambda: ShapeFree(KNOTS, [0, 0, np.nan, 0, 0], 0, 0.3), r"ShapeFree: log_radius must be finite"),
+        (lambda: ShapeFree([-1, 0, 1e-6, 1], [0, 0, 1, 0], 0, 0.3), r"log_radius runs off to .*: knots that nearly"),
         (lambda: ShapeFree(KNOTS, np.zeros(5), 0, np.inf), r"ShapeFree: x and y must be finite"),
         (lambda: ShapeFree(KNOTS, np.zeros(5), 0, 0.3, at=1.4), r"at = 1\.4 is not among .* -1\.3 to 1\.3"),
         (lambda: from_function(np.abs, (-1, 1)), r"from_function: absolute is not smooth enough .*Joined"),

@@ -17,6 +17,9 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["ShapeFree"]
 
+_LARGEST = 100.0
+"""Logarithm of a radius beyond which a spline has overshot."""
+
 _ORDER = 32
 """Chebyshev nodes a stretch between knots: what radii that change twentyfold there leave is rounding."""
 
@@ -42,7 +45,8 @@ class ShapeFree(Contour):
     Raises
     ------
     ContourError
-        If the knots are not increasing angles, there is not one value a knot, or a value is not finite.
+        If the knots are not increasing angles, there is not one value a knot, a value is not finite, or the spline runs
+        off between knots that nearly coincide.
 
     Examples
     --------
@@ -86,6 +90,11 @@ class ShapeFree(Contour):
         knots, width = self.slope_angles, np.diff(self.slope_angles)
         alpha = knots[:-1, None] + width[:, None] * chebyshev.nodes(_ORDER)
         log_radius = CubicSpline(knots, self.log_radius.reshape(-1, knots.size), axis=-1)(alpha)
+        if np.abs(log_radius).max(initial=0.0) > _LARGEST:
+            raise ContourError(
+                f"ShapeFree: between the knots log_radius runs off to {np.abs(log_radius).max():.3g}: knots that "
+                "nearly coincide make the spline overshoot; move them apart, or make their values alike"
+            )
         radius = np.exp(log_radius)
         rates = np.stack([radius * np.cos(alpha), radius * np.sin(alpha)], axis=2)  # (row, stretch, 2, order)
         path = chebyshev.integral(chebyshev.coefficients(rates)) * width[:, None]
