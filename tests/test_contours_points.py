@@ -13,7 +13,8 @@ from scipy.stats import t as student_t
 
 from tactile_bayes import scan
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
-from tactile_bayes.contours.points import _FALSE_ALARM, _FLOOR, _Bends, from_points
+from tactile_bayes.contours.bends import FALSE_ALARM, Bends
+from tactile_bayes.contours.points import _FLOOR, from_points
 from tactile_bayes.errors import ContourError
 
 ARCS = {
@@ -258,20 +259,20 @@ def test_false_alarms_of_the_bends_where_they_are_most_likely(count):
     rng, alarms, draws = np.random.default_rng(11), 0, 2000
     for _ in range(draws):
         u = np.sort(rng.uniform(-1, 1, count))
-        bends = _Bends.of(u, rng.standard_normal(count), np.ones(count))
-        alarms += bends.errors.min() < -student_t.isf(_FALSE_ALARM / bends.errors.size, np.inf)
-    assert alarms <= most(draws, _FALSE_ALARM)
+        bends = Bends.of(u, rng.standard_normal(count), np.ones(count))
+        alarms += bends.errors.min() < -student_t.isf(FALSE_ALARM / bends.errors.size, np.inf)
+    assert alarms <= most(draws, FALSE_ALARM)
 
 
 def test_bends_are_standard_normal_on_a_line_and_never_negative_on_a_convex_arc():
     rng, count, draws = np.random.default_rng(12), 30, 2000
     u, noise = np.sort(rng.uniform(-1, 1, count)), rng.uniform(0.5, 2.0, count)
-    errors = np.array([_Bends.of(u, 3 - u + noise * rng.standard_normal(count), noise).errors for _ in range(draws)])
+    errors = np.array([Bends.of(u, 3 - u + noise * rng.standard_normal(count), noise).errors for _ in range(draws)])
     # Variances of `draws` draws have the relative standard deviation √(2/draws); five of them for some 130 stretches.
     assert np.abs(errors.var(axis=0) - 1).max() < 5 * np.sqrt(2 / draws)
     assert np.abs(errors.mean(axis=0)).max() < 5 / np.sqrt(draws)
     for arc in (u**2, np.abs(u - 0.2), np.maximum(0.0, u) ** 3):
-        assert _Bends.of(u, arc, noise).errors.min() > -1e-12
+        assert Bends.of(u, arc, noise).errors.min() > -1e-12
 
 
 def alarms(count, draws, arc, seed):
@@ -289,13 +290,13 @@ def alarms(count, draws, arc, seed):
 @pytest.mark.parametrize("arc", [lambda x: 0.0 * x, lambda x: np.maximum(0.0, x) ** 3], ids=["line", "half a line"])
 @pytest.mark.parametrize("count", [8, 40])
 def test_false_alarms_with_the_scatter_estimated(count, arc):
-    assert alarms(count, 150, arc, seed=13) <= most(150, _FALSE_ALARM)
+    assert alarms(count, 150, arc, seed=13) <= most(150, FALSE_ALARM)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [6, 8, 15, 40, 120])
 def test_false_alarms_with_the_scatter_estimated_many_times(count):
-    assert alarms(count, 5000, lambda x: 0.0 * x, seed=14) <= most(5000, _FALSE_ALARM)
+    assert alarms(count, 5000, lambda x: 0.0 * x, seed=14) <= most(5000, FALSE_ALARM)
 
 
 # Refusals of what cannot be a contour

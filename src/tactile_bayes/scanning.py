@@ -6,90 +6,27 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.contours.base import Contour
-from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import PHASE_NAMES, TANGENTIAL, TIP, Wrench, largest_curvature, wrench_from_contact
-from tactile_bayes.errors import ClearanceWarning, ContourError, ParameterError, ReachError, StrainWarning
-from tactile_bayes.path import CLEARANCE, Paths, Reach, SnapOff, States, trace
-from tactile_bayes.reach import clear_angle
+from tactile_bayes.elastica import wrench_from_contact
+from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
+from tactile_bayes.path import Paths, States
 from tactile_bayes.record import COLUMNS, make_record
 from tactile_bayes.rod import Rod
+from tactile_bayes.sweep_events import SweepEvents, events_of
+from tactile_bayes.sweep_path import Direction, in_world, seen_from, sweep_paths
 
-__all__ = ["Event", "Scan", "SweepEvents", "equilibria", "scan", "sweep_paths"]
+__all__ = ["Scan", "equilibria", "scan"]
 
-Direction = Literal["forward", "backward"]
 Floats = NDArray[np.float64]
-
-_ORDER = 32
-_STRAINED = 65
-"""States on each stretch of a path of which the largest strain is taken."""
 
 _MARGIN = 15
 """Steps of the drive before first contact and after snap-off."""
-
-
-@dataclass(frozen=True)
-class Event:
-    """A distinguished state of a sweep, in the units of the scan.
-
-    Attributes
-    ----------
-    kind : str
-        "tip" or "tangential" at first contact; "tip → tangential" and so on at a change; "fold" (a smooth maximum of
-        the drive angle), "corner" (a maximum where the phase changes or the contour's curvature jumps) or "thrust"
-        (the line of force has come to pass through the pivot) at snap-off.
-    drive_angle, slope_angle : float
-        [rad].
-    contact_x, contact_y, contact_arclength : float
-        Contact point on the object and arc length of the rod up to it [length].
-    holding_moment, force_x, force_y : float
-        Base wrench.
-    """
-
-    kind: str
-    drive_angle: float
-    slope_angle: float
-    contact_x: float
-    contact_y: float
-    contact_arclength: float
-    holding_moment: float
-    force_x: float
-    force_y: float
-
-
-@dataclass(frozen=True)
-class SweepEvents:
-    """Where contact begins, changes its phase and ends in one sweep.
-
-    Attributes
-    ----------
-    direction : str
-        "forward" or "backward".
-    base : (float, float)
-        The pivot.
-    first_contact, snap_off : Event
-    transitions : tuple of Event
-        Changes of the phase, in the order in which they happen.
-    clear : bool
-        Whether the straight rod is free of the object after snap-off. If it is not, the rod comes to rest in another
-        contact, which no sweep leads to.
-    largest_strain : float
-        Largest bending strain of the rod up to snap-off, to about 1e-5 of it; 0 for a rod without thickness.
-    """
-
-    direction: str
-    base: tuple[float, float]
-    first_contact: Event
-    transitions: tuple[Event, ...]
-    snap_off: Event
-    clear: bool
-    largest_strain: float
 
 
 class _ByDirection(dict[str, SweepEvents]):
@@ -175,13 +112,13 @@ def equilibria(
     alpha = np.atleast_1d(np.asarray(slope_angles, dtype=float))
     if alpha.ndim != 1 or not np.all(np.abs(alpha) < 0.5 * np.pi):
         raise ParameterError("slope_angles must be a list of angles in (−π/2, π/2) radians")
-    seen = _seen(contour, base, direction, rod or Rod())
+    seen = seen_from(contour, base, direction, rod or Rod())
     lane = np.zeros(alpha.size, dtype=np.intp)
     parameter = (-1.0 if seen.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
     locus = seen.locate(lane, parameter)
     wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, np.arctan(friction))
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
-    columns = _columns(seen, states, rod or Rod())
+    columns = in_world(seen, states, rod or Rod())
     reached = columns["contact_phase"] != "none"
     data = {}
     for name, values in columns.items():
@@ -265,7 +202,7 @@ def scan(
     sweeps: list[SweepEvents] = []
     for pivot, sense in product(_pivots(base), directions):
         paths = sweep_paths(contour, base=pivot, direction=sense, rod=rod, friction=friction)
-        sweep = _events(paths, sense, pivot, rod)
+        sweep = events_of(paths, sense, pivot, rod)
         _warn_of(sweep, rod)
         if grid is None:
             first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
@@ -313,105 +250,12 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
         )
 
 
-def sweep_paths(
-    contour: Contour,
-    *,
-    base: tuple[float, float] = (0.0, 0.0),
-    direction: Direction = "forward",
-    rod: Rod | None = None,
-    friction: float = 0.0,
-) -> Paths:
-    """The exact path of one sweep along one contour, or a refusal that says why there is none.
-
-    Parameters and errors are those of `scan`.
-    """
-    rod = rod or Rod()
-    seen = _seen(contour, base, direction, rod)
-    height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
-    if np.any(height <= base[1]):
-        raise ContourError(
-            f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
-            f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
-        )
-    paths = trace(seen, friction_angle=float(np.arctan(friction)), order=_ORDER)
-    match Reach(int(paths.reach[0])):
-        case Reach.TOO_FAR:
-            raise ReachError(
-                f"the contour is out of reach: its nearest point is {paths.distance[0] * rod.length:.6g} from the "
-                f"pivot at ({base[0]:g}, {base[1]:g}), and the rod is {rod.length:g} long"
-            )
-        case Reach.CUTS_PIVOT:
-            raise ContourError(
-                f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
-                "contour or lower the pivot"
-            )
-        case Reach.TOO_CLOSE:
-            raise ContourError(
-                f"the contour comes within {paths.distance[0] * rod.length:.6g} of the pivot at ({base[0]:g}, "
-                f"{base[1]:g}); a path can be followed from {CLEARANCE * rod.length:g} on ({CLEARANCE:.0%} of the "
-                "rod's length): move one of them away"
-            )
-        case Reach.ENDS:
-            raise ContourError(
-                f"in a {direction} sweep the rod would first touch beyond {_end(contour, direction == 'forward')}, "
-                "and nothing is known of the object there: extend the contour, or move the pivot"
-            )
-        case Reach.RUNS_OUT:
-            raise ContourError(
-                f"in a {direction} sweep the rod would still touch at {_end(contour, direction == 'backward')}, and "
-                "nothing is known of the object beyond: extend the contour, or move the pivot"
-            )
-    return paths
-
-
-def _end(contour: Contour, at_right: bool) -> str:
-    side: Literal["left", "right"] = "right" if at_right else "left"
-    locus = contour.locate(contour.domain[1 if at_right else 0])
-    return f"the contour's {side} end at ({float(locus.x):.6g}, {float(locus.y):.6g}), {contour.end_name(side)}"
-
-
-def _seen(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SeenContour:
-    if direction not in ("forward", "backward"):
-        raise ParameterError(f"direction is {direction!r}: choose 'forward' or 'backward'")
-    if contour.shape != ():
-        raise ParameterError(f"one contour is wanted here, not an array of shape {contour.shape}")
-    x, y = (np.full(1, float(b)) for b in base)
-    return SeenContour(
-        contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, np.array([direction == "backward"])
-    )
-
-
-def _columns(seen: SeenContour, states: States, rod: Rod) -> dict[str, NDArray[Any]]:
-    """States in the world's signs and units; the contact point is the object's, not the centreline's."""
-    sign = -1.0 if seen.mirrored[0] else 1.0
-    wrench = states.wrench
-    standoff = seen.standoff / seen.length
-    x = states.x - standoff * np.sin(states.slope_angle)
-    y = states.y + standoff * np.cos(states.slope_angle)
-
-    def turned(angle: Floats) -> Floats:
-        return np.pi - angle if seen.mirrored[0] else angle
-
-    return {
-        "drive_angle": turned(wrench.drive_angle),
-        "holding_moment": sign * wrench.holding_moment * rod.moment_unit + 0.0,  # never −0
-        "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
-        "force_y": wrench.force_y * rod.force_unit,
-        "contact_arclength": wrench.contact_arclength * rod.length_unit,
-        "contact_phase": np.array(PHASE_NAMES)[wrench.phase],
-        "contact_x": seen.base_x[0] + sign * x * rod.length_unit,
-        "contact_y": seen.base_y[0] + y * rod.length_unit,
-        "tip_angle": turned(wrench.tip_angle),
-        "slope_angle": sign * states.slope_angle,
-    }
-
-
 def _sweep(
     paths: Paths, angles: Floats, number: int, direction: Direction, base: tuple[float, float], rod: Rod
 ) -> dict[str, NDArray[np.generic]]:
     lane = np.zeros(angles.size, dtype=np.intp)
     states = paths.states(lane, np.pi - angles if paths.seen.mirrored[0] else angles)
-    columns = _columns(paths.seen, states, rod)
+    columns = in_world(paths.seen, states, rod)
     loaded = columns["contact_phase"] != "none"
     sweep: dict[str, NDArray[np.generic]] = {
         "sweep": np.full(angles.size, number),
@@ -425,54 +269,6 @@ def _sweep(
     for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle", "contact_phase"):
         sweep[f"truth_{name}"] = columns[name]
     return sweep
-
-
-def _events(paths: Paths, direction: Direction, base: tuple[float, float], rod: Rod) -> SweepEvents:
-    segments = paths.segments
-    inner = np.flatnonzero(segments.tip[1:] != segments.tip[:-1])
-    parameters = np.concatenate([paths.first_parameter, segments.end[inner], paths.snap_parameter])
-    states = paths.states_at(np.zeros(parameters.size, dtype=np.intp), parameters)
-    # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
-    wrench = _at_rest_first(states, bool(segments.tip[0]))
-    columns = _columns(paths.seen, states._replace(wrench=wrench), rod)
-    words = ["tip" if tip else "tangential" for tip in segments.tip]
-    kinds = [
-        words[0],
-        *(f"{words[i]} → {words[i + 1]}" for i in inner),
-        SnapOff(int(paths.snap_off[0])).name.lower(),
-    ]
-    names = [name for name in Event.__dataclass_fields__ if name != "kind"]
-    found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
-    clear = bool(paths.snap_angle[0] > clear_angle(paths.seen)[0])
-    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, _largest_strain(paths, rod))
-
-
-def _largest_strain(paths: Paths, rod: Rod) -> float:
-    """Largest bending strain up to snap-off: that of the outer fibre, from the curvature on the nodes of the path."""
-    if not rod.diameter:
-        return 0.0
-    ways = np.broadcast_to(np.linspace(0.0, 1.0, _STRAINED), (paths.segments.lane.size, _STRAINED))
-    parameter, _ = paths.segments.take(np.s_[:, None]).along(ways)
-    wrench = paths.states_at(np.zeros(parameter.size, dtype=np.intp), parameter.ravel()).wrench
-    return float(np.nanmax(largest_curvature(wrench))) * 0.5 * rod.diameter / rod.length
-
-
-def _at_rest_first(states: States, tip: bool) -> Wrench:
-    x, y = states.x[0], states.y[0]
-    bearing, distance = np.arctan2(y, x), np.hypot(x, y)
-    rest = {
-        "drive_angle": bearing,
-        "tip_angle": bearing,
-        "contact_arclength": 1.0 if tip else distance,
-        "holding_moment": 0.0,
-        "force_x": 0.0,
-        "force_y": 0.0,
-        "phase": TIP if tip else TANGENTIAL,
-    }
-    columns = {name: value.copy() for name, value in states.wrench._asdict().items()}
-    for name, value in rest.items():
-        columns[name][0] = value
-    return Wrench(**columns)
 
 
 def _attributes(name: str, rod: Rod | None) -> dict[str, str]:

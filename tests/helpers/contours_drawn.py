@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw, ShapeFree
 from tactile_bayes.errors import ContourError, ReachError
 from tactile_bayes.path import Paths
-from tactile_bayes.scanning import sweep_paths
+from tactile_bayes.sweep_path import sweep_paths
 
 
 class Scene(NamedTuple):

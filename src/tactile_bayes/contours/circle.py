@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import Floats, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.oval import Oval
 
 __all__ = ["Circle"]
 
 
 @dataclass(frozen=True)
-class Circle(Contour):
+class Circle(Oval):
     """Lower half of a circle, y = q + r − √(r² − (x − x_c)²); it ends where it stands upright, at x = x_c ± r.
 
     Parameters
@@ -47,12 +47,8 @@ class Circle(Contour):
         refuse_unless(finite(self.q, self.x_c), "Circle", "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
     @property
-    def domain(self) -> tuple[Floats, Floats]:
-        upright = np.full(self.shape, 0.5 * np.pi)
-        return -upright, upright
-
-    def end_name(self, side: Literal["left", "right"]) -> str:
-        return "where it stands upright"
+    def half_width(self) -> Floats:
+        return np.asarray(self.r, dtype=float)
 
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = np.asarray(parameter, dtype=float)
@@ -65,10 +61,6 @@ class Circle(Contour):
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = np.asarray(slope_angle, dtype=float)
         return np.where(np.abs(alpha) <= 0.5 * np.pi, alpha, np.nan)
-
-    def parameter_of_x(self, x: ArrayLike) -> Floats:
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.arcsin((np.asarray(x, dtype=float) - self.x_c) / self.r))
 
     def height(self, x: ArrayLike) -> Floats:
         offset = np.asarray(x, dtype=float) - self.x_c

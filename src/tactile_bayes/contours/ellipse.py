@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import Floats, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.oval import Oval
 
 __all__ = ["Ellipse"]
 
 
 @dataclass(frozen=True)
-class Ellipse(Contour):
+class Ellipse(Oval):
     """Lower half of an ellipse, (x − x_c)²/a² + (y − q − b)²/b² = 1; it ends where it stands upright, at x = x_c ± a.
 
     Parameters
@@ -51,12 +51,8 @@ class Ellipse(Contour):
         refuse_unless(finite(self.q, self.x_c), "Ellipse", "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
     @property
-    def domain(self) -> tuple[Floats, Floats]:
-        upright = np.full(self.shape, 0.5 * np.pi)
-        return -upright, upright
-
-    def end_name(self, side: Literal["left", "right"]) -> str:
-        return "where it stands upright"
+    def half_width(self) -> Floats:
+        return np.asarray(self.a, dtype=float)
 
     def locate(self, parameter: ArrayLike) -> Locus:
         t = np.asarray(parameter, dtype=float)  # the eccentric angle from the lowest point
@@ -76,10 +72,6 @@ class Ellipse(Contour):
         alpha = np.asarray(slope_angle, dtype=float)
         t = np.arctan2(np.asarray(self.a) * np.sin(alpha), np.asarray(self.b) * np.cos(alpha))
         return np.where(np.abs(alpha) <= 0.5 * np.pi, t, np.nan)
-
-    def parameter_of_x(self, x: ArrayLike) -> Floats:
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.arcsin((np.asarray(x, dtype=float) - self.x_c) / self.a))
 
     def height(self, x: ArrayLike) -> Floats:
         offset = np.asarray(x, dtype=float) - self.x_c

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, PPoly
 from scipy.linalg import null_space
 from scipy.optimize import minimize_scalar, nnls
-from scipy.stats import t as student_t
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours.base import Floats, Graph, Parameter, Single
+from tactile_bayes.contours.bends import STRAIGHT, Bends, refuse_unless_convex
 from tactile_bayes.errors import ContourError
 
 __all__ = ["MeasuredContour", "from_points"]
@@ -29,15 +27,7 @@ _MOST_PIECES = 100
 _FLOOR = 1e-3
 """Least curvature of a fit, as a share of the points' mean curvature."""
 
-_FALSE_ALARM = 1e-3
-"""How often points of a contour that is convex may be refused."""
-
-_SEEN = 3.0
-"""Standard errors by which the points must bend upward as a whole."""
-
 _TINY = np.finfo(float).tiny
-
-_STRAIGHT = "; a contour must be curved: measure a longer stretch or more points"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,7 +133,7 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     rounding = 8.0 * np.finfo(float).eps * (np.abs(y).max() + abs(tilt / half) * np.abs(x).max())
     size = float(np.std(off_line))
     if size <= rounding:
-        raise ContourError(f"from_points: the points are on a straight line{_STRAIGHT}")
+        raise ContourError(f"from_points: the points are on a straight line{STRAIGHT}")
 
     with threadpool_limits(1):  # the matrices are small: threads would only wait for one another
         noise = np.ones_like(y) if given is None else np.broadcast_to(np.hypot(given, rounding) / size, y.shape)
@@ -155,8 +145,8 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
         else:
             weight, unit, freedom = problem.weigh(1.0).weight, 1.0, np.inf
             remark = f"the points by themselves suggest {estimate.noise:.2g} times the scatter given"
-        bends = _Bends.of(u, off_line, size * unit * noise)
-        _refuse_unless_convex(bends, freedom, lambda at: float(middle + half * at), remark)
+        bends = Bends.of(u, off_line, size * unit * noise)
+        refuse_unless_convex(bends, freedom, lambda at: float(middle + half * at), remark)
         offset, curvature = problem.solve(weight, _FLOOR * bends.mean_curvature / size)
 
     bent = BSpline(problem.knots, curvature, 2).antiderivative(2)
@@ -244,77 +234,6 @@ class _Smoothing(NamedTuple):
 
 def _triangle(columns: Floats) -> Floats:
     return np.asarray(np.linalg.qr(columns, mode="r"))
-
-
-class _Bends(NamedTuple):
-    """Parabolas fitted to stretches of neighbouring points; the last stretch is all of them.
-
-    The quadratic term is the heights' product with a parabola that is + − + and orthogonal to lines. Less the line that
-    meets them where it changes sign, heights of a convex contour are + − + too: their product is never negative.
-    """
-
-    first: Floats
-    last: Floats
-    size: Floats
-    """Coefficients of the squares."""
-    errors: Floats
-    """The same in standard errors."""
-
-    @property
-    def mean_curvature(self) -> float:
-        return 2.0 * float(self.size[-1])
-
-    @classmethod
-    def of(cls, u: Floats, heights: Floats, noise: Floats) -> _Bends:
-        u, at = np.unique(u, return_inverse=True)
-        weight = np.bincount(at, noise**-2.0)
-        heights = np.bincount(at, heights * noise**-2.0) / weight
-        found = []
-        length = 3
-        while True:
-            length = min(length, u.size)
-            starts = np.arange(0, u.size - length + 1, max(1, length // 8))
-            starts = np.union1d(starts, u.size - length)
-            x, y, w = (np.asarray(sliding_window_view(c, length)[starts], float) for c in (u, heights, weight))
-            offset = x - _mean(x, w)
-            spread = _mean(offset**2, w)
-            square = offset**2 - spread - _mean(offset**3, w) / spread * offset
-            y = y - _mean(y, w)
-            y = y - _mean(offset * y, w) / spread * offset
-            norm = np.sum(w * square**2, axis=1)
-            product = np.sum(w * square * y, axis=1)
-            found.append((x[:, 0], x[:, -1], product / norm, product / np.sqrt(norm)))
-            if length == u.size:
-                return cls(*(np.concatenate(column) for column in zip(*found, strict=True)))
-            length = int(np.ceil(1.35 * length))
-
-
-def _mean(values: Floats, weight: Floats) -> Floats:
-    return np.asarray(np.sum(weight * values, axis=1, keepdims=True) / np.sum(weight, axis=1, keepdims=True))
-
-
-def _refuse_unless_convex(bends: _Bends, freedom: float, place: Callable[[float], float], remark: str) -> None:
-    limit = float(student_t.isf(_FALSE_ALARM / bends.errors.size, freedom))
-    worst = int(np.argmin(bends.errors))
-    if bends.errors[-1] < -limit and bends.errors.max() < limit:
-        raise ContourError(
-            "from_points: the points are upside down: they bend downward. The contour is the lower boundary of an "
-            "object that lies above the pivot; if it was measured from above, mirror y"
-        )
-    if bends.errors[worst] < -limit:
-        first, last = bends.first[worst], bends.last[worst]
-        off_chord = -bends.size[worst] * (0.5 * (last - first)) ** 2
-        raise ContourError(
-            f"from_points: the points are not convex from x = {place(first):.6g} to {place(last):.6g}: there they bend "
-            f"downward by {-bends.errors[worst]:.1f} standard errors ({limit:.1f} pass as chance), and stand off a "
-            f"chord by {off_chord:.3g} ({remark}). Leave this stretch out, or give a larger scatter; an object that "
-            "has a dent is outside this package"
-        )
-    if bends.errors[-1] < _SEEN:
-        raise ContourError(
-            f"from_points: the points cannot be told from a straight line: as a whole they bend upward by "
-            f"{bends.errors[-1]:.1f} standard errors, and it takes {_SEEN:g} ({remark}){_STRAIGHT}"
-        )
 
 
 def _checked(x: ArrayLike, y: ArrayLike, scatter: ArrayLike | None) -> tuple[Floats, Floats, Floats | None]:

@@ -26,7 +26,7 @@ from tactile_bayes.record import CHANNELS, Frame, frame_of, turned
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.scanning import Event, SweepEvents
+    from tactile_bayes.sweep_events import Event, SweepEvents
 
 __all__ = ["observables", "predictive"]
 

@@ -1,0 +1,124 @@
+"""The events of a sweep: where contact begins, changes its phase and ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_bayes.elastica import TANGENTIAL, TIP, Wrench, largest_curvature
+from tactile_bayes.path import Paths, SnapOff, States
+from tactile_bayes.reach import clear_angle
+from tactile_bayes.rod import Rod
+from tactile_bayes.sweep_path import Direction, in_world
+
+__all__ = ["Event", "SweepEvents", "events_of"]
+
+_STRAINED = 65
+"""States on each stretch of a path of which the largest strain is taken."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A distinguished state of a sweep, in the units of the scan.
+
+    Attributes
+    ----------
+    kind : str
+        "tip" or "tangential" at first contact; "tip → tangential" and so on at a change; "fold" (a smooth maximum of
+        the drive angle), "corner" (a maximum where the phase changes or the contour's curvature jumps) or "thrust"
+        (the line of force has come to pass through the pivot) at snap-off.
+    drive_angle, slope_angle : float
+        [rad].
+    contact_x, contact_y, contact_arclength : float
+        Contact point on the object and arc length of the rod up to it [length].
+    holding_moment, force_x, force_y : float
+        Base wrench.
+    """
+
+    kind: str
+    drive_angle: float
+    slope_angle: float
+    contact_x: float
+    contact_y: float
+    contact_arclength: float
+    holding_moment: float
+    force_x: float
+    force_y: float
+
+
+@dataclass(frozen=True)
+class SweepEvents:
+    """Where contact begins, changes its phase and ends in one sweep.
+
+    Attributes
+    ----------
+    direction : str
+        "forward" or "backward".
+    base : (float, float)
+        The pivot.
+    first_contact, snap_off : Event
+    transitions : tuple of Event
+        Changes of the phase, in the order in which they happen.
+    clear : bool
+        Whether the straight rod is free of the object after snap-off. If it is not, the rod comes to rest in another
+        contact, which no sweep leads to.
+    largest_strain : float
+        Largest bending strain of the rod up to snap-off, to about 1e-5 of it; 0 for a rod without thickness.
+    """
+
+    direction: str
+    base: tuple[float, float]
+    first_contact: Event
+    transitions: tuple[Event, ...]
+    snap_off: Event
+    clear: bool
+    largest_strain: float
+
+
+def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod: Rod) -> SweepEvents:
+    segments = paths.segments
+    inner = np.flatnonzero(segments.tip[1:] != segments.tip[:-1])
+    parameters = np.concatenate([paths.first_parameter, segments.end[inner], paths.snap_parameter])
+    states = paths.states_at(np.zeros(parameters.size, dtype=np.intp), parameters)
+    # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
+    wrench = _at_rest_first(states, bool(segments.tip[0]))
+    columns = in_world(paths.seen, states._replace(wrench=wrench), rod)
+    words = ["tip" if tip else "tangential" for tip in segments.tip]
+    kinds = [
+        words[0],
+        *(f"{words[i]} → {words[i + 1]}" for i in inner),
+        SnapOff(int(paths.snap_off[0])).name.lower(),
+    ]
+    names = [name for name in Event.__dataclass_fields__ if name != "kind"]
+    found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
+    clear = bool(paths.snap_angle[0] > clear_angle(paths.seen)[0])
+    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, _largest_strain(paths, rod))
+
+
+def _largest_strain(paths: Paths, rod: Rod) -> float:
+    """Largest bending strain up to snap-off: that of the outer fibre, from the curvature on the nodes of the path."""
+    if not rod.diameter:
+        return 0.0
+    ways = np.broadcast_to(np.linspace(0.0, 1.0, _STRAINED), (paths.segments.lane.size, _STRAINED))
+    parameter, _ = paths.segments.take(np.s_[:, None]).along(ways)
+    wrench = paths.states_at(np.zeros(parameter.size, dtype=np.intp), parameter.ravel()).wrench
+    return float(np.nanmax(largest_curvature(wrench))) * 0.5 * rod.diameter / rod.length
+
+
+def _at_rest_first(states: States, tip: bool) -> Wrench:
+    x, y = states.x[0], states.y[0]
+    bearing, distance = np.arctan2(y, x), np.hypot(x, y)
+    rest = {
+        "drive_angle": bearing,
+        "tip_angle": bearing,
+        "contact_arclength": 1.0 if tip else distance,
+        "holding_moment": 0.0,
+        "force_x": 0.0,
+        "force_y": 0.0,
+        "phase": TIP if tip else TANGENTIAL,
+    }
+    columns = {name: value.copy() for name, value in states.wrench._asdict().items()}
+    for name, value in rest.items():
+        columns[name][0] = value
+    return Wrench(**columns)
