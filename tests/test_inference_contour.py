@@ -16,7 +16,7 @@ from tactile_bayes.inference.contour import contours_of, default_priors, infer_c
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, record_hash, to_si
+from tactile_bayes.record import CHANNELS, in_frame, record_hash, to_si
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
 
@@ -177,6 +177,16 @@ def test_units_do_not_matter():
         assert found[name].attrs["units"] == unit
         scatter = float(expected[name].std())
         np.testing.assert_allclose(found[name].values / factor, expected[name].values, rtol=0, atol=1e-5 * scatter)
+
+
+def test_a_record_is_predicted_in_its_own_frame():
+    """The other frame's forces are tens of standard deviations away."""
+    record = in_frame(coarse(), "turning")
+    result = infer_contour(record, seed=1, settings=BRIEF)
+    assert result.attrs["load_cell_frame"] == "turning"
+    predicted = result["posterior_predictive"].force_x.mean(("chain", "draw"))
+    assert np.abs(predicted - record.force_x).max() < 6.0 * CELL.force_noise
+    assert np.abs(predicted - in_frame(record, "fixed").force_x).max() > 30.0 * CELL.force_noise
 
 
 def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
