@@ -17,10 +17,10 @@ from matplotlib import colors
 from matplotlib import pyplot as plt
 
 from tactile_bayes import plotting
-from tactile_bayes.contours import Circle, Parabola, paper_profile
+from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.plotting import posteriors
+from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
@@ -116,6 +116,8 @@ def test_every_function_draws_where_it_is_told_and_nowhere_else(plain, noisy, co
     ax = panels(1).item()
     assert plotting.rods(plain, ax=ax) is ax
     ax = panels(1).item()
+    assert plotting.touched(plain, ax=ax) is ax
+    ax = panels(1).item()
     assert plotting.contour([-1.0, 1.0], truth=plain.contour, contacts=contacts, band=band, base=(0, 0), ax=ax) is ax
     grid = panels(5, 2)
     assert (plotting.trace(posterior, axes=grid) == grid).all()
@@ -127,10 +129,11 @@ def test_every_function_draws_where_it_is_told_and_nowhere_else(plain, noisy, co
 def test_every_function_makes_one_figure_of_its_own(plain, posterior):
     plotting.observables(plain.record)
     plotting.rods(plain)
+    plotting.touched(plain)
     plotting.contour([-1.0, 1.0], truth=plain.contour)
     plotting.trace(posterior)
     plotting.pairs(posterior)
-    assert len(plt.get_fignums()) == 5
+    assert len(plt.get_fignums()) == 6
     for number in plt.get_fignums():
         plt.figure(number).canvas.draw()
 
@@ -288,12 +291,199 @@ def test_rods_of_an_off_centre_pivot_start_there():
         np.testing.assert_allclose(line.get_xydata()[0], (0.2, -0.1), atol=1e-12)
 
 
+def test_rods_of_one_of_several_bases_are_those_of_a_scan_from_it_alone(plain):
+    several = scan(plain.contour, base=[(0.0, 0.0), (0.25, -0.05)], drive_step=STEP)
+    alone = scan(plain.contour, base=(0.25, -0.05), drive_step=STEP)
+    for sweep, direction in ((2, "forward"), (3, "backward")):
+        found = plotting.rods(several, sweep=sweep).lines
+        expected = plotting.rods(alone, direction=direction).lines
+        assert len(found) == len(expected)
+        for line, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())
+
+
+def test_rods_are_the_forward_ones_unless_told_otherwise(plain):
+    lines = [plotting.rods(plain, **which).lines[0] for which in ({}, {"direction": "forward"}, {"sweep": 0})]
+    for line in lines[1:]:
+        np.testing.assert_array_equal(line.get_xydata(), lines[0].get_xydata())
+    assert not np.array_equal(plotting.rods(plain, sweep=1).lines[0].get_xydata(), lines[0].get_xydata())
+
+
 def test_rods_refuse_what_is_not_there(plain):
     result = scan(plain.contour, direction="backward", drive_step=STEP)
     with pytest.raises(ParameterError, match="no forward sweep: choose from backward"):
         plotting.rods(result)
     with pytest.raises(ParameterError, match="at least one rod"):
         plotting.rods(plain, count=0)
+    for sweep in (2, -1, 0.5):
+        with pytest.raises(ParameterError, match=rf"no sweep {sweep}: choose from\n0: forward from \(0, 0\)\n1: backw"):
+            plotting.rods(plain, sweep=sweep)
+    with pytest.raises(ParameterError, match="direction='forward' and sweep=1 are given: one of them is enough"):
+        plotting.rods(plain, direction="forward", sweep=1)
+    several = scan(plain.contour, base=[(0, 0), (0.25, 0)], drive_step=STEP)
+    with pytest.raises(ParameterError, match=r"2 backward sweeps: choose .*sweep=1, from\n(.*\n)*3: .* \(0\.25, 0\)$"):
+        plotting.rods(several, direction="backward")
+    with pytest.raises(ParameterError, match="2 forward sweeps"):
+        plotting.rods(several)
+
+
+THREE = [(0.0, 0.0), (-0.25, 0.0), (0.25, 0.0)]
+
+
+def arcs(ax, scanned):
+    """What `touched` has drawn for each sweep."""
+    return [line for line in ax.lines if line.get_solid_capstyle() == "butt" and len(line.get_xdata())][
+        : len(scanned.sweeps)
+    ]
+
+
+def drawn_gaps(ax):
+    return [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in ax.patches]
+
+
+@pytest.mark.parametrize("unit", ["plain", "si", "several", "friction", "thick"])
+def test_touched_arcs_run_along_the_contour_from_first_contact_to_snap_off(unit, request):
+    made = {
+        "several": lambda: scan(paper_profile("IV", q=0.5), base=THREE, drive_step=STEP),
+        "friction": lambda: scan(Circle(1.0, q=0.4), base=[(0, 0), (0.3, 0)], friction=0.4, drive_step=STEP),
+        "thick": lambda: scan(Parabola(5.0, q=0.05), rod=replace(ROD, diameter=0.002), drive_step=STEP),
+    }
+    result = made[unit]() if unit in made else request.getfixturevalue(unit)
+    drawn = arcs(plotting.touched(result), result)
+    assert len(drawn) == len(result.sweeps)
+    size = 0.1 if unit in ("si", "thick") else 1.0
+    for line, sweep in zip(drawn, result.sweeps, strict=True):
+        x, y = line.get_data()
+        ends = sorted((event.contact_x, event.contact_y) for event in (sweep.first_contact, sweep.snap_off))
+        np.testing.assert_array_equal(line.get_xydata()[[0, -1]], ends)
+        assert line.get_marker() == "None"
+        assert (np.diff(x) > 0.0).all()
+        np.testing.assert_allclose(y, result.contour.height(x), rtol=0, atol=1e-12 * size)
+
+
+@pytest.mark.parametrize(("name", "q"), [("I", 0.4), ("II", 0.5), ("III", 0.5), ("IV", 0.4)])
+def test_the_gap_of_one_base_is_drawn_and_gone_with_three(name, q):
+    contour = paper_profile(name, q=q)
+    one = scan(contour, drive_step=STEP)
+    left, right = (one.events[direction].snap_off.contact_x for direction in ("backward", "forward"))
+    ax = plotting.touched(one)
+    assert drawn_gaps(ax) == [(left, pytest.approx(right, abs=1e-15))]
+    assert [text.get_text() for text in ax.texts] == [f"gap\n{right - left:.3g} $L$"]
+    ax = plotting.touched(scan(contour, base=THREE, drive_step=STEP))
+    assert drawn_gaps(ax) == []
+    assert [text.get_text() for text in ax.texts] == ["no gap"]
+
+
+def test_every_gap_is_what_no_sweep_touched():
+    """Bases so far apart that each leaves its own gap, and one more lies between two of them."""
+    result = scan(Parabola(0.3, 0.6), base=[(1.2, 0.0), (0.0, 0.0), (-1.2, 0.0), (-2.2, 1.4)], drive_step=STEP)
+    gaps = drawn_gaps(plotting.touched(result))
+    ends = np.array([[sweep.first_contact.contact_x, sweep.snap_off.contact_x] for sweep in result.sweeps])
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    x = np.linspace(low.min(), high.max(), 100_001)
+    free = ~((x[:, None] >= low) & (x[:, None] <= high)).any(axis=1)
+    inside = np.array([(x > left) & (x < right) for left, right in gaps])
+    np.testing.assert_array_equal(inside.any(axis=0), free)
+    assert len(gaps) == np.count_nonzero(np.diff(free.astype(int)) == 1) > 3
+    for left, right in gaps:
+        assert left in high
+        assert np.abs(low - right).min() < 1e-15
+
+
+def test_bases_have_colours_of_their_own_and_pivots_the_same(plain):
+    result = scan(plain.contour, base=[*THREE, (0.0, 0.0)], drive_step=STEP)
+    ax = plotting.touched(result)
+    drawn = arcs(ax, result)
+    colour_of = {sweep.base: line.get_color() for line, sweep in zip(drawn, result.sweeps, strict=True)}
+    assert len(set(colour_of.values())) == 3
+    assert [line.get_color() for line in drawn] == [colour_of[sweep.base] for sweep in result.sweeps]
+    pivots = {
+        tuple(line.get_xydata()[0]): line.get_markeredgecolor() for line in ax.lines if len(line.get_xdata()) == 1
+    }
+    assert pivots == colour_of
+    assert labels(ax) == ["contour", "base (0, 0) $L$", "base (−0.25, 0) $L$", "base (0.25, 0) $L$"]
+    # Arcs that cover one another stay visible: those of a base are drawn lower than those of the base before.
+    heights = [line.get_transform().transform((0.0, 0.5))[1] for line in drawn]
+    assert heights[0] == heights[1] == heights[6] == heights[7] > heights[2] == heights[3] > heights[4]
+    across = [line.get_transform().transform((0.0, 0.5))[0] for line in drawn]
+    assert len(set(across)) == 1
+
+
+def test_touched_is_labelled_in_the_units_of_the_record(si):
+    ax = plotting.touched(si)
+    width = si.events["forward"].snap_off.contact_x - si.events["backward"].snap_off.contact_x
+    assert [text.get_text() for text in ax.texts] == [f"gap\n{1e3 * width:.3g} mm"]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
+    moved = scan(si.contour, base=[(-0.0125, 0.0), (0.02, -0.005)], rod=ROD, drive_step=STEP)
+    assert labels(plotting.touched(moved)) == ["contour", "base (−12.5, 0) mm", "base (20, −5) mm"]
+
+
+def test_one_sweep_alone_leaves_nothing_between():
+    result = scan(Circle(1.0, 0.4), direction="forward", drive_step=STEP)
+    ax = plotting.touched(result)
+    assert (drawn_gaps(ax), len(ax.texts)) == ([], 0)
+    two = scan(Circle(1.0, 0.4), base=[(-0.2, 0), (0.3, 0)], direction="forward", drive_step=STEP)
+    assert [text.get_text() for text in plotting.touched(two).texts] == ["no gap"]
+
+
+def test_sweeps_that_meet_in_an_edge_leave_no_gap():
+    roof = Joined(Parabola(0.2, q=0.3, x_c=1.0), Parabola(0.2, q=0.3, x_c=-1.0), x=0.0)
+    result = scan(roof, base=(0.05, 0.1), drive_step=STEP)
+    assert {round(sweep.snap_off.contact_x, 7) for sweep in result.sweeps} == {0.0}
+    ax = plotting.touched(result)
+    assert (drawn_gaps(ax), [text.get_text() for text in ax.texts]) == ([], ["no gap"])
+
+
+def test_a_sweep_that_touches_an_edge_only_is_a_point():
+    wedge = Joined(Parabola(0.05, q=-11.25, x_c=15.0), Parabola(0.05, q=-5.618, x_c=-10.6), x=0.0)
+    result = scan(wedge, base=(-0.5, -0.4), direction="forward", drive_step=STEP)
+    (sweep,) = result.sweeps
+    assert sweep.first_contact.contact_x == pytest.approx(sweep.snap_off.contact_x, abs=1e-7)
+    ax = plotting.touched(result)
+    (arc,) = arcs(ax, result)
+    assert arc.get_marker() == "o"
+    np.testing.assert_allclose(arc.get_xydata(), np.zeros((len(arc.get_xdata()), 2)), atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("ends", "gaps"),
+    [
+        ([(0.0, 1.0)], []),
+        ([(1.2, 2.0), (0.0, 1.0)], [(1.0, 1.2)]),
+        ([(0.0, 1.0), (1.0 + 1e-8, 2.0)], []),  # the contacts' own accuracy at a fold
+        ([(0.0, 1.0), (1.0 + 1e-6, 2.0)], [(1.0, 1.0 + 1e-6)]),
+        ([(0.0, 1.0), (0.2, 0.3), (0.6, 1.5)], []),  # an arc within another
+        ([(0.0, 1.0), (0.2, 0.3), (1.1, 1.1), (1.5, 2.0)], [(1.0, 1.1), (1.1, 1.5)]),  # and an edge alone
+    ],
+)
+@pytest.mark.parametrize("size", [1.0, 0.05])
+def test_gaps_are_between_all_arcs(ends, gaps, size):
+    found = touch_map._gaps([(size * np.array(end), np.zeros(2)) for end in ends], same=1e-7 * size)
+    np.testing.assert_allclose(np.reshape(found, (-1, 2)), size * np.reshape(gaps, (-1, 2)), rtol=1e-15)
+
+
+@pytest.mark.parametrize(("width", "written"), [(7.0, 3), (1.5, 1), (0.3, 0)])
+def test_widths_are_written_where_there_is_room(width, written):
+    """The widest first; none runs into another or out of the Axes, and the gaps are drawn all the same."""
+    result = scan(Parabola(0.3, 0.6), base=[(-1.2, 0.0), (0.0, 0.0), (1.2, 0.0)], drive_step=STEP)
+    widths = ["gap\n0.184 $L$", "gap\n0.0971 $L$", "gap\n0.0971 $L$"]
+    ax = mpl.figure.Figure(figsize=(width, width)).add_axes((0.0, 0.0, 1.0, 1.0), xlim=(-2.0, 2.0))
+    plotting.touched(result, ax=ax)
+    assert [text.get_text() for text in ax.texts] == widths[:written]
+    assert len(ax.patches) == 3
+
+
+def test_the_object_fills_a_map_whose_limits_are_set(plain):
+    ax = panels(1).item()
+    ax.set(xlim=(-0.9, 0.9), ylim=(-0.2, 0.8))
+    plotting.touched(plain, ax=ax)
+    assert (ax.get_xlim(), ax.get_ylim()) == ((-0.9, 0.9), (-0.2, 0.8))
+    (contour,) = (line for line in ax.lines if line.get_label() == "contour")
+    x, y = contour.get_xydata()[np.isfinite(contour.get_xdata())].T
+    assert y.max() == pytest.approx(0.8, abs=0.01)
+    (filled,) = ax.collections
+    box = filled.get_datalim(ax.transData)
+    np.testing.assert_allclose(box.extents, [x.min(), plain.contour.q, x.max(), 0.8], atol=1e-5)
 
 
 def test_contour_draws_the_contacts_that_are_ok_and_in_range(contacts, band, plain):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
 __all__ = [
+    "BASES",
     "LABELS",
     "PALETTE",
     "PHASES",
@@ -24,8 +25,10 @@ __all__ = [
     "channel_panels",
     "handles_once",
     "legend_entry",
+    "number",
     "parameter_grid",
     "set_unit",
+    "shown_unit",
     "single_axes",
 ]
 
@@ -44,6 +47,9 @@ PALETTE: Mapping[str, str] = {
     "gap": "#F0E442",
 }
 """Colours after Okabe and Ito, told apart with any colour vision."""
+
+BASES = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
+"""Colours of bases in their order, after Okabe and Ito, without the gap's; used over again from the seventh base on."""
 
 PHASES = {"tip": "tip contact", "tangential": "tangential contact"}
 LABELS = {
@@ -102,15 +108,25 @@ def set_unit(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values
     """Label of an axis with its unit, and in SI tick labels in the fitting multiple of it."""
     from matplotlib.ticker import FuncFormatter
 
+    power, unit = shown_unit(name, attrs, values)
+    axis.set_label_text(f"{label}[{unit}]" if unit else label.strip())
+    if power:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: number(value, power)))
+
+
+def shown_unit(name: str, attrs: Mapping[Any, Any], values: Floats) -> tuple[int, str]:
+    """Power of ten and name of the unit in which such values of a column are shown; "" for a plain number."""
     unit = str(attrs.get("units", "1"))
     column = COLUMNS[name]
     if unit == "1":
-        axis.set_label_text(f"{label}[{_DIMENSIONLESS[column.scale]}]" if column.scale else label.strip())
-        return
+        return 0, _DIMENSIONLESS[column.scale] if column.scale else ""
     power = _power(values) if unit == column.unit else 0
-    axis.set_label_text(f"{label}[{_PREFIXES[power]}{unit}]")
-    if power:
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}".replace("-", "−")))
+    return power, f"{_PREFIXES[power]}{unit}"
+
+
+def number(value: float, power: int = 0, *, digits: int = 6) -> str:
+    """A value in units of a power of ten, as a text."""
+    return f"{value / 10.0**power:.{digits}g}".replace("-", "−")
 
 
 def _power(values: Floats) -> int:

@@ -1,0 +1,152 @@
+"""The rod on the map: deformed, along a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, single_axes
+from tactile_bayes.plotting.maps import CONTACT_MARKERS, draw_object, draw_pivot, finish_map
+from tactile_bayes.record import CHANNELS, in_frame, rod_of
+from tactile_bayes.shape import rod_shape
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tactile_bayes.scanning import Scan
+    from tactile_bayes.sweep_events import Event
+
+__all__ = ["rods"]
+
+
+def rods(
+    scan: Scan,
+    *,
+    direction: Literal["forward", "backward"] | None = None,
+    sweep: int | None = None,
+    count: int = 15,
+    ax: Axes | None = None,
+) -> Axes:
+    """Deformed rods along a sweep, coloured by contact phase, like Figures 7 to 10 of Merker et al. 2018.
+
+    Doi 10.1155/2018/1613945.
+
+    Parameters
+    ----------
+    scan : Scan
+        A scan.
+    direction : {"forward", "backward"}, optional
+        Which sweep, where there is one of this direction; by default the forward one.
+    sweep : int, optional
+        Which sweep, by its number in the record, instead of the direction: for scans with several bases.
+    count : int
+        How many of its states are drawn at most, evenly over the samples in contact; first contact, phase changes and
+        snap-off come on top.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If the scan has no such sweep, or several of this direction, or the count is not positive.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> rods(scan(paper_profile("I", q=0.4)), direction="backward").get_xlabel()
+    '$x$ [$L$]'
+
+    The third of four sweeps, forward from the second base:
+
+    >>> rods(scan(paper_profile("I", q=0.4), base=[(0, 0), (0.25, 0)]), sweep=2).get_xlabel()
+    '$x$ [$L$]'
+    """
+    number = _number(scan, direction, sweep)
+    if count < 1:
+        raise ParameterError(f"count is {count!r}: at least one rod must be drawn")
+    record, events, rod = in_frame(scan.record, "fixed"), scan.sweeps[number], rod_of(scan.record)
+    samples = np.flatnonzero((record["sweep"].values == number) & (record["truth_contact_phase"].values != "none"))
+    samples = (
+        samples[np.unique(np.linspace(0, samples.size - 1, count).round().astype(int))] if samples.size else samples
+    )
+
+    def shape(state: Mapping[str, Any]) -> tuple[Floats, Floats]:
+        x, y = rod_shape(
+            state["drive_angle"],
+            state["holding_moment"] / rod.moment_unit,
+            state["force_x"] / rod.force_unit,
+            state["force_y"] / rod.force_unit,
+            side=1 if events.direction == "forward" else -1,
+        )
+        return events.base[0] + rod.length_unit * x, events.base[1] + rod.length_unit * y
+
+    ax = single_axes() if ax is None else ax
+    wrench = ("drive_angle", *CHANNELS)
+    names = {name: f"truth_{name}" if f"truth_{name}" in record else name for name in wrench}
+    phases = record["truth_contact_phase"].values[samples]
+    x, y = shape({name: record[column].values[samples] for name, column in names.items()})
+    for phase, label in PHASES.items():
+        chosen = phases == phase
+        if chosen.any():
+            ax.plot(x[chosen].T, y[chosen].T, color=PALETTE[phase], linewidth=0.9, label=label)
+            at = samples[chosen]
+            ax.plot(
+                record["truth_contact_x"].values[at],
+                record["truth_contact_y"].values[at],
+                linestyle="none",
+                marker=CONTACT_MARKERS[phase],
+                markersize=3.0,
+                color=PALETTE[phase],
+                zorder=3,
+            )
+    marked: list[tuple[Event, str, str]] = [
+        (events.first_contact, "first contact", ":"),
+        *((event, "phase change", "-") for event in events.transitions),
+        (events.snap_off, "snap-off", "--"),
+    ]
+    extent = [x, y]
+    for event, label, style in marked:
+        x, y = shape(vars(event))
+        extent = [np.append(a, b) for a, b in zip(extent, (x, y), strict=True)]
+        ax.plot(x, y, color=PALETTE["change"], linestyle=style, linewidth=1.4, zorder=2.5, label=label)
+        ax.plot(event.contact_x, event.contact_y, "o", color=PALETTE["change"], markersize=4.0, zorder=3.5)
+    draw_pivot(ax, events.base)
+    draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
+    finish_map(ax, record["base_x"].attrs)
+    return ax
+
+
+def _number(scan: Scan, direction: str | None, sweep: int | None) -> int:
+    """Number of the one sweep that is asked for."""
+    if sweep is not None:
+        if direction is not None:
+            raise ParameterError(f"both direction={direction!r} and sweep={sweep!r} are given: one of them is enough")
+        if sweep not in range(len(scan.sweeps)):
+            raise ParameterError(f"the scan has no sweep {sweep!r}: choose from\n{_listed(scan)}")
+        return sweep
+    direction = direction or "forward"
+    numbers = [number for number, events in enumerate(scan.sweeps) if events.direction == direction]
+    if not numbers:
+        have = ", ".join(dict.fromkeys(events.direction for events in scan.sweeps))
+        raise ParameterError(f"the scan has no {direction} sweep: choose from {have}")
+    if len(numbers) > 1:
+        raise ParameterError(
+            f"the scan has {len(numbers)} {direction} sweeps: choose one by its number, as sweep={numbers[0]}, "
+            f"from\n{_listed(scan)}"
+        )
+    return numbers[0]
+
+
+def _listed(scan: Scan) -> str:
+    return "\n".join(
+        f"{number}: {events.direction} from ({events.base[0]:g}, {events.base[1]:g})"
+        for number, events in enumerate(scan.sweeps)
+    )

@@ -1,0 +1,121 @@
+"""What was touched: arcs of the contour between first contact and snap-off, and the gaps between them."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tactile_bayes.plotting.axes import BASES, Floats, legend_entry, number, shown_unit, single_axes
+from tactile_bayes.plotting.maps import draw_gap, draw_object, draw_pivot, finish_map, limits_of, outline, write_on_top
+from tactile_bayes.record import rod_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.text import Text
+    from matplotlib.transforms import Bbox
+
+    from tactile_bayes.contours.base import Contour
+    from tactile_bayes.scanning import Scan
+    from tactile_bayes.sweep_events import SweepEvents
+
+__all__ = ["touched"]
+
+_SAME_PLACE = 1e-7
+"""Contacts that are closer [L] are in one place: at a fold, rounding leaves a contact half of its digits."""
+
+_ARC_WIDTH = 3.0
+_LANE = np.sqrt(2.0) * _ARC_WIDTH
+"""Points by which the arcs of a base are drawn below those of the base before: side by side up to slopes of 45°."""
+
+
+def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
+    """Which arcs of the contour the sweeps touched, in a colour for each base, and which gaps remain between them.
+
+    An arc goes from first contact to snap-off. Arcs of the first base are on the contour, those of every further base
+    a line's width below; x is true everywhere. A gap is what no sweep touched between the outermost contacts, and its
+    width in x is written where there is room; if none remains, "no gap" is written.
+
+    Parameters
+    ----------
+    scan : Scan
+        A scan, from one base or several.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> [text.get_text() for text in touched(scan(paper_profile("II", q=0.5))).texts]
+    ['gap\\n0.122 $L$']
+    >>> [text.get_text() for text in touched(scan(paper_profile("II", q=0.5), base=[(0, 0), (0.25, 0)])).texts]
+    ['no gap']
+    """
+    from matplotlib.transforms import ScaledTranslation
+
+    rod, attrs = rod_of(scan.record), scan.record["base_x"].attrs
+    same = _SAME_PLACE * rod.length_unit
+    ax = single_axes() if ax is None else ax
+    arcs = [_arc(scan.contour, sweep) for sweep in scan.sweeps]
+    colours = dict(zip(dict.fromkeys(sweep.base for sweep in scan.sweeps), cycle(BASES), strict=False))
+    for (x, y), sweep in zip(arcs, scan.sweeps, strict=True):
+        (line,) = ax.plot(x, y, color=colours[sweep.base], linewidth=_ARC_WIDTH, solid_capstyle="butt", zorder=2.0)
+        lowered = ScaledTranslation(0.0, -_LANE / 72.0 * list(colours).index(sweep.base), ax.figure.dpi_scale_trans)
+        line.set_transform(ax.transData + lowered)  # only now: the limits are those of the arc itself
+        if x[-1] - x[0] <= same:  # an edge, and nothing beside it
+            line.set_marker("o")
+    pivots = np.array(list(colours))
+    x, y = (np.concatenate([*(arc[axis] for arc in arcs), pivots[:, axis]]) for axis in (0, 1))
+    draw_object(ax, scan.contour, x, y, room=0.05 * rod.length_unit)
+    power, unit = shown_unit("contact_x", attrs, limits_of(ax))
+    for base, colour in colours.items():
+        draw_pivot(ax, base, colour=colour, label="")
+        place = ", ".join(number(part, power) for part in base)
+        legend_entry(
+            ax, f"base ({place}) {unit}", color=colour, linewidth=_ARC_WIDTH, marker="o", markerfacecolor="white"
+        )
+
+    gaps = _gaps(arcs, same)
+    texts = [
+        draw_gap(ax, left, right, f"gap\n{number(right - left, power, digits=3)} {unit}")
+        for left, right in sorted(gaps, key=lambda gap: gap[0] - gap[1])
+    ]
+    _keep_apart(ax, texts)
+    if not gaps and len(arcs) > 1:
+        write_on_top(ax, 0.5 * sum(ax.get_xlim()), "no gap")
+    finish_map(ax, attrs)
+    return ax
+
+
+def _arc(contour: Contour, sweep: SweepEvents) -> tuple[Floats, Floats]:
+    """Points of the contour from the left end of what a sweep touched to the right one, which are the events' own."""
+    left, right = sorted((sweep.first_contact, sweep.snap_off), key=lambda event: event.contact_x)
+    x, y = outline(contour, left.contact_x, right.contact_x)
+    x[[0, -1]] = left.contact_x, right.contact_x
+    y[[0, -1]] = left.contact_y, right.contact_y
+    return x, y
+
+
+def _gaps(arcs: list[tuple[Floats, Floats]], same: float) -> list[tuple[float, float]]:
+    """Stretches in x, from left to right, that lie between arcs and in none."""
+    ends = sorted((float(x[0]), float(x[-1])) for x, _ in arcs)
+    reached = np.maximum.accumulate([right for _, right in ends])
+    return [(float(end), left) for end, (left, _) in zip(reached, ends[1:], strict=False) if left - end > same]
+
+
+def _keep_apart(ax: Axes, texts: list[Text]) -> None:
+    """Remove texts that would run into an earlier one, or out of the Axes, at the size the figure has."""
+    ax.apply_aspect()
+    kept: list[Bbox] = []
+    for text in texts:
+        box = text.get_window_extent()
+        if ax.bbox.x0 <= box.x0 and box.x1 <= ax.bbox.x1 and not box.count_overlaps(kept):
+            kept.append(box)
+        else:
+            text.remove()
