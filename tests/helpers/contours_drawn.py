@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw, ShapeFree
+from tactile_bayes.contours import (
+    Circle,
+    Contour,
+    Ellipse,
+    Joined,
+    MeasuredContour,
+    Parabola,
+    PowerLaw,
+    ShapeFree,
+    from_function,
+    from_points,
+)
+from tactile_bayes.contours.function import FunctionContour
 from tactile_bayes.errors import ContourError, ReachError
 from tactile_bayes.path import Paths
 from tactile_bayes.sweep_path import sweep_paths
@@ -97,3 +111,82 @@ def scenes(draw) -> Scene:
     except (ContourError, ReachError):
         assume(False)
     return scene
+
+
+# --- families that no sweep is drawn from ----------------------------------------------------------------------------
+
+all_power_laws = st.builds(PowerLaw, log_uniform(0.05, 20.0), st.floats(1.1, 8.0), heights, places)
+
+
+@st.composite
+def functions(draw) -> Contour:
+    """Catenaries, exponentials, and polynomials bent like sums of squares; with their derivatives given or not."""
+    x_c, q = draw(places), draw(heights)
+    domain = x_c - draw(st.floats(0.1, 1.5)), x_c + draw(st.floats(0.1, 1.5))
+    kind = draw(st.sampled_from(["catenary", "exponential", "polynomial"]))
+    if kind == "catenary":
+        size = draw(log_uniform(0.3, 5.0))
+        parts = (
+            lambda x: q + 2.0 * size * np.sinh(0.5 * (x - x_c) / size) ** 2,
+            lambda x: np.sinh((x - x_c) / size),
+            lambda x: np.cosh((x - x_c) / size) / size,
+        )
+    elif kind == "exponential":
+        size, rate = draw(log_uniform(0.05, 1.0)), draw(st.sampled_from([-1.0, 1.0])) * draw(log_uniform(0.5, 2.5))
+        tilt = draw(st.floats(-1.0, 1.0))
+        parts = (
+            lambda x: q + size * np.exp(rate * (x - x_c)) + tilt * x,
+            lambda x: size * rate * np.exp(rate * (x - x_c)) + tilt,
+            lambda x: size * rate**2 * np.exp(rate * (x - x_c)),
+        )
+    else:
+        root, width = np.polynomial.Polynomial([-draw(st.floats(-1.0, 1.0)), 1.0]), draw(log_uniform(0.1, 2.0))
+        bend = draw(log_uniform(0.1, 3.0)) * (root**2 + width) ** draw(st.integers(1, 4))
+        slope = bend.integ(k=draw(st.floats(-1.0, 1.0)))
+        parts = slope.integ(k=q), slope, bend
+    if draw(st.booleans()):
+        return from_function(parts[0], domain, slope=parts[1], curvature=parts[2])
+    return from_function(parts[0], domain)
+
+
+@st.composite
+def measured_contours(draw) -> Contour:
+    """Fits to points of a function that scatter little."""
+    truth, rng = draw(functions()), np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    x = rng.uniform(*truth.domain, draw(st.integers(12, 60)))
+    y = truth.height(x)
+    scatter = draw(st.sampled_from([0.0, 1e-6, 1e-3])) * np.ptp(y)
+    try:
+        return from_points(x, y + scatter * rng.standard_normal(x.size))
+    except ContourError:  # as good as straight, or a false alarm
+        assume(False)
+
+
+# --- mirrored --------------------------------------------------------------------------------------------------------
+
+
+@singledispatch
+def mirrored(contour: Contour) -> Contour:
+    """The contour with x → −x: its family with the vertex on the other side."""
+    return replace(contour, x_c=-contour.x_c)
+
+
+@mirrored.register
+def _(contour: Joined) -> Contour:
+    return Joined(mirrored(contour.right), mirrored(contour.left), None if contour.x is None else -contour.x)
+
+
+@mirrored.register
+def _(contour: ShapeFree) -> Contour:
+    knots, radii = -contour.slope_angles[::-1], contour.log_radius[..., ::-1]
+    return ShapeFree(knots, radii, -contour.x, contour.y, -contour.at)
+
+
+@mirrored.register
+def _(contour: FunctionContour) -> Contour:
+    return from_function(lambda x: contour.g(-x), (-contour.right, -contour.left))
+
+
+@mirrored.register
+def _(contour: MeasuredContour) -> Contour:
+    return from_points(-contour.x, contour.y)
