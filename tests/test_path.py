@@ -265,6 +265,39 @@ def test_many_lanes_at_once_equal_one_at_a_time(family):
             assert np.all(off < 1e-6)
 
 
+def test_first_contact_with_an_edge_straight_above_the_pivot():
+    """From first contact on, no point of the arc within reach lies lower: the rod would have met it before."""
+    rng, count = np.random.default_rng(4), 4000
+    y, before = rng.uniform(0.05, 0.95, count), rng.uniform(-1.2, 1.0, count)
+    after = np.minimum(before + rng.uniform(1e-3, 2.0, count), 1.3)
+    sizes = np.exp(rng.uniform(np.log(0.05), np.log(10.0), (2, count)))
+    vertices = -np.tan([before, after]) / (2.0 * sizes)
+    halves = [Parabola(a, y - a * x_c**2, x_c) for a, x_c in zip(sizes, vertices, strict=True)]
+    lanes, zero = np.arange(count), np.zeros(count)
+    seen = SeenContour(Joined(*halves, x=zero), zero, zero, 1.0, 0.0, np.zeros(count, dtype=bool))
+    paths = trace(seen, order=8, exact_events=False)
+    first = paths.first_parameter
+    end = seen.domain()[1]
+    touched = np.isfinite(first)
+    assert touched.mean() > 0.9
+    for share in np.linspace(0.0, 1.0, 200)[1:] ** 2:
+        locus = seen.locate(lanes, first + (end - first) * share)
+        within = touched & (np.hypot(locus.x, locus.y) <= 1.0)
+        assert np.all(np.arctan2(locus.y, locus.x)[within] >= paths.first_angle[within] - 1e-9)
+
+
+def test_first_contact_is_not_sought_where_directions_are_rounding():
+    """The halves end 1e15 rod lengths away, at a slope of almost π/2; the right one alone is open."""
+    left = Parabola(2.978468290506286, -0.054262206189445134, 0.1995164199561281)
+    right = Parabola(2.978468290506286, -0.06176136045269866, -0.20572941132934008)
+    zero, forward = np.zeros(1), np.zeros(1, dtype=bool)
+    joined, alone = (
+        trace(SeenContour(contour.broadcast_to((1,)), zero, zero, 1.0, 0.0, forward)).first_angle
+        for contour in (Joined(left, right, x=0.0), right)
+    )
+    assert joined == pytest.approx(alone, rel=1e-14)
+
+
 def test_own_angles_for_every_lane():
     contour = Parabola(np.array([0.5, 0.7, 0.6]), np.array([0.5, 0.3, 1.5]), 0.0)
     paths = trace(seen_from(contour))

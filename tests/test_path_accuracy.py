@@ -145,6 +145,12 @@ HARD = {
     "nearly square vertex": Scene(PowerLaw(6.8, 2.2, 0.54, -0.14), (0.06, 0.15), "backward"),
     "two ellipses": Scene(Joined(Ellipse(2.7, 0.17, 0.15, -0.24), Ellipse(1.8, 0.17, 0.15, -0.24)), (0.21, -0.07)),
     "pivot below a slope": Scene(Joined(PowerLaw(0.34, 3.93, 0.26, 0.1), Ellipse(1.72, 0.11, 0.26, 0.1)), (0.57, 0.19)),
+    # The path is not smooth where it ends, at the flat vertex.
+    "flat vertex": Scene(PowerLaw(3.9788149864202675, 3.3070677398801873, 0.05)),
+    "hardly flat vertex": Scene(PowerLaw(0.5, 2.8, 0.1)),
+    "flatter vertex": Scene(PowerLaw(4.0, 3.1, 0.2), (0.0, 0.0), "backward"),
+    # Rounding undoes the very first contact.
+    "steep start": Scene(PowerLaw(4.0, 8.0, 0.2)),
     # Everything happens in a few degrees.
     "pivot close by": Scene(steep(0.39, 0.1, 0.67, 2.79, 0.62, 0.94), (0.43, 0.126)),
     "small circle close by": Scene(Circle(0.1, 0.03), (0.02, 0.0)),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import TANGENTIAL, TIP, QuickWrench, Wrench, quick_wrench, wrench_from_contact
+from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, QuickWrench, Wrench, quick_wrench, wrench_from_contact
 from tactile_bayes.reach import CLEARANCE, Reach, limits, seen_frame
 from tactile_bayes.roots import falling_root
 from tactile_bayes.segments import (
@@ -41,6 +41,13 @@ CHANNELS = ("holding_moment", "force_x", "force_y")
 
 _RESOLVED, _ROUGHLY_RESOLVED = 1e-8, 1e-3
 """Share of the change of the drive angle on a segment by which an interpolant may miss it."""
+
+_LOST, _ROUNDING = 1e-4, 1e-12
+"""Shares, of what is left to the end of a segment and of all of it, by which a state may miss its drive angle for the
+interpolant to make up for it."""
+
+_NO_MOMENT = 1e-12
+"""Holding moment [EI/L] that is none."""
 
 _LAST_STEP = 1e-6
 """Newton step on an interpolant, as a share of the segment, whose square is below the interpolation's error."""
@@ -114,40 +121,77 @@ class Paths:
         out = np.zeros((*angles.shape, 3))
         segment, sample = self._loaded(angles)
         lane = self.segments.lane[segment]
-        # Samples of a segment side by side, so that one product with its coefficients serves them all.
-        count = np.bincount(segment, minlength=self.segments.lane.size)
-        rank = np.arange(segment.size) - (np.cumsum(count) - count)[segment]
-        turn = np.zeros((count.size, int(count.max(initial=0))))
-        turn[segment, rank] = self._turn(segment, angles[lane, sample])
-        basis = chebyshev.polynomials(self.coefficients.shape[0], turn)
-        out[lane, sample] = (basis @ np.moveaxis(self.coefficients[:, 1:], -1, 0))[segment, rank]
+        out[lane, sample] = self._interpolated(segment, angles[lane, sample])[:, 1:]
         return out
 
     def states(self, lane: Index, drive_angles: Floats) -> States:
         """Exact states at drive angles, shape (k,), on lanes, shape (k,); NaN and `NONE` out of contact."""
         angles = np.asarray(drive_angles, dtype=float)
-        by_lane = np.full((self.seen.lanes, angles.size), np.nan)
-        by_lane[lane, np.arange(angles.size)] = angles
-        segment, sample = self._loaded(by_lane)
-        way = chebyshev.evaluate(self.coefficients[:, 0, segment], self._turn(segment, angles[sample]))
-        parameter = np.full(angles.size, np.nan)
-        parameter[sample] = self._polish(segment, way, angles[sample])
+        count = np.bincount(lane, minlength=self.seen.lanes)
+        order = np.argsort(lane, kind="stable")
+        rank = np.empty(lane.size, dtype=np.intp)
+        rank[order] = np.arange(lane.size) - (np.cumsum(count) - count)[lane[order]]
+        by_lane = np.full((self.seen.lanes, int(count.max(initial=0))), np.nan)
+        by_lane[lane, rank] = angles
+        where = np.zeros(by_lane.shape, dtype=np.intp)
+        where[lane, rank] = np.arange(lane.size)
+        on_lane, sample, found = self.loaded_states(by_lane)
+        at = where[on_lane, sample]
+
+        def everywhere(values: NDArray[Any], elsewhere: float = np.nan) -> NDArray[Any]:
+            filled = np.full(angles.shape, elsewhere, dtype=values.dtype)
+            filled[at] = values
+            return filled
+
+        wrench = {
+            name: everywhere(v, NONE if name == "phase" else np.nan) for name, v in found.wrench._asdict().items()
+        }
+        rest = {name: everywhere(v) for name, v in found._asdict().items() if name != "wrench"}
+        return States(wrench=Wrench(**wrench), **rest)
+
+    def loaded_states(self, drive_angles: Floats, *, polish: bool = True) -> tuple[Index, Index, States]:
+        """States at drive angles, of those in contact only.
+
+        Parameters
+        ----------
+        drive_angles : ndarray, shape (k,) or (lanes, k)
+        polish : bool
+            Whether the contour's parameter is brought to rounding; else it is as good as the interpolation, and loads
+            some 1e-8 of their largest value.
+
+        Returns
+        -------
+        lane, sample : ndarray, shape (n,)
+            Which they are.
+        states : States
+            Their states, shape (n,).
+        """
+        angles = np.broadcast_to(drive_angles, (self.seen.lanes, np.shape(drive_angles)[-1]))
+        segment, sample = self._loaded(angles)
+        lane = self.segments.lane[segment]
+        wanted = angles[lane, sample]
+        interpolated = self._interpolated(segment, wanted)
+        way = interpolated[:, 0]
+        parameter = self._polish(segment, way, wanted) if polish else self.segments.take(segment).along(way)[0]
         states = self.states_at(lane, parameter)
         # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
-        rest = self._interpolated(segment, angles[sample])
-        rest -= self._interpolated(segment, states.wrench.drive_angle[sample])
-        columns = {name: getattr(states.wrench, name).copy() for name in CHANNELS}
-        for column, change in zip(columns.values(), rest, strict=True):
-            column[sample] += change
-        return states._replace(wrench=states.wrench._replace(**columns))
+        rest = interpolated - self._interpolated(segment, states.wrench.drive_angle)
+        loads = {name: getattr(states.wrench, name) + gap for name, gap in zip(CHANNELS, rest[:, 1:].T, strict=True)}
+        return lane, sample, states._replace(wrench=states.wrench._replace(**loads))
 
     def states_at(self, lane: Index, parameter: Floats) -> States:
         """Exact states at the contour's parameters, whether on the path or beyond its end."""
         return _states(self.seen, lane, parameter, self.friction_angle)
 
     def _interpolated(self, segment: Index, angle: Floats) -> Floats:
-        """Loads at drive angles, shape (3, n)."""
-        return chebyshev.evaluate(self.coefficients[:, 1:, segment], self._turn(segment, angle))
+        """Way and loads at drive angles, shape (n, 4); `segment` grows."""
+        # Samples of a segment side by side, so that one product with its coefficients serves them all.
+        count = np.bincount(segment, minlength=self.segments.lane.size)
+        rank = np.arange(segment.size) - (np.cumsum(count) - count)[segment]
+        turn = np.zeros((count.size, int(count.max(initial=0))))
+        turn[segment, rank] = self._turn(segment, angle)
+        basis = chebyshev.polynomials(self.coefficients.shape[0], turn)
+        return np.asarray((basis @ np.moveaxis(self.coefficients, -1, 0))[segment, rank])
 
     def _loaded(self, angles: Floats) -> tuple[Index, Index]:
         """Pairs of segment and sample such that the sample's angle, shape (lanes, k), lies in the segment."""
@@ -171,19 +215,32 @@ class Paths:
         chosen = self.segments.take(segment)
         begin, end, steady = self.begin_angle[segment], self.end_angle[segment], self.steadiness[segment]
         target = self._turn(segment, angle)
-        way = 1.0 - np.abs(1.0 - np.maximum(way, 0.0))  # beyond a fold the drive angle is less again
         pace = chebyshev.evaluate(chebyshev.derivative(self.coefficients[:, 0, segment]), target)
-        for _ in range(4):
-            parameter, parameter_rate = chosen.along(way)
-            state = self.states_at(chosen.lane, parameter)
-            turn = self._turn(segment, state.wrench.drive_angle)
+
+        def short_of(i: Index, at: Floats) -> tuple[Floats, Floats]:
+            some = chosen.take(i)
+            parameter, parameter_rate = some.along(at)
+            state = self.states_at(some.lane, parameter)
+            reached = np.isfinite(state.wrench.drive_angle)  # but for rounding, which may undo the very first contact
+            turn = np.where(reached, self._turn(segment[i], state.wrench.drive_angle), 0.0)
             with np.errstate(divide="ignore", invalid="ignore"):
-                rate = _angle_rate(self.seen, chosen.lane, state) * parameter_rate / (end - begin)
-                newton = (steady + 2.0 * (1.0 - steady) * (1.0 - turn)) / rate
+                rate = _angle_rate(self.seen, some.lane, state) * parameter_rate / (end[i] - begin[i])
+                newton = (steady[i] + 2.0 * (1.0 - steady[i]) * (1.0 - turn)) / rate
                 # Much nearer to the end than the goal is, the rate may be zero or rounding: the interpolant's serves.
-                sound = (1.0 - turn > 0.5 * (1.0 - target)) & (newton > 0.0)
-                step = (turn - target) * np.where(sound, newton, pace)
+                sound = (1.0 - turn > 0.5 * (1.0 - target[i])) & (newton > 0.0)
+                return target[i] - turn, -1.0 / np.where(sound, newton, pace[i])
+
+        every = np.arange(way.size)
+        way = 1.0 - np.abs(1.0 - np.clip(way, 0.0, 2.0))  # beyond a fold the drive angle is less again
+        for _ in range(4):
+            missing, fall = short_of(every, way)
+            step = missing / fall
             way = np.clip(np.where(np.isfinite(step), way - step, way), 0.0, 1.0)
+        # Where the path is not smooth at its end, Newton may go round in circles.
+        lost = np.flatnonzero(np.abs(missing) > _LOST * (1.0 - target) + _ROUNDING)
+        way[lost] = falling_root(
+            lambda i, at: short_of(lost[i], at), np.zeros(lost.size), np.ones(lost.size), start=way[lost]
+        )
         return chosen.along(way)[0]
 
 
@@ -228,8 +285,10 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     end_parameter, _ = segments.along(stop)
     end_angle = chebyshev.evaluate(angle, stop)
     if exact_events:
-        at_end = _states(seen, segments.lane, end_parameter, friction_angle).wrench.drive_angle
-        end_angle = np.where(np.isfinite(at_end), at_end, end_angle)
+        at_end = _states(seen, segments.lane, end_parameter, friction_angle).wrench
+        end_angle = np.where(np.isfinite(at_end.drive_angle), at_end.drive_angle, end_angle)
+        # At a flat vertex the maximum and the end of all moment are one, and rounding must not choose between them.
+        kind = np.where(folds & (np.abs(at_end.holding_moment) <= _NO_MOMENT), np.int8(SnapOff.THRUST), kind)
     locus = seen.locate(segments.lane, segments.begin)
     begin_angle = np.where(first, np.arctan2(locus.y, locus.x), np.append(np.nan, end_angle[:-1])[: first.size])
     node = chebyshev.nodes(order)
@@ -336,13 +395,24 @@ def _first_maximum(segments: Segments, angle: Floats) -> tuple[Index, Floats, ND
 
 
 def _polish_fold(seen: SeenContour, segments: Segments, angle: Floats, stop: Floats, friction_angle: float) -> Floats:
-    """Ways at which the exact derivative of the drive angle vanishes: Newton with the interpolant's curvature."""
+    """Ways at which the exact derivative of the drive angle vanishes: secants, the first by the interpolant."""
+
+    def rate(way: Floats) -> Floats:
+        parameter, parameter_rate = segments.along(way)
+        return _angle_rate(seen, segments.lane, _states(seen, segments.lane, parameter, friction_angle)) * parameter_rate
+
     bend = chebyshev.evaluate(chebyshev.derivative(chebyshev.derivative(angle)), stop)
-    for _ in range(5):
-        parameter, parameter_rate = segments.along(stop)
-        state = _states(seen, segments.lane, parameter, friction_angle)
-        step = _angle_rate(seen, segments.lane, state) * parameter_rate / bend
-        stop = np.where(np.abs(step) < 1e-2, np.clip(stop - step, 0.0, 1.0), stop)
+    at_stop, last_step = rate(stop), np.full(stop.shape, 2e-2)
+    for _ in range(7):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = at_stop / bend
+            chosen = np.abs(step) < 0.5 * last_step
+            new = np.where(chosen, np.clip(stop - step, 0.0, 1.0), stop)
+            at_new = rate(new)
+            bend = np.where(chosen, (at_new - at_stop) / (new - stop), bend)
+        stop, at_stop, last_step = new, at_new, np.where(chosen, np.abs(step), last_step)
+        if not np.any(chosen):
+            break
     return stop
 
 

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.contours.base import Contour, Floats, Index, Locus
+from tactile_bayes.contours.base import Contour, Floats, Index, Locus, Parameter
 
 __all__ = ["SeenContour"]
+
+_FAR = 1e3
+"""Rod lengths beyond which an end of a contour is as good as none."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,9 @@ class SeenContour:
         With parameters that are all arrays of shape (lanes,).
     base_x, base_y : ndarray, shape (lanes,)
         Pivots, in the contour's unit of length.
-    length : float
+    length : float or ndarray, shape (lanes,)
         The rod's length, in the same unit.
-    standoff : float
+    standoff : float or ndarray, shape (lanes,)
         Half the rod's diameter, in the same unit.
     mirrored : ndarray of bool, shape (lanes,)
         Whether the sweep is a backward one.
@@ -36,8 +39,8 @@ class SeenContour:
     contour: Contour
     base_x: Floats
     base_y: Floats
-    length: float
-    standoff: float
+    length: Parameter
+    standoff: Parameter
     mirrored: NDArray[np.bool_]
 
     @property
@@ -49,32 +52,45 @@ class SeenContour:
         it still grows from left to right."""
         sign = np.where(self.mirrored[lane], -1.0, 1.0)
         x, y, slope, arclength_rate, slope_rate = self.contour.take(lane).locate(sign * parameter)
-        if self.standoff:
-            x = x + self.standoff * np.sin(slope)
-            y = y - self.standoff * np.cos(slope)
-            arclength_rate = arclength_rate + self.standoff * slope_rate
+        length, standoff = (v[lane] if isinstance(v, np.ndarray) else v for v in (self.length, self.standoff))
+        if np.any(standoff):
+            x = x + standoff * np.sin(slope)
+            y = y - standoff * np.cos(slope)
+            arclength_rate = arclength_rate + standoff * slope_rate
         return Locus(
-            sign * (x - self.base_x[lane]) / self.length,
-            (y - self.base_y[lane]) / self.length,
+            sign * (x - self.base_x[lane]) / length,
+            (y - self.base_y[lane]) / length,
             sign * slope,
-            arclength_rate / self.length,
+            arclength_rate / length,
             slope_rate,
         )
 
     def domain(self) -> tuple[Floats, Floats]:
-        """Least and greatest parameter of every lane, infinite ones brought in to just beyond the rod's reach."""
+        """Least and greatest parameter of every lane, infinite ones brought in to just beyond the rod's reach.
+
+        So are ends so far away that rounding would hide in which direction they are.
+        """
         lo, hi = (np.broadcast_to(end, (self.lanes,)).astype(float) for end in self.contour.domain)
         lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
         lanes = np.arange(self.lanes)
         for end, outward in ((lo, -1.0), (hi, 1.0)):
             open_ended = ~np.isfinite(end)
-            reach = self.length
+            reach = np.full(self.lanes, self.length)
             while np.any(open_ended):
-                end[open_ended] = outward * reach
+                end[open_ended] = outward * reach[open_ended]
                 x = self.locate(lanes[open_ended], end[open_ended]).x
                 open_ended[open_ended] = outward * x <= 1.0
                 reach *= 2.0
+            far = np.flatnonzero(~(outward * self.locate(lanes, end).x <= _FAR))
+            if far.size:
+                end[far] = self._parameter_at(far, 2.0 * outward)
         return lo, hi
+
+    def _parameter_at(self, lane: Index, x: float) -> Floats:
+        """Parameters at which the contour itself, without standoff, is at x as seen."""
+        sign = np.where(self.mirrored[lane], -1.0, 1.0)
+        length = self.length[lane] if isinstance(self.length, np.ndarray) else self.length
+        return np.asarray(sign * self.contour.take(lane).parameter_of_x(self.base_x[lane] + sign * x * length))
 
     def knots(self) -> Floats:
         """Parameters, shape (knots, lanes), at which the radius of curvature jumps."""
