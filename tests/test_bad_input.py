@@ -117,11 +117,16 @@ def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, m
     assert not (tmp_path / "run").exists()
 
 
-def test_semicolons_are_named(table, tmp_path):
+def test_semicolons_and_decimal_commas_are_read_but_not_commas_for_both(table, tmp_path):
     header, rows = table
     path = tmp_path / "record.csv"
-    path.write_text("\n".join([*header, ";".join(NAMES), *map(";".join, rows)]), encoding="utf-8")
-    with pytest.raises(RecordError, match="line 8: the columns are not separated by commas: use commas, and points"):
+    with_commas = [";".join(cells).replace(".", ",") for cells in rows]
+    path.write_text("\n".join([*header, ";".join(NAMES), *with_commas]), encoding="utf-8")
+    record = read_record(path)
+    path.write_text("\n".join([*header, ",".join(NAMES), *map(",".join, rows)]), encoding="utf-8")
+    assert record.identical(read_record(path))
+    path.write_text("\n".join([*header, ",".join(NAMES), *(",".join(cells).replace(".", ",") for cells in rows)]))
+    with pytest.raises(RecordError, match=f"line {FIRST_ROW}: there are 1[0-9] cells in 8 columns .*with a point in"):
         read_record(path)
 
 

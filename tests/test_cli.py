@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import subprocess
 import sys
@@ -137,6 +138,24 @@ def test_a_file_without_header_is_told_its_rod_and_cell(record, bare, tmp_path):
 
 
 @pytest.mark.usefixtures("quick")
+def test_a_rig_tells_its_names_units_signs_and_sweeps_by_options(record, bare, tmp_path):
+    names, *rows = (line.split(",") for line in bare.read_text(encoding="utf-8").splitlines())
+    place = names.index
+    table = [["Winkel", "Mz [mN m]", "Fx", "Fy"]]
+    for row in rows:
+        angle, moment, x, y = (float(row[place(name)]) for name in names[-4:])
+        table.append([repr(90 - math.degrees(angle)), repr(1e3 * moment), repr(-1e3 * x), repr(y)])
+    path = tmp_path / "rig.csv"
+    path.write_text("\n".join(map(";".join, table)).replace(".", ","), encoding="utf-8")
+    options = ["drive_angle=90-Winkel[deg]", "holding_moment=Mz", "force_x = -Fx[mN]", "force_y=Fy[N]"]
+    options = ["--split-sweeps", *(word for option in options for word in ("--column", option))]
+    told = call("infer", path, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, *CELL_OPTIONS, *options)
+    assert told.exit_code == 0, told.output
+    plain = call("infer", bare, "--out", tmp_path / "1", "-q", *ROD_OPTIONS, *CELL_OPTIONS)
+    assert told.stdout.split("\n\n")[0].split("\n")[:4] == plain.stdout.split("\n\n")[0].split("\n")[:4]
+
+
+@pytest.mark.usefixtures("quick")
 def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(record, tmp_path, monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
     result = call("infer", record, "--out", tmp_path)
@@ -176,6 +195,15 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
         (["--force-noise", "-1"], "the load cell's force_noise is -1.0: give a standard deviation, zero or positive"),
         (["--missing", "force_z"], "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
         (["--missing", "force_x"], "column 'force_x' has values, but is declared missing"),
+        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
+        (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice: keep one of them"),
+        (["--column", "force=Fx"], "columns: 'force' is no column of a record: did you mean 'force_"),
+        (["--column", "force_x=Fx[mN]"], "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
+        (
+            ["--column", "force_x=force_x[mm]"],
+            "column 'force_x' is in [N], but [mm] is given for it: leave out the one",
+        ),
+        (["--split-sweeps"], "column 'sweep' is there already: do without split_sweeps, or remove the column"),
     ],
 )
 def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):

@@ -21,6 +21,7 @@ from tactile_bayes.record import (
     read_record,
     record_hash,
     rod_of,
+    text,
     write_record,
 )
 from tactile_bayes.rod import Rod
@@ -111,6 +112,15 @@ def test_a_csv_file_loses_nothing(tmp_path, record):
 @given(record=records())
 def test_a_netcdf_file_loses_nothing(tmp_path, record):
     assert_nothing_is_lost(record, tmp_path / "record.nc")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr(text, "FREE", 100)
+    record = make_record(columns(note=np.array(["", "a,b", "", "x" * 100, "", "a,b"], dtype=object)))
+    assert [record[name].dtype.kind for name in ("note", "direction")] == ["O", "U"]
+    write_record(record, tmp_path / f"record{suffix}")
+    assert read_record(tmp_path / f"record{suffix}").identical(record)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
@@ -211,20 +221,43 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         ([HEADER, ROW.replace("1.25", "71.6")], "line 2, column 'drive_angle': 71.6 is more than a turn"),
         ([HEADER, ROW, ROW.replace("1.25", "1.0")], "from 1.25 rad (line 2) to 1.0 rad (line 3)"),
         ([HEADER, "0,forward,1,25,0,5,0,125"], "line 2: there are 8 cells in 6 columns"),
-        ([HEADER.replace(",", ";"), ROW.replace(",", ";")], "line 1: the columns are not separated by commas"),
+        ([HEADER.replace(",", ";"), ROW], "line 2: there are 1 cells in 6 columns"),
+        (
+            [HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"],
+            "'0,5' is not a number: correct it, or remove the row; ",
+        ),
+        (
+            [HEADER.replace(",", " "), ROW.replace(",", " ")],
+            "there is no column 'sweep' (columns: sweep direction drive",
+        ),
+        (
+            [HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"],
+            "line 2, column 'holding_moment': '1.000,5' is not a",
+        ),
         (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it"),
         ([HEADER + ",force_x", ROW + ",1"], "line 1: there are two columns 'force_x'"),
         (["# tactile_bayes record, format 2", HEADER, ROW], "line 1: the file has format 2"),
         (["# units: SI", "# units: SI", HEADER, ROW], "line 2: 'units' is stated a second time"),
-        (["# units: SI", "# rod_length: 200 [mm]", HEADER, ROW], "line 2: rod_length is in [mm]: convert it to [m]"),
+        (
+            ["# units: SI", "# rod_length: 200 [mN]", HEADER, ROW],
+            "line 2: rod_length is in [mN], but takes m, cm, mm or",
+        ),
         (["# units: SI", "# rod_length: long", HEADER, ROW], "line 2: rod_length is 'long': give a number [m]"),
         (
             ["# units: dimensionless", "# load_cell_force_noise: 0.1 [N]", HEADER, ROW],
-            "line 2: load_cell_force_noise is in [N]: convert it to [1]",
+            "line 2: load_cell_force_noise is in [N], but takes 1: convert it",
         ),
         (["# column time: clock [s]", HEADER, ROW], "line 1: 'clock' is no kind of column"),
         (["# column n: integer [1]", HEADER + ",n", ROW + ",1.5"], "line 3, column 'n': '1.5' is no integer"),
-        (["# column drive_angle: number [deg]", HEADER, ROW], "column 'drive_angle' is in [deg]"),
+        (
+            ["# column drive_angle: number [mm]", HEADER, ROW],
+            "line 1, column 'drive_angle' is in [mm], but takes rad, mrad, deg or °: correct the unit, or convert",
+        ),
+        (
+            ["# units: dimensionless", "# column force_x: number [mN]", HEADER, ROW],
+            "line 2, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]: convert it, "
+            "or state units 'SI' and the rod",
+        ),
         (["# units: SI"], "there is no line of column names: add one, sweep,direction,"),
         ([HEADER], "there are no samples"),
         ([HEADER, ROW + '"' + "x" * 200_000], "line 2: the line cannot be read"),
@@ -241,9 +274,10 @@ def test_files_that_are_something_else_are_refused(tmp_path):
     (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
     with refused("this is no NetCDF file that can be read"):
         read_record(tmp_path / "a.nc")
-    (tmp_path / "a.csv").write_bytes(HEADER.encode() + b"\n\xff\xfe")
-    with refused("the file is not UTF-8 text"):
-        read_record(tmp_path / "a.csv")
+    for line, content in ((2, HEADER.encode() + b"\n\xff\xfe"), (1, b"# rig: \xb5\n" + HEADER.encode())):
+        (tmp_path / "a.csv").write_bytes(content)
+        with refused(f"line {line}: the file is not UTF-8 text"):
+            read_record(tmp_path / "a.csv")
     for path in ("a.txt", "a"):
         with refused("a record is a .csv or a .nc file, not"):
             read_record(tmp_path / path)

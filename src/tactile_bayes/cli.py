@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from tactile_bayes.inference.ensembles import Progress
     from tactile_bayes.run import Run
@@ -81,6 +81,17 @@ def infer(
     record: Annotated[Path, typer.Argument(help="Record, .csv or .nc.")],
     out: Out,
     family: Annotated[str, typer.Option(help="What shape the contour has: parabola or circle.")] = "parabola",
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What the file has for a column, where it has another name, unit, sign or zero: force_x=Fx[mN], "
+            "force_y=-Fy[N], drive_angle=90-Angle[deg], base_x=12[mm]; give it again for another."
+        ),
+    ] = None,
+    split_sweeps: Annotated[
+        bool,
+        typer.Option("--split-sweeps", help="Find sweeps and directions where the drive turns, if there are none."),
+    ] = False,
     length: Annotated[float | None, typer.Option(help="Rod length [m], for SI files that do not state it.")] = None,
     flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], likewise.")] = None,
     diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0,
@@ -119,7 +130,14 @@ def infer(
     if diameter and length is None:
         raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
     rod = None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
-    measured = read_record(record, rod=rod, missing=missing or (), load_cell_frame=load_cell_frame)
+    measured = read_record(
+        record,
+        columns=_columns(column or []),
+        split_sweeps=split_sweeps,
+        rod=rod,
+        missing=missing or (),
+        load_cell_frame=load_cell_frame,
+    )
     cell = None
     if force_noise is not None or moment_noise is not None:
         cell = LoadCell(force_noise=force_noise or 0.0, moment_noise=moment_noise or 0.0)
@@ -173,6 +191,21 @@ def demo(
     with _progress(quiet) as progress:
         run = analyse(read_record(path), out, family="parabola", seed=seed, truth=CONTOUR, progress=progress)
     _print_run(run, {"record": path}, TRUTH)
+
+
+def _columns(options: Sequence[str]) -> dict[str, str]:
+    """The values of --column by the columns that they are for."""
+    from tactile_bayes.errors import ParameterError
+
+    columns: dict[str, str] = {}
+    for option in options:
+        name, equals, origin = (part.strip() for part in option.partition("="))
+        if not (name and equals and origin):
+            raise ParameterError(f"--column {option}: write COLUMN=NAME[UNIT], like force_x=Fx[mN]")
+        if name in columns:
+            raise ParameterError(f"--column {name}= is given twice: keep one of them")
+        columns[name] = origin
+    return columns
 
 
 @contextmanager

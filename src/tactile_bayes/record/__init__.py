@@ -5,7 +5,17 @@ from tactile_bayes.record.construction import make_record
 from tactile_bayes.record.files import read_record, write_record
 from tactile_bayes.record.frame import frame_of, in_frame, turned
 from tactile_bayes.record.identity import record_hash
-from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, Column, Frame, column_of
+from tactile_bayes.record.schema import (
+    CHANNELS,
+    COLUMNS,
+    FRAMES,
+    LOAD_CELL_UNITS,
+    MEASURED,
+    REQUIRED,
+    Column,
+    Frame,
+    column_of,
+)
 from tactile_bayes.record.units import rod_of, to_dimensionless, to_si
 from tactile_bayes.record.validation import validate
 
@@ -13,6 +23,7 @@ __all__ = [
     "CHANNELS",
     "COLUMNS",
     "FRAMES",
+    "LOAD_CELL_UNITS",
     "MEASURED",
     "REQUIRED",
     "Column",

@@ -14,6 +14,8 @@ from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
 from tactile_bayes.record.table import Source
 from tactile_bayes.rod import Rod
 
+_SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_offset")
+
 __all__ = ["checked_attributes", "completed_attributes", "rod_attributes", "same_rod", "stated_frame", "stated_rod"]
 
 
@@ -120,8 +122,10 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
         plain = value.item() if isinstance(value, np.generic | np.ndarray) and value.size == 1 else value
         if name in ATTRIBUTE_UNITS:
             plain = _quantity(name, plain, source)
-            if not (math.isfinite(plain) and plain >= 0):
-                raise source.error(f"attribute {name!r} is {plain!r}: give zero or a positive number")
+            signed = any(word in name for word in _SIGNED)
+            if not (math.isfinite(plain) and (signed or plain >= 0)):
+                what = "finite number" if signed else "zero or a positive number"
+                raise source.error(f"attribute {name!r} is {plain!r}: give {what}")
         is_storable = isinstance(plain, str | float) or (
             isinstance(plain, int) and not isinstance(plain, bool) and -(2**63) <= plain < 2**63
         )

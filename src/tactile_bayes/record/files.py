@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import xarray as xr
@@ -11,9 +11,12 @@ import xarray as xr
 from tactile_bayes.errors import RecordError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.record.construction import completed_record
+from tactile_bayes.record.conversion import in_units_of_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf_format import read_netcdf, write_netcdf
+from tactile_bayes.record.origin import renamed
 from tactile_bayes.record.schema import Frame
+from tactile_bayes.record.stroke import split_at_turns
 from tactile_bayes.record.validation import validate
 from tactile_bayes.rod import Rod
 
@@ -26,20 +29,38 @@ _WRITERS = {".csv": write_csv, ".nc": write_netcdf}
 def read_record(
     path: str | os.PathLike[str],
     *,
+    columns: Mapping[str, str] | None = None,
+    split_sweeps: bool = False,
     rod: Rod | None = None,
     missing: Collection[str] = (),
     load_cell_frame: Frame | None = None,
 ) -> xr.Dataset:
-    """Read a record from a CSV or a NetCDF file.
+    """Read a record from a CSV or a NetCDF file, with columns of any name, unit, sign and zero.
 
     A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
     sample; `write_record` shows the form. The header may be absent: then the numbers are dimensionless, or SI if
-    `rod` is given. A load cell that turns with the drive is stated by `# load_cell_frame: turning`.
+    `rod` is given or a column states a unit. A load cell that turns with the drive is stated by
+    `# load_cell_frame: turning`. Semicolons or tabs may stand between columns, and then commas in decimals.
+
+    Units are those of the record (SI, or those of the rod; angles in radians), or others that are stated: by
+    `columns`, in the name of a column ("force_x [mN]"), in a line of the header (`# column force_x: number [mN]`,
+    `# rod_length: 200 [mm]`), or in the attribute `units` of a NetCDF variable. They are converted.
 
     Parameters
     ----------
     path : path-like
         A file with suffix .csv or .nc.
+    columns : mapping of str to str, optional
+        What the file has for a column of a record: `NAME`, or `NAME[UNIT]` where the file does not state the unit. A
+        minus before it, `-NAME[UNIT]`, is for a rig that counts the other way round, a number with a sign for one
+        that counts from another zero: `90-NAME[deg]` or `NAME[mN]+12.5`; it is in the same unit. For base_x,
+        base_y, sweep and direction one value for all samples can be given, as "12[mm]", "0" or "forward". A unit in
+        the name of a column may be left out. Further columns keep their names.
+    split_sweeps : bool
+        Whether the columns sweep and direction, which the file lacks, are found from the drive angle: a sweep ends
+        where the angle comes back from an extreme by more than a tenth of its whole range, or where the pivot moves;
+        its direction is that of the straight line through its angles. An angle that is back within one sample was
+        reset, and the sweeps before and after it have one direction.
     rod : Rod, optional
         The rod, if the file does not state it.
     missing : collection of str, optional
@@ -56,12 +77,32 @@ def read_record(
     ------
     RecordError
         If the content is not a record, see `validate` (the message names line and column); if the file is SI
-        and no rod is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if the
-        suffix is another one.
+        and no rod is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if a
+        column is in a unit of another quantity, or what stands for it in `columns` is not there; if there are sweeps
+        already where they are to be split; if the suffix is another one.
+    ParameterError
+        If `columns` names no column of a record, or what stands for it cannot be.
 
     Examples
     --------
+    A rig with names, units and signs of its own, and semicolons:
+
     >>> import tempfile
+    >>> rig = "Angle [°];M;Fx;Fy\\n60,0;0;0;0\\n60,5;0,25;-1,5;40\\n"
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     path = Path(directory) / "rig.csv"
+    ...     _ = path.write_text(rig, encoding="utf-8")
+    ...     record = read_record(
+    ...         path,
+    ...         columns={"drive_angle": "Angle", "holding_moment": "M[Nmm]", "force_x": "-Fx[mN]", "force_y": "Fy[mN]"},
+    ...         split_sweeps=True,
+    ...         rod=Rod(0.1, 1.2e-5),
+    ...     )
+    >>> record["holding_moment"].values.tolist(), record["force_x"].values.tolist(), str(record["direction"].values[0])
+    ([0.0, 0.00025], [-0.0, 0.0015], 'forward')
+
+    A rig that measures the moment only:
+
     >>> with tempfile.TemporaryDirectory() as directory:
     ...     path = Path(directory) / "moment_only.csv"
     ...     _ = path.write_text("sweep,direction,drive_angle,holding_moment\\n0,forward,1.2,6e-5\\n")
@@ -70,7 +111,11 @@ def read_record(
     'SI'
     """
     path = Path(path)
-    table = _READERS[_suffix(path)](path)
+    columns = columns or {}
+    table = renamed(_READERS[_suffix(path)](path, columns), columns)
+    table = in_units_of_record(table, rod)
+    if split_sweeps:
+        table = split_at_turns(table)
     record = completed_record(table, rod, missing, load_cell_frame)
     if rod is None and "units" not in table.attrs:
         record.attrs["units_source"] = "assumed"

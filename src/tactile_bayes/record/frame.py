@@ -10,13 +10,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.record.attributes import stated_frame
-from tactile_bayes.record.schema import CHANNELS, FRAMES, Frame
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.validation import validate
 
 __all__ = ["frame_of", "in_frame", "turned"]
 
 Floats = NDArray[np.float64]
+
+_BOUND = {"degrees_of_freedom", "relative_noise"} | {name for name in LOAD_CELL_UNITS if "force" in name} - {
+    "force_noise"
+}
+"""Entries of a load cell's data sheet that hold along the axes it measures along, and along no others."""
 
 
 def frame_of(record: xr.Dataset) -> Frame:
@@ -71,7 +76,8 @@ def in_frame(record: xr.Dataset, frame: Frame) -> xr.Dataset:
     ------
     RecordError
         If `record` is not a record, or has only one of the two forces: a force in the one frame takes both of the
-        other. (Where both are missing, nothing is lost.)
+        other. (Where both are missing, nothing is lost.) Also if its load cell has flaws that are bound to the axes
+        it measures along, like a bias.
     ParameterError
         If the frame is none of the two.
 
@@ -89,6 +95,7 @@ def in_frame(record: xr.Dataset, frame: Frame) -> xr.Dataset:
     converted = validate(record)
     if frame_of(converted) == frame:
         return record
+    _refuse_bound_to_frame(converted)
     sense = 1.0 if frame == "turning" else -1.0
     for prefix in ("", "truth_"):
         names = f"{prefix}force_x", f"{prefix}force_y"
@@ -125,6 +132,18 @@ def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Fl
     x, y = np.asarray(force_x, dtype=np.float64), np.asarray(force_y, dtype=np.float64)
     cos, sin = np.cos(angle), np.sin(angle)
     return np.asarray(x * cos + y * sin), np.asarray(y * cos - x * sin)
+
+
+def _refuse_bound_to_frame(record: xr.Dataset) -> None:
+    """Refuse a record whose data sheet says of its forces what holds in the frame they were measured in."""
+    for name, value in record.attrs.items():
+        entry = str(name).removeprefix("load_cell_")
+        if name in ATTRIBUTE_UNITS and entry in _BOUND:
+            raise RecordError(
+                f"its load cell's {entry}, {value!r}, holds along the axes that it measured: keep the record in the "
+                "frame in which it was measured, or take out what is known of the cell's errors "
+                "(LoadCell.corrected) and remove the attributes that are left"
+            )
 
 
 def _values(record: xr.Dataset, name: str) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ from tactile_bayes.record.table import Source, Table, table_of
 __all__ = ["read_netcdf", "write_netcdf"]
 
 
-def read_netcdf(path: Path) -> Table:
-    """Read a table."""
+def read_netcdf(path: Path, columns: Mapping[str, str]) -> Table:
+    """Read a table as it is in the file; all its columns are read, whichever are meant."""
     source = Source(str(path))
     with open(path, "rb"):  # what the system refuses, it refuses in fewer words than HDF5
         pass
@@ -21,7 +22,6 @@ def read_netcdf(path: Path) -> Table:
         with xr.open_dataset(
             path,
             engine="h5netcdf",
-            mask_and_scale=False,
             decode_times=False,
             decode_timedelta=False,
             decode_coords=False,
@@ -42,6 +42,6 @@ def write_netcdf(record: xr.Dataset, path: Path) -> None:
             while dimension in record.variables:
                 dimension += "_"
             encoding[name] = {"dtype": "S1", "char_dim_name": dimension}
-        else:
+        elif variable.dtype.kind != "O":  # objects are texts of different lengths
             encoding[name] = {"_FillValue": None}
     record.to_netcdf(path, engine="h5netcdf", encoding=encoding)

@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations, product
 from types import MappingProxyType
 from typing import Literal
 
@@ -15,6 +16,7 @@ __all__ = [
     "COLUMNS",
     "DIRECTIONS",
     "FRAMES",
+    "LOAD_CELL_UNITS",
     "MEASURED",
     "REQUIRED",
     "UNITS",
@@ -116,13 +118,44 @@ along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos 
 UNITS = ("SI", "dimensionless")
 """What the attribute `units` of a record can be."""
 
+_GAIN_UNITS = {("N", "N m"): "1/m", ("N m", "N"): "m"}
+
+LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "force_noise": "N",
+        "moment_noise": "N m",
+        "degrees_of_freedom": "1",
+        "relative_noise": "1",
+        **{f"correlation_{one}_{other}": "1" for one, other in combinations(CHANNELS, 2)},
+        **{f"bias_{name}": COLUMNS[name].unit for name in CHANNELS},
+        **{f"bias_uncertainty_{name}": COLUMNS[name].unit for name in CHANNELS},
+        "random_walk_moment": "N m",
+        "random_walk_force": "N",
+        "ornstein_uhlenbeck_moment": "N m",
+        "ornstein_uhlenbeck_force": "N",
+        "ornstein_uhlenbeck_time": "1",
+        **{
+            f"gain_{to}_{of}": _GAIN_UNITS.get((COLUMNS[to].unit, COLUMNS[of].unit), "1")
+            for to, of in product(CHANNELS, CHANNELS)
+        },
+        "force_range": "N",
+        "moment_range": "N m",
+        "force_resolution": "N",
+        "moment_resolution": "N m",
+        "drive_angle_offset": "rad",
+        "drive_angle_noise": "rad",
+        "drive_angle_resolution": "rad",
+    }
+)
+"""The entries of a load cell's data sheet that are quantities, with their units in SI; `LoadCell` says what they mean.
+As attributes of a record their names begin with "load_cell_"."""
+
 ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
     {
         "rod_length": "m",
         "rod_flexural_rigidity": "N m²",
         "rod_diameter": "m",
-        "load_cell_force_noise": "N",
-        "load_cell_moment_noise": "N m",
+        **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )
 """The attributes that are quantities, with their units in an SI record."""

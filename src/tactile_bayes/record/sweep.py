@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,34 +19,42 @@ __all__ = ["refuse_impossible_sweeps"]
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
     """Refuse sweeps of several directions or pivots, or whose drive angle is in degrees or runs the wrong way."""
     direction, angle = values["direction"], values["drive_angle"]
-    for sample in np.flatnonzero(~np.isin(direction, DIRECTIONS)).tolist():
+    forward = direction == "forward"
+    impossible = ~(forward | (direction == "backward"))
+    if impossible.any():
+        sample = int(np.argmax(impossible))
         raise source.cell_error(
             sample, "direction", f"{str(direction[sample])!r} is no direction: write 'forward' or 'backward'"
         )
-    for sample in np.flatnonzero(np.abs(angle) > 2 * math.pi).tolist():
+    beyond = (angle > 2 * math.pi) | (angle < -2 * math.pi)
+    if beyond.any():
+        sample = int(np.argmax(beyond))
         raise source.cell_error(
             sample,
             "drive_angle",
             f"{float(angle[sample])!r} is more than a turn (2π), so the angles look like degrees: convert the column "
-            "to radians, with numpy.radians or times 0.017453292519943295",
+            "to radians, with numpy.radians or times 0.017453292519943295, or state its unit, as in "
+            "columns={'drive_angle': 'drive_angle[deg]'} of read_record, on the command line "
+            "--column 'drive_angle=drive_angle[deg]'",
         )
     for rows in _sweeps(values["sweep"]):
-        sweep = int(values["sweep"][rows[0]])
-        for name, part in (
-            ("direction", "stroke of the drive"),
-            ("base_x", "position of the pivot"),
-            ("base_y", "position of the pivot"),
+        first, last = _ends(rows)
+        sweep = int(values["sweep"][first])
+        for name, column, part in (
+            ("direction", forward, "stroke of the drive"),
+            ("base_x", values["base_x"], "position of the pivot"),
+            ("base_y", values["base_y"], "position of the pivot"),
         ):
-            column = values[name]
-            for other in rows[column[rows] != column[rows[0]]]:
+            differs = column[rows] != column[first]
+            if differs.any():
+                other = first + int(np.argmax(differs)) if isinstance(rows, slice) else int(rows[np.argmax(differs)])
+                one, two = values[name][first].item(), values[name][other].item()
                 raise source.error(
-                    f"sweep {sweep} mixes two values of {name!r}, {column[rows[0]].item()!r} ({source.row(rows[0])}) "
-                    f"and {column[other].item()!r} ({source.row(other)}): "
-                    f"give each {part} a sweep number of its own"
+                    f"sweep {sweep} mixes two values of {name!r}, {one!r} ({source.row(first)}) and {two!r} "
+                    f"({source.row(other)}): give each {part} a sweep number of its own"
                 )
-        sense = 1 if direction[rows[0]] == "forward" else -1
-        if _runs_backwards(sense * angle[rows]):
-            first, last = rows[0], rows[-1]
+        sense = 1 if forward[first] else -1
+        if _runs_backwards(angle[rows], sense):
             raise source.error(
                 f"sweep {sweep} is labelled {DIRECTIONS[sense < 0]!r}, but its drive angle "
                 f"{'decreases' if sense > 0 else 'increases'}, from {float(angle[first])!r} rad ({source.row(first)}) "
@@ -54,21 +63,40 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
             )
 
 
-def _sweeps(sweep: NDArray[np.int64]) -> list[NDArray[np.intp]]:
-    """The rows of each sweep, in the order of measurement."""
-    order = np.argsort(sweep, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
+def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | NDArray[np.intp]]:
+    """The rows of each sweep, in the order of measurement: slices, where sweeps come one after the other."""
+    steps = np.flatnonzero(sweep[1:] != sweep[:-1]) + 1
+    numbers = sweep[np.concatenate(([0], steps))]
+    if np.unique(numbers).size == numbers.size:
+        ends = [0, *steps.tolist(), sweep.size]
+        yield from (slice(begin, end) for begin, end in pairwise(ends))
+    else:
+        order = np.argsort(sweep, kind="stable")
+        yield from np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
-def _runs_backwards(angle: NDArray[np.float64]) -> bool:
-    """Whether a sequence decreases, and not only by the noise of the encoder (see the notes of `validate`)."""
+def _ends(rows: slice | NDArray[np.intp]) -> tuple[int, int]:
+    """The first and the last row of a sweep."""
+    return (rows.start, rows.stop - 1) if isinstance(rows, slice) else (int(rows[0]), int(rows[-1]))
+
+
+def _runs_backwards(angle: NDArray[np.float64], sense: int) -> bool:
+    """Whether a sequence runs against its sense, and not only by the noise of the encoder (see `validate`)."""
     if angle.size < 2:
         return False
-    if (np.diff(angle) < 0).all():
-        return True
     angle = angle - angle[0]  # so that a drive at rest has exactly no trend
     time = np.arange(angle.size) - (angle.size - 1) / 2
-    slope = float(time @ angle / (time @ time))
-    residual = angle - angle.mean() - slope * time
-    variance_of_slope = float(residual @ residual / max(angle.size - 2, 1) / (time @ time))
+    squares = _product(time, time)
+    slope = sense * _product(time, angle) / squares
+    if slope >= 0:
+        return False
+    if (sense * angle[1:] < sense * angle[:-1]).all():
+        return True
+    residual = angle - angle.mean() - sense * slope * time
+    variance_of_slope = _product(residual, residual) / max(angle.size - 2, 1) / squares
     return slope < -6 * math.sqrt(variance_of_slope)
+
+
+def _product(one: NDArray[np.floating[Any]], other: NDArray[np.floating[Any]]) -> float:
+    """Scalar product, without the threads of BLAS: many sweeps, little work in each."""
+    return float(np.einsum("i,i->", one, other))

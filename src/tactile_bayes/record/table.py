@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,16 @@ class Source:
         Name of the file, if there is one.
     lines : sequence of int, optional
         The line of the file that each sample begins in.
+    heads : mapping of str to int, optional
+        The line of the file that says what a column is.
+    aliases : mapping of str to str, optional
+        What a column is called in the file, if that is something else.
     """
 
     name: str = ""
     lines: Sequence[int] | None = None
+    heads: Mapping[str, int] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
 
     def row(self, sample: int) -> str:
         """What a sample is called."""
@@ -47,7 +53,17 @@ class Source:
 
     def cell_error(self, sample: int, column: str, what: str) -> RecordError:
         """A refusal that points at a cell."""
-        return self.error(f"{self.row(sample)}, column {column!r}: {what}")
+        return self.error(f"{self.row(sample)}, {self.column(column)}: {what}")
+
+    def column_error(self, column: str, what: str) -> RecordError:
+        """A refusal that points at what is said of a column."""
+        line = self.heads.get(column)
+        return self.error(f"{'' if line is None else f'line {line}, '}{self.column(column)} {what}")
+
+    def column(self, name: str) -> str:
+        """What a column is called."""
+        alias = self.aliases.get(name, name)
+        return f"column {name!r}" if alias == name else f"column {name!r} ({alias!r} in the file)"
 
 
 @dataclass(frozen=True)

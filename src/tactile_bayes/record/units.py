@@ -9,7 +9,7 @@ import xarray as xr
 
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod
-from tactile_bayes.record.schema import column_of
+from tactile_bayes.record.schema import LOAD_CELL_UNITS, column_of
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.validation import validate
 from tactile_bayes.rod import Rod
@@ -123,8 +123,11 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
             with np.errstate(over="ignore"):  # refused below, with the sample that it happened in
                 variable.values = convert(variable.values, getattr(rod, column.scale))
             variable.attrs["units"] = column.unit_in(units)
-    for name, scale in (("load_cell_force_noise", rod.force_unit), ("load_cell_moment_noise", rod.moment_unit)):
-        if name in converted.attrs:
-            converted.attrs[name] = convert(converted.attrs[name], scale)
+    length = rod.length_unit
+    scales = {"N": rod.force_unit, "N m": rod.moment_unit, "m": length, "1/m": 1.0 / length}
+    for entry, unit in LOAD_CELL_UNITS.items():
+        name = f"load_cell_{entry}"
+        if name in converted.attrs and unit in scales:
+            converted.attrs[name] = convert(converted.attrs[name], scales[unit])
     converted.attrs |= {"units": units, **rod_attributes(rod if units == "SI" else _in_lengths(rod))}
     return validate(converted)

@@ -13,8 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.record.attributes import checked_attributes, stated_frame
-from tactile_bayes.record.cell import integer_in, number_in
-from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, Kind, column_of, same_unit
+from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of, same_unit
 from tactile_bayes.record.sweep import refuse_impossible_sweeps
 from tactile_bayes.record.table import Cells, Source, Table, table_of
 
@@ -33,7 +33,7 @@ def validate(record: xr.Dataset) -> xr.Dataset:
     -------
     xr.Dataset
         The same record with columns in the order of the schema, absent bases as 0, and `units` and `long_name`
-        on every variable. The argument is not changed.
+        on every variable. The argument is not changed; values that are right as they are are not copied.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def checked_record(table: Table) -> xr.Dataset:
     at_origin: dict[str, Cells] = {name: (np.zeros(table.samples), {}) for name in ("base_x", "base_y")}
     filled = at_origin | dict(columns)
     order = [*MEASURED, *(name for name in columns if name not in MEASURED)]
-    values = {name: _parsed(name, filled[name][0], source) for name in order}
+    values = {name: parsed_column(name, filled[name][0], source) for name in order}
     _refuse_gaps(values, source)
     refuse_impossible_sweeps(values, source)
     variables = {
@@ -140,6 +140,11 @@ def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
                 f", or declare the channel missing, with an empty column or missing=({name!r},), on the command line "
                 f"--missing {name}"
             )
+        elif name in ("sweep", "direction"):
+            what += (
+                ", or have the record split where the drive turns back: split_sweeps=True, on the command line "
+                "--split-sweeps"
+            )
         elif not is_required:
             what += f", or add a column {name!r} (0 for a pivot in the origin)"
         raise source.error(what)
@@ -162,44 +167,6 @@ def _refuse_gaps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
             raise source.cell_error(
                 int(bad[0]), name, f"the value {what}: give a finite number, remove the row{way_out}"
             )
-
-
-def _parsed(name: str, values: NDArray[Any], source: Source) -> NDArray[Any]:
-    """The cells of a column as int64, float64 or text."""
-    column = column_of(name)
-    if column is not None:
-        kind: Kind = column.kind
-    elif values.dtype.kind in "biu":
-        kind = "integer"
-    elif values.dtype.kind in "US" or any(isinstance(cell, str) for cell in values if values.dtype.kind == "O"):
-        kind = "text"
-    else:
-        kind = "number"
-    if values.dtype.kind == "S":
-        values = np.char.decode(values, "utf-8")
-    if values.dtype.kind in "mM":
-        raise source.cell_error(0, name, f"{values[0]!r} is a time: give seconds, as numbers, or text")
-
-    if kind == "number" and values.dtype.kind in "biuf":
-        return values.astype(np.float64)
-    if kind == "integer" and values.dtype.kind in "bi":
-        return values.astype(np.int64)
-    if kind == "text" and values.dtype.kind == "U":
-        return values
-    dtype, parse = {"integer": (np.int64, integer_in), "number": (np.float64, number_in), "text": (np.str_, _text)}[
-        kind
-    ]
-    cells = values.tolist()
-    parsed = [parse(cell) for cell in cells]
-    if None in parsed:
-        bad = parsed.index(None)
-        what = {"integer": "an integer", "number": "a number", "text": "text"}[kind]
-        raise source.cell_error(bad, name, f"{cells[bad]!r} is not {what}: correct it, or remove the row")
-    return np.array(parsed, dtype=dtype)
-
-
-def _text(cell: Any) -> str | None:
-    return cell if isinstance(cell, str) else None
 
 
 def _nearest(name: str, candidates: Iterable[str], cutoff: float) -> str | None:

@@ -1,0 +1,209 @@
+"""The header of a CSV file: attributes and descriptions of columns in commented lines, and the line of names."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
+from tactile_bayes.record.quantity import accepted_units, converted, unit_of
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
+from tactile_bayes.record.table import Source
+
+__all__ = ["FORMAT", "KINDS", "Header", "column_line", "header_line", "read_header"]
+
+FORMAT = 1
+KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
+_DELIMITERS = ",;\t"
+_NAME = r"[\w.\-]+"
+_QUOTED = r'"(?:[^"\\]|\\.)*"'
+_UNIT = r'(?!\s)[^\]"]*(?<!\s)'
+_FORMAT_LINE = re.compile(r"tactile_bayes record, format (?P<format>[0-9]+)")
+_HEADER_LINE = re.compile(rf"(?P<key>{_NAME}|{_QUOTED})\s*:\s*(?P<value>.*)")
+_COLUMN_LINE = re.compile(
+    rf"column\s+(?P<name>{_NAME}|{_QUOTED})\s*:\s*(?P<kind>\w+)\s*"
+    rf"(?:\[\s*(?P<units>{_QUOTED}|{_UNIT})\s*\])?\s*(?P<long_name>.*)"
+)
+_QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a CSV file says before its first sample.
+
+    Parameters
+    ----------
+    attrs : mapping
+        Attributes of the record; quantities are in SI, or in units of the rod.
+    descriptions : mapping of str to mapping
+        What is said of columns: `kind`, `units`, `long_name`.
+    heads : mapping of str to int
+        The line that says what a column is.
+    names : list of str
+        The columns.
+    delimiter : str
+        What separates them.
+    line : int
+        The line of the names.
+    """
+
+    attrs: Mapping[str, Any]
+    descriptions: Mapping[str, Mapping[str, str]]
+    heads: Mapping[str, int]
+    names: list[str]
+    delimiter: str
+    line: int
+
+
+# --- Writing ----------------------------------------------------------------------------------------------------
+
+
+def header_line(name: str, value: str | float, units: str) -> str:
+    """An attribute of a record in the given units, as a line of a header."""
+    unit = _attribute_unit(name, units)
+    return f"# {_quoted(name, _NAME)}: {_header_text(value)}{'' if unit == '1' else f' [{unit}]'}\n"
+
+
+def column_line(name: str, kind: str, attrs: Mapping[str, Any]) -> str:
+    """The description of a column, as a line of a header."""
+    unit = _quoted(str(attrs["units"]), _UNIT)
+    return f"# column {_quoted(name, _NAME)}: {kind} [{unit}] {_header_text(str(attrs['long_name']))}\n"
+
+
+def _attribute_unit(name: str, units: str) -> str:
+    """The unit of an attribute in a record of the given units; "1" where it has none."""
+    unit = ATTRIBUTE_UNITS.get(name, "1")
+    return unit if units != "dimensionless" or unit == "rad" else "1"
+
+
+def _header_text(value: str | float) -> str:
+    if not isinstance(value, str):
+        return repr(value)
+    is_plain = value != "" and value.isprintable() and _header_value(_unpadded(value)) == value
+    return value if is_plain else json.dumps(value, ensure_ascii=False)
+
+
+def _quoted(text: str, plain: str) -> str:
+    """The text, in quotation marks where it would not be recognised without."""
+    return text if re.fullmatch(plain, text) and text.isprintable() else json.dumps(text, ensure_ascii=False)
+
+
+# --- Reading ----------------------------------------------------------------------------------------------------
+
+
+def read_header(file: BinaryIO, source: Source) -> Header:
+    """Read the lines up to the names, and leave the file where the samples begin."""
+    stated: dict[str, tuple[int, str]] = {}
+    descriptions: dict[str, dict[str, str]] = {}
+    heads: dict[str, int] = {}
+    delimiter = None
+    for number, line in enumerate(_lines(file, source), start=1):
+        if number == 1 and (match := re.fullmatch(rf"sep=([{_DELIMITERS}])\s*", line)):  # as spreadsheets begin a file
+            delimiter = match[1]
+            continue
+        if not line.startswith("#"):
+            if line.strip(_DELIMITERS + " \r\n"):
+                names, delimiter = _column_names(line, delimiter, number, source)
+                heads = dict.fromkeys(names, number) | heads
+                return Header(_stated_attributes(stated, source), descriptions, heads, names, delimiter, number)
+            continue
+        content = _unpadded(line[1:])
+        if match := _FORMAT_LINE.fullmatch(content):
+            if int(match["format"]) > FORMAT:
+                raise source.line_error(
+                    number,
+                    f"the file has format {match['format']}, but this version of tactile_bayes reads formats up to "
+                    f"{FORMAT}: update it",
+                )
+        elif match := _COLUMN_LINE.fullmatch(content):
+            if match["kind"] not in KINDS.values():
+                raise source.line_error(
+                    number, f"{match['kind']!r} is no kind of column: write integer, number or text"
+                )
+            description = {"kind": match["kind"]}
+            if match["units"] is not None:
+                description["units"] = _unquoted(match["units"])
+            if match["long_name"]:
+                description["long_name"] = _unquoted(match["long_name"])
+            descriptions[_unquoted(match["name"])] = description
+            heads[_unquoted(match["name"])] = number
+        elif match := _HEADER_LINE.fullmatch(content):
+            key = _unquoted(match["key"])
+            if key in stated:
+                raise source.line_error(number, f"{key!r} is stated a second time: keep one of the lines")
+            stated[key] = (number, match["value"])
+    raise source.error(f"there is no line of column names: add one, {','.join(MEASURED)}")
+
+
+def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
+    for number, line in enumerate(iter(file.readline, b""), start=1):
+        try:
+            yield line.decode("utf-8-sig" if number == 1 else "utf-8")
+        except UnicodeDecodeError as error:
+            raise source.line_error(
+                number, f"the file is not UTF-8 text ({error.reason}): save it as CSV in UTF-8"
+            ) from error
+
+
+def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) -> dict[str, str | int | float]:
+    """The values of header lines; quantities that the schema knows are converted, and a unit of theirs means SI."""
+    attrs = {key: _header_value(text) for key, (_, text) in stated.items()}
+    matches = {key: _QUANTITY.fullmatch(stated[key][1]) for key in ATTRIBUTE_UNITS if key in stated}
+    if "units" not in attrs and any(
+        match is not None and match["unit"] is not None and ATTRIBUTE_UNITS[key] not in ("1", "rad")
+        for key, match in matches.items()
+    ):
+        attrs["units"] = "SI"
+    for key, match in matches.items():
+        line, text = stated[key]
+        expected = _attribute_unit(key, str(attrs.get("units")))
+        number = number_in(match["number"]) if match else None
+        if match is None or number is None:
+            raise source.line_error(line, f"{key} is {text!r}: give a number [{expected}]")
+        if match["unit"] is not None:
+            unit, wanted = unit_of(match["unit"]), unit_of(expected)
+            if unit is None or wanted is None or unit.dimension != wanted.dimension:
+                raise source.line_error(
+                    line, f"{key} is in [{match['unit']}], but takes {accepted_units(expected)}: convert it"
+                )
+            number = converted(number, unit, wanted)
+        attrs[key] = number
+    return attrs
+
+
+def _header_value(text: str) -> str | int | float:
+    """What a value in a header means: a number, a text in quotation marks, or else the text itself."""
+    if is_integer_text(text):
+        number: float | None = integer_in(text)
+    else:
+        number = number_in(text) if text else None
+    return _unquoted(text) if number is None else number
+
+
+def _unpadded(text: str) -> str:
+    """The text without blanks around it, and without the delimiters that a spreadsheet pads a header with."""
+    return text.strip().rstrip(_DELIMITERS + " ")
+
+
+def _unquoted(text: str) -> str:
+    try:
+        return str(json.loads(text)) if re.fullmatch(_QUOTED, text) else text
+    except json.JSONDecodeError:
+        return text
+
+
+def _column_names(line: str, delimiter: str | None, number: int, source: Source) -> tuple[list[str], str]:
+    """The names of the columns, and what separates them: what makes the most columns, if it is not said."""
+    cells = {sign: next(csv.reader([line], delimiter=sign)) for sign in delimiter or _DELIMITERS}
+    delimiter = max(cells, key=lambda sign: len(cells[sign]))
+    names = [name.strip() for name in cells[delimiter]]
+    for index, column in enumerate(names):
+        if not column:
+            raise source.line_error(number, f"column {index + 1} has no name: name it, or remove it")
+        if column in names[:index]:
+            raise source.line_error(number, f"there are two columns {column!r}: rename or remove one of them")
+    return names, delimiter

@@ -1,0 +1,378 @@
+"""The rows of a CSV file: chunks of lines become columns, by a fast reader, or a careful one that knows its place."""
+
+from __future__ import annotations
+
+import csv
+import io
+import warnings
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO, NoReturn, overload
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
+from tactile_bayes.record.schema import Kind
+from tactile_bayes.record.table import Source
+from tactile_bayes.record.text import FREE, text_array
+
+__all__ = ["Layout", "Lines", "read_rows"]
+
+_FIRST, _CHUNK = 1 << 16, 1 << 21
+"""Bytes that are read at once: at first few, from which the kinds of columns are guessed."""
+
+_MARK = 5_790_842_613_117
+"""Ends each line for the fast reader, so that no cell is taken for that of another column."""
+
+_ROUNDING: dict[str, Any] = (
+    {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
+)
+"""Digits become the nearest double: since pandas 3.1 they always do."""
+
+
+class Lines(Sequence[int]):
+    """The line that each sample begins in: runs of lines that follow each other, and what is between them."""
+
+    def __init__(self) -> None:
+        self._starts: list[int] = []
+        self._runs: list[range | NDArray[np.int64]] = []
+        self._size = 0
+
+    def extend(self, lines: range | NDArray[np.int64]) -> None:
+        """Add the lines of further samples."""
+        last = self._runs[-1] if self._runs else None
+        if isinstance(last, range) and isinstance(lines, range) and last.stop == lines.start:
+            self._runs[-1] = range(last.start, lines.stop)
+        elif len(lines):
+            self._starts.append(self._size)
+            self._runs.append(lines)
+        self._size += len(lines)
+
+    def __len__(self) -> int:
+        return self._size
+
+    @overload
+    def __getitem__(self, sample: int) -> int: ...
+    @overload
+    def __getitem__(self, sample: slice) -> Sequence[int]: ...
+    def __getitem__(self, sample: int | slice) -> int | Sequence[int]:
+        if isinstance(sample, slice):
+            return [self[index] for index in range(*sample.indices(self._size))]
+        run = bisect_right(self._starts, sample) - 1
+        return int(self._runs[run][sample - self._starts[run]])
+
+
+@dataclass
+class Layout:
+    """What the columns of a file are, as far as it is known before they are read.
+
+    Parameters
+    ----------
+    names : list of str
+        The columns.
+    delimiter : str
+        What separates them. Where it is no comma, a comma may separate decimals.
+    line : int
+        The line above the first row.
+    meant : mapping of str to {"integer", "number", "text"}
+        Kinds of columns that mean something in a record.
+    described : mapping of str to {"integer", "number", "text"}
+        Kinds of other columns, where the header says them.
+    guessed : dict of str to {"integer", "number", "text"}
+        Kinds of the rest, from their cells; filled while they are read.
+    """
+
+    names: list[str]
+    delimiter: str
+    line: int
+    meant: Mapping[str, Kind]
+    described: Mapping[str, Kind]
+    guessed: dict[str, Kind] = field(default_factory=dict)
+    decimal: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.delimiter == ",":
+            self.decimal = "."
+
+    def kind(self, name: str) -> Kind | None:
+        """The kind of a column, None if nothing is known of it yet."""
+        return self.meant.get(name) or self.described.get(name) or self.guessed.get(name)
+
+
+class _WrongGuessError(Exception):
+    """A column has text in it, but was guessed to be of numbers: all of it has to be read again, as text."""
+
+
+def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str, NDArray[Any]], Lines]:
+    """The columns of a file from where it stands, as int64, float64 or text, and the line of each sample.
+
+    It takes little more memory than what it returns. Text is as `text_array` makes it. Columns that the layout says
+    nothing of are integers, else numbers (empty cells are NaN), else text.
+    """
+    begin = file.tell()
+    most = sum(block.count(b"\n") for block in iter(lambda: file.read(_CHUNK), b"")) + 1
+    while True:
+        file.seek(begin)
+        try:
+            return _read_once(_Chunks(file), layout, most, source)
+        except _WrongGuessError:
+            continue
+
+
+def _read_once(chunks: _Chunks, layout: Layout, most: int, source: Source) -> tuple[dict[str, NDArray[Any]], Lines]:
+    columns = {name: _Growing(most) for name in layout.names}
+    lines = Lines()
+    above = layout.line
+    while chunk := chunks.next():
+        cells = _read_fast(chunk, layout)
+        if cells is None:
+            cells, here, above = _read_carefully(chunk, chunks, layout, above, source)
+        else:
+            rows = len(cells[layout.names[0]])
+            here, above = range(above + 1, above + 1 + rows), above + rows
+        lines.extend(here)
+        for name, values in cells.items():
+            columns[name].append(values)
+    return {name: column.finished() for name, column in columns.items()}, lines
+
+
+class _Chunks:
+    """The rest of a file in pieces that end with a line."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._size = _FIRST
+        self._rest: list[bytes] = []
+
+    def next(self) -> bytes:
+        """The next piece, empty at the end."""
+        while block := self._file.read(self._size):
+            self._size = max(self._size, _CHUNK) if self._rest else self._size
+            end = block.rfind(b"\n") + 1
+            if end:
+                chunk = b"".join((*self._rest, block[:end]))
+                self._rest = [block[end:]]
+                self._size = _CHUNK
+                return chunk
+            self._rest.append(block)
+        chunk = b"".join(self._rest)
+        self._rest = []
+        return chunk
+
+
+class _Growing:
+    """A column that is filled from the top. Memory that is never written to costs nothing."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._size = 0
+        self._values: NDArray[Any] | None = None
+        self._seen: dict[str, str] = {}
+
+    def append(self, values: NDArray[Any]) -> None:
+        """Add values, which may be wider or of a more general type than those before."""
+        size = self._size + len(values)
+        self._most = max(self._most, size)
+        before = self._values
+        dtype = self._dtype_with(values)
+        if before is None or before.dtype != dtype or len(before) < self._most:
+            self._values = np.empty(self._most, dtype)
+            if before is not None:
+                self._values[: self._size] = self._as(dtype, before[: self._size])
+        assert self._values is not None
+        self._values[self._size : size] = self._as(dtype, values)
+        self._size = size
+
+    def _dtype_with(self, values: NDArray[Any]) -> np.dtype[Any]:
+        """A type for the values and those before: objects, where text of equal width might waste memory."""
+        before = values.dtype if self._values is None else self._values.dtype
+        dtype = np.promote_types(before, values.dtype)
+        if dtype.kind != "U" or dtype == before != values.dtype or dtype.itemsize * self._most <= FREE:
+            return dtype
+        is_wide = dtype.itemsize > 2 * before.itemsize
+        if self._values is None:
+            is_wide = dtype.itemsize > 8 * (float(np.char.str_len(values).mean()) + 1)
+        return np.dtype(object) if is_wide else dtype
+
+    def _as(self, dtype: np.dtype[Any], values: NDArray[Any]) -> Any:
+        if dtype.kind != "O" or values.dtype.kind == "O":
+            return values
+        return [self._seen.setdefault(text, text) for text in values.tolist()]
+
+    def finished(self) -> NDArray[Any]:
+        """The values, without the room that was left for others."""
+        values = np.empty(0, object) if self._values is None else self._values
+        self._values = None
+        values.resize(self._size, refcheck=False)
+        return text_array(values.tolist()) if values.dtype.kind == "O" and self._size else values
+
+
+# --- The fast reader --------------------------------------------------------------------------------------------
+
+
+def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
+    """The columns of a chunk; None where anything is unusual, which is for the careful reader."""
+    kinds = {name: layout.kind(name) for name in layout.names}
+    if None in kinds.values() or layout.decimal is None or b"\0" in chunk:
+        return None
+    chunk = chunk.replace(b"\r\n", b"\n")
+    if b"\r" in chunk or not chunk.endswith(b"\n"):
+        return None
+    rows = chunk.count(b"\n")
+    chunk = chunk.replace(b"\n", f"{layout.delimiter}{_MARK}\n".encode())
+    dtypes: dict[int, Any] = {len(layout.names): np.int64}
+    for index, (name, kind) in enumerate(kinds.items()):
+        if kind != "integer" or name not in layout.guessed:  # where it would be inferred, 2.0 is no integer
+            dtypes[index] = {"integer": np.int64, "number": np.float64, "text": object}[kind or "text"]
+    try:
+        with warnings.catch_warnings(action="error"), np.errstate(invalid="raise"):
+            frame = pd.read_csv(
+                io.BytesIO(chunk),
+                sep=layout.delimiter,
+                decimal=layout.decimal,
+                header=None,
+                names=list(range(len(layout.names) + 1)),
+                index_col=False,
+                dtype=dtypes,
+                keep_default_na=False,
+                na_values={
+                    index: ["", "nan", "NaN", "NAN"] for index, kind in enumerate(kinds.values()) if kind == "number"
+                },
+                skip_blank_lines=False,
+                low_memory=False,
+                engine="c",
+                **_ROUNDING,
+            )
+    except (ValueError, OverflowError, ArithmeticError, Warning):  # ParserError and UnicodeError are ValueErrors
+        return None
+    if len(frame) != rows or not (frame[len(layout.names)] == _MARK).all():
+        return None
+    columns: dict[str, NDArray[Any]] = {}
+    for index, (name, kind) in enumerate(kinds.items()):
+        values = frame[index].to_numpy()
+        if kind == "text":
+            values = _text_array(values.tolist(), name in layout.meant)
+        elif values.dtype != (np.int64 if kind == "integer" else np.float64):
+            return None
+        columns[name] = values
+    return columns
+
+
+def _text_array(texts: Sequence[str], stripped: bool) -> NDArray[Any]:
+    words = set(texts)
+    if stripped and any(word != word.strip() for word in words):
+        texts = [text.strip() for text in texts]
+    return text_array(texts)
+
+
+# --- The careful reader -----------------------------------------------------------------------------------------
+
+
+def _read_carefully(
+    chunk: bytes, chunks: _Chunks, layout: Layout, above: int, source: Source
+) -> tuple[dict[str, NDArray[Any]], range | NDArray[np.int64], int]:
+    """The columns of a chunk, the lines of its samples, and its last line; or the refusal of a cell, with its place."""
+    lines: list[str] = []
+
+    def fed() -> Iterator[str]:
+        piece = chunk
+        while piece:  # further ones only where a cell in quotation marks goes on beyond the end of one
+            lines.extend(_text_lines(piece, above + len(lines), source))
+            yield from lines[reader.line_num :]
+            piece = chunks.next()
+
+    rows: list[list[str]] = []
+    begins: list[int] = []
+    reader = csv.reader(fed(), delimiter=layout.delimiter)
+    begin = above + 1
+    try:
+        for row in reader:
+            if row and len(row) != len(layout.names):
+                raise source.line_error(
+                    begin,
+                    f"there are {len(row)} cells in {len(layout.names)} columns ({', '.join(layout.names)}): write one "
+                    "per column, with a point in decimals"
+                    + ("" if layout.delimiter == "," else " or a comma, but none between thousands"),
+                )
+            if row:
+                rows.append(row)
+                begins.append(begin)
+            begin = above + 1 + reader.line_num
+            if reader.line_num == len(lines):
+                break
+    except csv.Error as error:
+        raise source.line_error(begin, f"the line cannot be read ({error}): correct it") from error
+    here = Source(source.name, begins, aliases=source.aliases)
+    order = sorted(layout.names, key=lambda name: name not in layout.meant)  # they show what separates decimals
+    places = {name: index for index, name in enumerate(layout.names)}
+    columns = {name: _column_values(name, [row[places[name]] for row in rows], layout, here) for name in order}
+    is_run = bool(begins) and begins[-1] - begins[0] == len(begins) - 1
+    return columns, range(begins[0], begins[-1] + 1) if is_run else np.array(begins, dtype=np.int64), begin - 1
+
+
+def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
+    try:
+        text = chunk.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = above + 1 + chunk.count(b"\n", 0, error.start)
+        raise source.line_error(
+            line, f"the file is not UTF-8 text ({error.reason}): save it as CSV in UTF-8"
+        ) from error
+    return io.StringIO(text, newline="").readlines()
+
+
+def _column_values(name: str, texts: list[str], layout: Layout, source: Source) -> NDArray[Any]:
+    """The cells of a column as what it is known to be, or as what they look like."""
+    kind = layout.kind(name)
+    if kind == "text":
+        return _text_array(texts, name in layout.meant)
+    if name not in layout.meant and name not in layout.described:
+        looks = _kind_of(texts, layout)
+        if looks == "text":
+            layout.guessed[name] = "text"
+            if kind is None:
+                return text_array(texts)
+            raise _WrongGuessError
+        if kind != "number":
+            kind = layout.guessed[name] = looks
+    parsed = [integer_in(text) if kind == "integer" else _number_in(text, layout) for text in texts]
+    if None in parsed:
+        _refuse_cell(name, kind, texts, parsed.index(None), layout, source)
+    return np.array(parsed, dtype=np.int64 if kind == "integer" else np.float64)
+
+
+def _number_in(text: str, layout: Layout) -> float | None:
+    """The number in a cell; the first one with decimals shows whether a comma or a point separates them."""
+    if layout.delimiter != "," and ("," in text or "." in text):
+        sign = "," if "," in text else "."
+        number = number_in(text.replace(",", ".")) if layout.decimal in (None, sign) else None
+        if number is not None:
+            layout.decimal = sign
+        return number
+    return number_in(text)
+
+
+def _kind_of(texts: list[str], layout: Layout) -> Kind:
+    """What the cells of a column are of which nothing is said."""
+    if all(is_integer_text(text) and integer_in(text) is not None for text in texts):
+        return "integer"
+    decimal = layout.decimal
+    if all(_number_in(text, layout) is not None for text in texts):
+        return "number"
+    layout.decimal = decimal
+    return "text"
+
+
+def _refuse_cell(
+    name: str, kind: Kind | None, texts: list[str], sample: int, layout: Layout, source: Source
+) -> NoReturn:
+    if name in layout.described:
+        what = f"is no {kind}, as the header says the column is: correct one"
+    else:
+        what = f"is not {'an integer' if kind == 'integer' else 'a number'}: correct it, or remove the row"
+        if layout.delimiter != "," and layout.decimal and ("," if layout.decimal == "." else ".") in texts[sample]:
+            what += f"; decimals are separated by {layout.decimal!r} in this file, and thousands by nothing"
+    raise source.cell_error(sample, name, f"{texts[sample]!r} {what}")

@@ -1,0 +1,273 @@
+"""The origin of a column: what a file calls it, in which unit it has it, and with which sign and zero."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.quantity import accepted_units, unit_of
+from tactile_bayes.record.schema import COLUMNS, DIRECTIONS, MEASURED, Column, Kind, column_of
+from tactile_bayes.record.table import Cells, Source, Table
+
+__all__ = ["Origin", "meant_kinds", "origins_of", "renamed"]
+
+CONSTANTS = ("sweep", "direction", "base_x", "base_y")
+"""Columns for which a single value can be given."""
+
+_NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_LEAD = re.compile(rf"(?:(?P<offset>[+-]?{_NUMBER})\s*)?(?P<sign>[+-])\s*(?P<rest>.+)")
+_TRAIL = re.compile(rf"(?P<rest>.*?\S)\s*(?P<sign>[+-])\s*(?P<offset>{_NUMBER})")
+_BRACKETS = re.compile(r"(?P<rest>.*\S)\s*\[(?P<unit>[^\[\]]*)\]")
+_VALUE = re.compile(rf"(?P<number>[+-]?{_NUMBER})\s*(?:\[(?P<unit>[^\[\]]*)\])?")
+_UNIT_IN_NAME = re.compile(
+    r"(?P<stem>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)|/\s*(?P<slash>[^/]*\S))\s*"
+)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a column of a record comes from: offset + sign · (a column of the file), or one value for all samples.
+
+    Parameters
+    ----------
+    column : str or None
+        The column of the file; None for a value.
+    unit : str or None
+        Its unit, where one is given beside it, or in its name; that of the offset too.
+    sign : {1, -1}
+        −1 where the file counts the other way round.
+    offset : float
+        What is added.
+    value : str, float, int or None
+        The value.
+    """
+
+    column: str | None
+    unit: str | None = None
+    sign: int = 1
+    offset: float = 0.0
+    value: str | float | None = None
+
+
+def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source) -> dict[str, Origin]:
+    """Where the columns of a record come from that a file calls otherwise.
+
+    Parameters
+    ----------
+    columns : mapping of str to str
+        Names of a record, and what stands for them in the file; see `read_record`. Columns like "force_x [mN]" are
+        found without it.
+    names : iterable of str
+        The columns of the file.
+    source : Source
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If a key is no column of a record, or a value cannot be read.
+    RecordError
+        If the file lacks a column, or has one already that is called like one of these.
+
+    Examples
+    --------
+    >>> origins_of({"force_x": "-Fx[mN]", "drive_angle": "90-Angle[deg]"}, ["Fx", "Angle"], Source())["drive_angle"]
+    Origin(column='Angle', unit='deg', sign=-1, offset=90.0, value=None)
+    """
+    names = list(names)
+    origins = {target: _origin(target, str(text), names, source) for target, text in columns.items()}
+    for name in names:
+        stem, unit = _stem_and_unit(name)
+        if stem in MEASURED and unit is not None and stem not in names and stem not in origins:
+            origins[stem] = Origin(name, unit)
+    used = {origin.column for origin in origins.values()}
+    for target in origins:
+        if target in names and target not in used:
+            raise source.column_error(
+                target, f"is in the file, but {columns.get(target)!r} is given for it: leave out the one that is wrong"
+            )
+    return origins
+
+
+def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str, Kind]:
+    """The kinds of those columns of a file that mean something in a record."""
+    kinds = {name: column.kind for name in names if (column := column_of(name)) is not None}
+    kinds |= {origin.column: _column(target).kind for target, origin in origins.items() if origin.column is not None}
+    return kinds
+
+
+def renamed(table: Table, columns: Mapping[str, str]) -> Table:
+    """The table with the names of a record, its signs and its zeros; units are stated, and not converted yet."""
+    origins = origins_of(columns, table.columns, table.source)
+    if not origins:
+        return table
+    used = Counter(origin.column for origin in origins.values())
+    heads, aliases = dict(table.source.heads), dict(table.source.aliases)
+    for target, origin in origins.items():
+        if origin.column is not None:
+            aliases[target] = origin.column
+            if origin.column in table.source.heads:
+                heads[target] = table.source.heads[origin.column]
+    source = replace(table.source, heads=heads, aliases=aliases)
+    cells = {name: content for name, content in table.columns.items() if name not in used}
+    for target, origin in origins.items():
+        if origin.column is None:
+            unit = {} if origin.unit is None else {"units": origin.unit}
+            cells[target] = (np.full(table.samples, origin.value), unit)
+        else:
+            cells[target] = _cells(target, origin, table.columns[origin.column], used[origin.column] > 1, source)
+    return Table(cells, table.attrs, source)
+
+
+def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: Source) -> Cells:
+    """What is in a column of the file, as a column of the record."""
+    values, attrs = found
+    if _column(target).kind != "number":
+        return values, {name: value for name, value in attrs.items() if name != "units"}
+    values = parsed_column(target, values, source)
+    if is_shared:
+        values = values.copy()
+    if origin.sign < 0:
+        np.negative(values, out=values)
+    if origin.offset:
+        values += origin.offset
+    stated = attrs.get("units")
+    if stated in (None, "unknown"):
+        unit = origin.unit
+    else:
+        unit = str(stated)
+        of_origin, of_file = unit_of(origin.unit) if origin.unit is not None else None, unit_of(unit)
+        if of_origin is not None and of_origin != of_file:
+            raise source.column_error(
+                target, f"is in [{unit}], but [{origin.unit}] is given for it: leave out the one that is wrong"
+            )
+        if of_file is None and origin.unit is not None:
+            unit = origin.unit
+    attrs = {name: value for name, value in attrs.items() if name != "units"}
+    return values, attrs if unit is None else {"units": unit, **attrs}
+
+
+def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
+    column = column_of(target)
+    if column is None:
+        near = difflib.get_close_matches(target, COLUMNS, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(MEASURED)}"
+        raise ParameterError(f"columns: {target!r} is no column of a record: {hint}")
+    text = text.strip()
+    readings = list(_readings(text))
+    for origin in readings:
+        name = None if origin.column is None else _found(origin.column, names)
+        if name is not None:
+            return _checked(target, column, replace(origin, column=name), text, source)
+    value = _value(target, text)
+    if value is not None:
+        return value
+    wanted = readings[-1].column or text
+    near = difflib.get_close_matches(wanted, names, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else "write NAME[UNIT], with a minus before it for the opposite sign"
+    if target in CONSTANTS:
+        hint += f" (or one value for all samples, like {_example(column)})"
+    raise source.error(
+        f"there is no column {wanted!r}, which is given for {target!r} (columns: {', '.join(names)}): {hint}"
+    )
+
+
+def _readings(text: str) -> Iterator[Origin]:
+    """What a text may mean, from the most literal to the least: names may have signs, digits and brackets in them."""
+    starts = [("", 1, text)]
+    if match := _LEAD.fullmatch(text):
+        starts.append((match["offset"] or "", -1 if match["sign"] == "-" else 1, match["rest"]))
+    for lead, sign, rest in starts:
+        ends = [("", rest)]
+        if match := _TRAIL.fullmatch(rest):
+            ends.append((match["sign"] + match["offset"], match["rest"]))
+        for trail, name in ends:
+            offset = float(lead or 0) + float(trail or 0)
+            yield Origin(name, None, sign, offset)
+            if match := _BRACKETS.fullmatch(name):
+                yield Origin(match["rest"], match["unit"].strip(), sign, offset)
+
+
+def _found(text: str, names: list[str]) -> str | None:
+    """The column that a text names, blanks apart; a unit in the name of a column may be left out."""
+    if text in names:
+        return text
+    for form in (str, lambda name: _stem_and_unit(name)[0]):
+        same = [name for name in names if _compact(form(name)) == _compact(text)]
+        if len(same) == 1:
+            return same[0]
+    return None
+
+
+def _compact(text: str) -> str:
+    return re.sub(r"\s", "", text)
+
+
+def _checked(target: str, column: Column, origin: Origin, text: str, source: Source) -> Origin:
+    """The origin with the unit that the column's name states, unless that contradicts what is given."""
+    if column.kind != "number":
+        if origin.unit is not None or origin.sign < 0 or origin.offset:
+            raise ParameterError(
+                f"columns: {text!r} is given for {target!r}, which has no unit, sign or zero: give a name alone"
+            )
+        return origin
+    assert origin.column is not None
+    _, in_name = _stem_and_unit(origin.column)
+    if origin.unit is None:
+        return replace(origin, unit=in_name)
+    given, named = unit_of(origin.unit), None if in_name is None else unit_of(in_name)
+    if given is None:
+        raise ParameterError(
+            f"columns: {text!r} is given for {target!r}, but {origin.unit!r} is no unit of it: it takes "
+            f"{accepted_units(column.unit)}"
+        )
+    if named is not None and named != given:
+        raise source.error(
+            f"column {origin.column!r} has its unit in its name, but [{origin.unit}] is given for it: leave out the "
+            "one that is wrong"
+        )
+    return origin
+
+
+def _stem_and_unit(name: str) -> tuple[str, str | None]:
+    """A name without the unit in it, and the unit; what is in square brackets is taken for one whatever it is."""
+    match = _UNIT_IN_NAME.fullmatch(name)
+    if match is None:
+        return name, None
+    unit = match["square"] if match["square"] is not None else match["round"] or match["slash"] or ""
+    is_unit = match["square"] is not None or unit_of(unit) is not None
+    return (match["stem"], unit.strip()) if is_unit else (name, None)
+
+
+def _value(target: str, text: str) -> Origin | None:
+    """A value for all samples, if the text is one, and the column can have it."""
+    match = _VALUE.fullmatch(text)
+    if target == "direction":
+        return Origin(None, value=text) if text in DIRECTIONS else None
+    if match is None:
+        return None
+    if target not in CONSTANTS:
+        raise ParameterError(
+            f"columns: {text!r} is given for {target!r}, which is measured: name a column of the file, or declare a "
+            "channel missing"
+        )
+    if target == "sweep":
+        return Origin(None, value=int(text)) if re.fullmatch(r"[+-]?[0-9]+", text) else None
+    return Origin(None, unit=match["unit"], value=float(match["number"]))
+
+
+def _example(column: Column) -> str:
+    return {"direction": "forward", "sweep": "0"}.get(column.name, "12[mm]")
+
+
+def _column(name: str) -> Column:
+    column = column_of(name)
+    assert column is not None
+    return column

@@ -1,0 +1,57 @@
+"""The parsing of columns: cells as integers, numbers or text, or which of them is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.record.cell import integer_in, number_in
+from tactile_bayes.record.schema import Kind, column_of
+from tactile_bayes.record.table import Source
+from tactile_bayes.record.text import text_array
+
+__all__ = ["parsed_column"]
+
+
+def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[Any]:
+    """The cells of a column as int64, float64 or text: the array itself, where it is that already."""
+    column = column_of(name)
+    if column is not None:
+        kind: Kind = column.kind
+    elif values.dtype.kind in "biu":
+        kind = "integer"
+    elif values.dtype.kind in "US" or any(isinstance(cell, str) for cell in values if values.dtype.kind == "O"):
+        kind = "text"
+    else:
+        kind = "number"
+    if values.dtype.kind == "S":
+        values = np.char.decode(values, "utf-8")
+    if values.dtype.kind in "mM":
+        raise source.cell_error(0, name, f"{values[0]!r} is a time: give seconds, as numbers, or text")
+
+    if kind == "number" and values.dtype.kind in "biuf":
+        return values.astype(np.float64, copy=False)
+    if kind == "integer" and values.dtype.kind in "bi":
+        return values.astype(np.int64, copy=False)
+    if kind == "integer" and values.dtype.kind == "f":  # 2.0 is one, as tables often write it so
+        with np.errstate(invalid="ignore"):
+            integers = values.astype(np.int64)
+        if (integers == values).all() and (np.abs(values) < 2.0**63).all():
+            return integers
+    if kind == "text" and values.dtype.kind == "U":
+        return values
+    parse: Callable[[Any], Any] = {"integer": integer_in, "number": number_in, "text": _text}[kind]
+    cells = values.tolist()
+    parsed = [parse(cell) for cell in cells]
+    if None in parsed:
+        bad = parsed.index(None)
+        what = {"integer": "an integer", "number": "a number", "text": "text"}[kind]
+        raise source.cell_error(bad, name, f"{cells[bad]!r} is not {what}: correct it, or remove the row")
+    return text_array(parsed) if kind == "text" else np.array(parsed, np.int64 if kind == "integer" else np.float64)
+
+
+def _text(cell: Any) -> str | None:
+    return cell if isinstance(cell, str) else None

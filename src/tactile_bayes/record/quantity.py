@@ -1,0 +1,193 @@
+"""The quantities of a record, and the units that people measure them in."""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+import unicodedata
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Unit", "accepted_units", "converted", "unit_of"]
+
+Dimension = tuple[int, int, int, int]
+"""Powers of length, force, time and angle."""
+
+_PREFIXES = {
+    "": Fraction(1),
+    "da": Fraction(10),
+    "G": Fraction(10**9),
+    "M": Fraction(10**6),
+    "k": Fraction(10**3),
+    "h": Fraction(10**2),
+    "d": Fraction(1, 10),
+    "c": Fraction(1, 10**2),
+    "m": Fraction(1, 10**3),
+    "u": Fraction(1, 10**6),
+    "μ": Fraction(1, 10**6),
+    "n": Fraction(1, 10**9),
+    "p": Fraction(1, 10**12),
+}
+_DEGREE = Fraction(math.pi) / 180
+_BASES: dict[str, tuple[Dimension, Fraction]] = {
+    "m": ((1, 0, 0, 0), Fraction(1)),
+    "N": ((0, 1, 0, 0), Fraction(1)),
+    "gf": ((0, 1, 0, 0), Fraction(980665, 10**8)),
+    "s": ((0, 0, 1, 0), Fraction(1)),
+    "rad": ((0, 0, 0, 1), Fraction(1)),
+    "deg": ((0, 0, 0, 1), _DEGREE),
+    "°": ((0, 0, 0, 1), _DEGREE),
+}
+_WORDS = {
+    "": "1",
+    "-": "1",
+    "degree": "deg",
+    "degrees": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "metre": "m",
+    "meter": "m",
+    "newton": "N",
+}
+_COMMON = {
+    (1, 0, 0, 0): ("m", "cm", "mm", "µm"),
+    (0, 1, 0, 0): ("N", "kN", "mN", "µN", "gf"),
+    (1, 1, 0, 0): ("N m", "N mm", "mN m", "µN m", "mN mm"),
+    (2, 1, 0, 0): ("N m²", "N cm²", "N mm²", "mN mm²"),
+    (-1, 0, 0, 0): ("1/m", "1/cm", "1/mm"),
+    (0, 0, 0, 1): ("rad", "mrad", "deg", "°"),
+}
+_SYMBOL = re.compile(
+    rf"(?P<prefix>{'|'.join(sorted(_PREFIXES, key=len, reverse=True))})"
+    rf"(?P<base>{'|'.join(sorted(_BASES, key=len, reverse=True))})"
+    r"(?:\^?(?P<power>-?[1-9]))?"
+)
+_SEPARATOR = re.compile(r"[\s·⋅•*.]+|-(?=[^\W\d])")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: how many SI units it is, and of what.
+
+    Parameters
+    ----------
+    scale : Fraction
+        The unit in SI units.
+    dimension : tuple of int
+        Powers of length, force, time and angle.
+
+    Examples
+    --------
+    >>> unit_of("N mm") == unit_of("mN·m")
+    True
+    """
+
+    scale: Fraction
+    dimension: Dimension
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is the unit of pure numbers."""
+        return not any(self.dimension)
+
+
+@functools.cache
+def unit_of(text: str) -> Unit | None:
+    """The unit that a text means, or None.
+
+    Metres, newtons, gram-forces, seconds, radians and degrees, with prefixes from p to G, products and powers. Marks
+    that people write differently do not matter: N m², N·m^2, N*m2, N-m² and Nm² are one unit. Where symbols are not
+    separated a prefix is seen before a product: mN is a millinewton, and m N a newton metre.
+
+    Parameters
+    ----------
+    text : str
+        A unit.
+
+    Examples
+    --------
+    >>> unit_of("µN m").scale
+    Fraction(1, 1000000)
+    >>> unit_of("Nmm2") == unit_of("N mm²")
+    True
+    >>> unit_of("furlong") is None
+    True
+    """
+    text = unicodedata.normalize("NFKC", text).strip()
+    text = _WORDS.get(text.lower(), text)
+    scale, dimension = Fraction(1), (0, 0, 0, 0)
+    for index, part in enumerate(text.split("/")):
+        sense = -1 if index else 1
+        for piece in _SEPARATOR.split(part.strip()):
+            factors = _factors(piece) if piece != "1" else ()
+            if factors is None:
+                return None
+            for factor in factors:
+                scale *= factor.scale**sense
+                length, force, time, angle = (
+                    sum(pair) for pair in zip(dimension, (sense * power for power in factor.dimension), strict=True)
+                )
+                dimension = (length, force, time, angle)
+    return Unit(scale, dimension)
+
+
+def _factors(piece: str) -> tuple[Unit, ...] | None:
+    """The units in a piece without separators, one after the other; None if it is not made of units."""
+    factors = []
+    while piece:
+        match = _SYMBOL.match(piece)
+        if match is None:
+            return None
+        dimension, scale = _BASES[match["base"]]
+        power = int(match["power"] or 1)
+        length, force, time, angle = (power * one for one in dimension)
+        factors.append(Unit((_PREFIXES[match["prefix"]] * scale) ** power, (length, force, time, angle)))
+        piece = piece[match.end() :]
+    return tuple(factors) or None
+
+
+def converted(values: Any, unit: Unit, other: Unit) -> Any:
+    """Values in another unit of the same quantity, an array in place; a power of ten costs one rounding and no more.
+
+    Parameters
+    ----------
+    values : float or array of float64
+        In the one unit.
+    unit, other : Unit
+        The one unit, and the other.
+
+    Examples
+    --------
+    >>> converted(12.0, unit_of("mm"), unit_of("m"))
+    0.012
+    """
+    ratio = unit.scale / other.scale
+    out = values if isinstance(values, np.ndarray) else None
+    with np.errstate(over="ignore"):  # infinities are refused with the others
+        if ratio.numerator == 1:
+            result = np.divide(values, float(ratio.denominator), out=out)
+        else:
+            result = np.multiply(values, float(ratio), out=out)
+    return result if out is not None else float(result)
+
+
+def accepted_units(expected: str) -> str:
+    """Units that are taken where one is expected, in words.
+
+    Parameters
+    ----------
+    expected : str
+        A unit.
+
+    Examples
+    --------
+    >>> accepted_units("rad")
+    'rad, mrad, deg or °'
+    """
+    unit = unit_of(expected)
+    names = _COMMON.get(unit.dimension, (expected,)) if unit else (expected,)
+    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))

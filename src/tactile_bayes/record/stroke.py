@@ -1,0 +1,124 @@
+"""The strokes of a drive: where it turns back, and which way it goes in between."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.record.parsing import parsed_column
+from tactile_bayes.record.table import Table
+
+__all__ = ["split_at_turns", "turning_points"]
+
+SHARE = 0.1
+"""A drive turns where it comes back by more than this share of its whole range."""
+
+
+def turning_points(angle: NDArray[np.float64], least: float) -> list[int]:
+    """The extremes of an angle that it leaves again by more than a threshold, minima and maxima in turn.
+
+    Noise of an encoder makes no turning point as long as the angle does not come back by the threshold.
+
+    Parameters
+    ----------
+    angle : array of float, shape (n_samples,)
+        Drive angles in the order of measurement [rad].
+    least : float
+        The threshold [rad].
+
+    Returns
+    -------
+    list of int
+        Samples, in ascending order.
+
+    Examples
+    --------
+    >>> turning_points(np.array([0.0, 1.0, 0.9, 2.0, 3.0, 1.0, 0.0, 2.0]), least=0.5)
+    [4, 6]
+    """
+    falls, rises = _left_extreme(angle, 0, 1, least), _left_extreme(angle, 0, -1, least)
+    if falls is None or rises is None:
+        return []
+    sense = 1 if rises[1] < falls[1] else -1
+    begin = min(rises, falls, key=lambda extreme: extreme[1])[0]
+    found: list[int] = []
+    while extreme := _left_extreme(angle, begin, sense, least):
+        begin, sense = extreme[0], -sense
+        found.append(begin)
+    return found
+
+
+def split_at_turns(table: Table) -> Table:
+    """The table with sweeps and directions from its drive angle.
+
+    A sweep ends where the drive turns, that is where the angle comes back from an extreme by more than a tenth of its
+    whole range, and where the pivot moves. An angle that is back within one sample was reset: the sweeps before and
+    after it have one direction. The direction of a sweep is that of the straight line through its angles.
+
+    Raises
+    ------
+    RecordError
+        If the table has sweeps or directions already; if it has no angle, or one that does not move.
+    """
+    source = table.source
+    for name in ("sweep", "direction"):
+        if name in table.columns:
+            raise source.column_error(name, "is there already: do without split_sweeps, or remove the column")
+    if "drive_angle" not in table.columns or table.samples == 0:  # which is refused with what else is missing
+        return table
+    angle = parsed_column("drive_angle", table.columns["drive_angle"][0], source)
+    bad = ~np.isfinite(angle)
+    if bad.any():
+        sample = int(np.argmax(bad))
+        raise source.cell_error(
+            sample, "drive_angle", f"the value is {float(angle[sample])!r}: give a finite number, or remove the row"
+        )
+    least = SHARE * float(np.ptp(angle))
+    moved = np.zeros(angle.size, dtype=bool)
+    for name in ("base_x", "base_y"):
+        if name in table.columns:
+            base = parsed_column(name, table.columns[name][0], source)
+            moved[1:] |= base[1:] != base[:-1]
+    starts = []
+    for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):
+        turns = turning_points(angle[begin:end], least)
+        is_reset = [False, *(turn == before + 1 for before, turn in pairwise(turns))]
+        starts += [begin, *(begin + turn + 1 for turn, reset in zip(turns, is_reset, strict=False) if not reset)]
+    sweep = np.zeros(angle.size, dtype=np.int64)
+    sweep[starts[1:]] = 1
+    np.cumsum(sweep, out=sweep)
+    direction = np.empty(angle.size, dtype="U8")
+    for begin, end in pairwise([*starts, angle.size]):
+        trend = _trend(angle[begin:end])
+        if trend == 0.0:
+            raise source.error(
+                f"the drive angle does not move from {source.row(begin)} to {source.row(end - 1)}, so that the sweep "
+                "has no direction: remove these samples, or give columns 'sweep' and 'direction'"
+            )
+        direction[begin:end] = "forward" if trend > 0.0 else "backward"
+    return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
+
+
+def _left_extreme(angle: NDArray[np.float64], begin: int, sense: int, least: float) -> tuple[int, int] | None:
+    """The first maximum (sense 1) or minimum (−1) that the angle leaves by more than a threshold, and where it has."""
+    top, place = -np.inf, begin
+    size = 256
+    while begin < angle.size:
+        block = sense * angle[begin : begin + size]
+        back = np.maximum(np.maximum.accumulate(block), top) - block > least
+        is_left = bool(back.any())
+        stop = int(np.argmax(back)) if is_left else block.size - 1
+        highest = int(np.argmax(block[: stop + 1]))
+        if block[highest] > top:
+            top, place = float(block[highest]), begin + highest
+        if is_left:
+            return place, begin + stop
+        begin, size = begin + size, min(2 * size, 1 << 20)
+    return None
+
+
+def _trend(angle: NDArray[np.float64]) -> float:
+    """The slope of the straight line through a sequence, times something positive."""
+    return float(np.einsum("i,i->", np.arange(angle.size) - (angle.size - 1) / 2, angle - angle[0]))

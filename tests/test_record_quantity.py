@@ -1,0 +1,84 @@
+"""The units that people measure in."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given
+
+from tactile_bayes.record.quantity import accepted_units, converted, unit_of
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, COLUMNS, same_unit
+
+
+def si(text):
+    unit = unit_of(text)
+    assert unit is not None
+    return unit.scale
+
+
+@pytest.mark.parametrize(
+    ("spellings", "scale", "expected"),
+    [
+        (["m", "metre"], 1, "m"),
+        (["cm"], Fraction(1, 100), "m"),
+        (["mm", " mm "], Fraction(1, 1000), "m"),
+        (["µm", "μm", "um"], Fraction(1, 10**6), "m"),
+        (["N", "newton"], 1, "N"),
+        (["mN"], Fraction(1, 1000), "N"),
+        (["µN", "uN"], Fraction(1, 10**6), "N"),
+        (["kN"], 1000, "N"),
+        (["gf"], Fraction("0.00980665"), "N"),
+        (["kgf"], Fraction("9.80665"), "N"),
+        (["N m", "Nm", "N·m", "N⋅m", "N*m", "N-m", "N.m", "m N", "kN mm"], 1, "N m"),
+        (["N mm", "Nmm", "mN m", "mNm", "N·mm", "mN*m"], Fraction(1, 1000), "N m"),
+        (["µN m", "uNm", "mN mm", "mNmm"], Fraction(1, 10**6), "N m"),
+        (["N m²", "N·m^2", "N*m2", "Nm²", "N m^2"], 1, "N m²"),
+        (["N mm²", "Nmm2", "N·mm^2"], Fraction(1, 10**6), "N m²"),
+        (["rad", "radians"], 1, "rad"),
+        (["mrad"], Fraction(1, 1000), "rad"),
+        (["deg", "°", "degree", "Degrees"], Fraction(math.pi) / 180, "rad"),
+        (["1/mm"], 1000, "1/m"),
+        (["1", "-", ""], 1, "1"),
+    ],
+)
+def test_a_unit_is_known_by_all_its_spellings(spellings, scale, expected):
+    for text in spellings:
+        unit = unit_of(text)
+        assert unit is not None, text
+        assert (unit.scale, unit.dimension) == (scale, unit_of(expected).dimension), text
+
+
+@pytest.mark.parametrize("text", ["furlong", "g", "V", "degC", "mm/", "N m ?", "forward", "ch1", "kg", "%", "2 mm"])
+def test_what_is_no_unit_of_a_record(text):
+    assert unit_of(text) is None
+
+
+def test_every_unit_of_the_schema_is_known_and_accepts_itself_first():
+    for text in {*ATTRIBUTE_UNITS.values(), *(column.unit for column in COLUMNS.values())}:
+        assert si(text) == 1
+        assert same_unit(accepted_units(text).replace(" or ", ", ").split(", ")[0], text)
+
+
+def test_every_unit_that_is_offered_is_accepted():
+    for text in ("m", "N", "N m", "N m²", "1/m", "rad"):
+        for offered in accepted_units(text).replace(" or ", ", ").split(", "):
+            assert unit_of(offered).dimension == unit_of(text).dimension
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_power_of_ten_costs_one_rounding(number):
+    # Division by a power of ten that is a double itself is correctly rounded.
+    assert converted(number, unit_of("mm"), unit_of("m")) == number / 1000
+    assert converted(number, unit_of("N mm²"), unit_of("N m²")) == number / 1e6
+    assert converted(number, unit_of("kN"), unit_of("N")) == number * 1000
+    assert converted(number, unit_of("deg"), unit_of("rad")) == np.radians(number)
+
+
+def test_arrays_are_converted_in_place():
+    values = np.array([1.0, 2.0])
+    assert converted(values, unit_of("mN"), unit_of("N")) is values
+    assert values.tolist() == [1e-3, 2e-3]

@@ -1,0 +1,117 @@
+"""Sweeps and directions, found where the drive turns."""
+
+from __future__ import annotations
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given
+
+from helpers.record_tables import refused
+from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record.stroke import split_at_turns, turning_points
+from tactile_bayes.record.table import Source, Table
+
+
+def split(angle, **columns):
+    table = split_at_turns(Table({"drive_angle": (np.asarray(angle, float), {}), **columns}, {}, Source()))
+    sweep, direction = table.columns["sweep"][0], table.columns["direction"][0]
+    starts = [0, *(np.flatnonzero(np.diff(sweep)) + 1).tolist()]
+    assert sweep[starts].tolist() == list(range(len(starts)))
+    return starts, "".join(direction[starts].astype("U1").tolist())
+
+
+UP, DOWN = np.linspace(1.0, 2.0, 101), np.linspace(2.0, 1.0, 101)
+
+
+@pytest.mark.parametrize(
+    ("parts", "starts", "directions"),
+    [
+        ([UP], [0], "f"),
+        ([DOWN], [0], "b"),
+        ([UP, DOWN], [0, 101], "fb"),
+        ([DOWN, UP[1:], DOWN[1:]], [0, 101, 201], "bfb"),
+        ([UP, UP, UP], [0, 101, 202], "fff"),  # the drive goes back between samples
+        ([DOWN, DOWN], [0, 101], "bb"),
+        ([UP, np.full(40, 2.0), DOWN], [0, 101], "fb"),  # it rests: which sweep that belongs to does not matter
+        ([UP[:2], DOWN[:0]], [0], "f"),
+    ],
+)
+def test_strokes_without_noise(parts, starts, directions):
+    assert split(np.concatenate(parts)) == (starts, directions)
+
+
+@given(st.integers(0, 2**32), st.floats(0.0, 0.02), st.integers(1, 7), st.booleans())
+def test_encoder_noise_makes_no_strokes(seed, noise, strokes, downwards):
+    # Noise is uniform within ±0.02 of the range at most, so it cannot come back by a tenth, whatever the seed; an
+    # extreme lies where the angle is within 0.04 of the end, that is within 4 samples of the turn.
+    angle = np.concatenate([DOWN[k > 0 :] if (k + downwards) % 2 else UP[k > 0 :] for k in range(strokes)])
+    noisy = angle + np.random.default_rng(seed).uniform(-noise, noise, angle.size)
+    starts, directions = split(noisy)
+    assert directions == ("bf" * 4 if downwards else "fb" * 4)[:strokes]
+    assert np.abs(np.array(starts) - [0, *(101 + 100 * k for k in range(strokes - 1))]).max() <= 4
+
+
+@given(st.lists(st.integers(-20, 20), min_size=1, max_size=700), st.integers(0, 25))
+def test_turning_points_are_those_of_the_definition(angle, least):
+    """Against the definition, sample by sample."""
+    expected, sense, extreme = [], 0, 0
+    for i, value in enumerate(angle):
+        if sense == 0:
+            rises, falls = value - min(angle[: i + 1]) > least, max(angle[: i + 1]) - value > least
+            sense, extreme = int(rises) - int(falls), i
+        elif sense * value > sense * angle[extreme]:
+            extreme = i
+        elif sense * (angle[extreme] - value) > least:
+            expected.append(extreme)
+            sense, extreme = -sense, i
+    assert turning_points(np.array(angle, float), least) == expected
+
+
+def test_a_pivot_that_moves_begins_a_sweep():
+    base = np.repeat([0.0, 0.5], [101, 100])
+    assert split(np.concatenate([UP, DOWN[1:]]), base_x=(base, {})) == ([0, 101], "fb")
+    base = np.repeat([0.0, 0.5], [50, 51])
+    assert split(UP, base_y=(base, {})) == ([0, 50], "ff")
+
+
+def table_of(**changes):
+    table = {"drive_angle": np.concatenate([UP, DOWN]), "holding_moment": 0.1, **changes}
+    return {name: values for name, values in table.items() if values is not None}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_a_file_without_sweeps_is_split(tmp_path, suffix):
+    missing = ("force_x", "force_y")
+    labels = {"sweep": np.repeat([0, 1], 101), "direction": np.repeat(["forward", "backward"], 101)}
+    record = make_record(table_of(**labels), missing=missing)
+    path = tmp_path / f"record{suffix}"
+    if suffix == ".nc":
+        record.drop_vars(["sweep", "direction"]).to_netcdf(path, engine="h5netcdf")
+    else:
+        record.drop_vars(["sweep", "direction"]).to_dataframe().to_csv(path, index=False)
+        path.write_text("# units: dimensionless\n" + path.read_text())
+    assert read_record(path, split_sweeps=True).identical(record)
+    with refused("there is no column 'sweep' (columns: base_x, base_y, drive_angle, holding_moment, force_x, force_y)"):
+        read_record(path)
+    with refused(
+        "or have the record split where the drive turns back: split_sweeps=True, on the command line --split-"
+    ):
+        read_record(path)
+    write_record(record, path)
+    with refused("column 'sweep' is there already: do without split_sweeps, or remove the column"):
+        read_record(path, split_sweeps=True)
+
+
+@pytest.mark.parametrize(
+    ("angle", "message"),
+    [
+        ([1.0, 1.0, 1.0], "the drive angle does not move from line 2 to line 4, so that the sweep has no direction"),
+        ([1.0, np.nan, 1.2], "line 3, column 'drive_angle': the value is nan: give a finite number, or remove the row"),
+    ],
+)
+def test_what_cannot_be_split_is_refused_with_its_place(tmp_path, angle, message):
+    path = tmp_path / "record.csv"
+    path.write_text("drive_angle,holding_moment\n" + "".join(f"{value},0.1\n" for value in angle))
+    with refused(f"{path}: {message}"):
+        read_record(path, split_sweeps=True, missing=("force_x", "force_y"))
