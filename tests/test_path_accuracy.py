@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
@@ -28,8 +28,10 @@ from helpers.exact_path import ExactPath
 from helpers.exact_rod import mp
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, paper_profile
 from tactile_bayes.elastica import NONE, tangential_arclength
+from tactile_bayes.errors import ContourError
 from tactile_bayes.path import CHANNELS, SnapOff
 from tactile_bayes.scanning import equilibria, scan
+from tactile_bayes.sweep_path import sweep_paths
 
 # Some of these objects are met again after snap-off, which is no concern of the path up to there.
 pytestmark = pytest.mark.filterwarnings("ignore::tactile_bayes.errors.ClearanceWarning")
@@ -184,8 +186,8 @@ def test_hard_cases_down_to_the_snap_off(scene):
 # --- shooting --------------------------------------------------------------------------------------------------------
 
 
-def shot(scene, angle, parameter, force, rest, tip):
-    """Contact parameter, force and arc length or tip angle of the equilibrium at a drive angle.
+def shot(scene, angle, parameter, force, rest, tip, friction_angle=0.0):
+    """Loads and contact parameter of the equilibrium at a drive angle.
 
     The rod is integrated from the contact, where it has no curvature, back to the pivot, which it must hit with the
     drive's slope: three conditions for three unknowns. In tangential contact it leaves along the contour, after an
@@ -203,7 +205,7 @@ def shot(scene, angle, parameter, force, rest, tip):
         slope, length = (rest, 1.0) if tip else (alpha, rest)
 
         def rates(_s, z):
-            return [-np.cos(z[2]), -np.sin(z[2]), -z[3], -force * np.cos(z[2] - alpha)]
+            return [-np.cos(z[2]), -np.sin(z[2]), -z[3], -force * np.cos(z[2] - alpha - friction_angle)]
 
         found = solve_ivp(rates, (0.0, length), [x, y, slope, 0.0], method="DOP853", rtol=1e-13, atol=1e-15)
         return found.y[:3, -1] - [0.0, 0.0, angle]
@@ -212,9 +214,40 @@ def shot(scene, angle, parameter, force, rest, tip):
     assert np.max(np.abs(solution.fun)) < 1e-12, solution.message
     p, force, rest = solution.x
     x, y, alpha = contact(p)
-    along = x * np.cos(alpha) + y * np.sin(alpha)
     assert rest >= alpha if tip else rest <= 1.0
-    return np.array([force * along, -force * np.sin(alpha), force * np.cos(alpha)])
+    beta = alpha + friction_angle
+    return force * np.array([x * np.cos(beta) + y * np.sin(beta), -np.sin(beta), np.cos(beta)]), p
+
+
+def shot_at(scene, paths, angle, states, k):
+    """Loads by shooting, from some way off; from nearer where the shot hits the other equilibrium, beyond the fold."""
+    w = states.wrench
+    tip = w.contact_arclength[k] == 1.0
+    force = float(np.hypot(w.force_x[k], w.force_y[k]))
+    for off in (0.1, 0.03, 0.01):
+        rest = w.tip_angle[k] + 0.1 * off * (w.drive_angle[k] - w.tip_angle[k]) if tip else 1.0 - 0.2 * off
+        rest = float(rest if tip else rest * w.contact_arclength[k])
+        parameter = states.parameter[k] + off * (states.parameter[k] - paths.snap_parameter[0])
+        loads, found = shot(scene, angle, parameter, (1.0 + 0.2 * off) * force, rest, tip, paths.friction_angle)
+        if found > paths.snap_parameter[0]:
+            return loads
+    raise AssertionError("no shot hit an equilibrium on the path")
+
+
+@settings(FEW, max_examples=8)
+@given(scenes(), st.floats(0.05, 0.6), st.floats(0.02, 0.98))
+def test_against_shooting_with_friction(scene, friction, share):
+    """The force is turned by arctan μ. What 1e-12 of drive angle changes is granted to the shots, as above."""
+    try:
+        paths = sweep_paths(scene.contour, base=scene.base, direction=scene.direction, friction=friction)
+    except ContourError:
+        assume(False)
+    first, snap = float(paths.first_angle[0]), float(paths.snap_angle[0])
+    angle = first + share * (snap - first)
+    (loads, beside), states = told(paths, np.array([angle, angle - 1e-3 * (angle - first)]))
+    shooting = shot_at(scene, paths, angle, states, 0)
+    slope = np.abs(loads - beside) / (1e-3 * (angle - first))
+    assert np.all(np.abs(shooting - loads) <= ACCURACY * greatest_loads(paths) + 1e-12 * slope)
 
 
 @settings(FEW, max_examples=8)
@@ -229,16 +262,7 @@ def test_against_shooting(scene, where):
     loads, states = told(paths, angles)
     greatest = greatest_loads(paths)
     for k, angle in enumerate(angles):
-        w = states.wrench
-        tip = w.contact_arclength[k] == 1.0
-        force = float(np.hypot(w.force_x[k], w.force_y[k]))
-        rest = (
-            float(w.tip_angle[k] + 0.01 * (w.drive_angle[k] - w.tip_angle[k]))
-            if tip
-            else 0.98 * float(w.contact_arclength[k])
-        )
-        away = 0.1 * (states.parameter[k] - paths.snap_parameter[0])
-        shooting = shot(scene, angle, states.parameter[k] + away, 1.02 * force, rest, tip)
+        shooting = shot_at(scene, paths, angle, states, k)
         start = exact.start(states, k)
         truth, beside = (exact.at_angle(mp.mpf(angle) - h, start).loads() for h in (0, mp.mpf(10) ** -12))
         bound = ACCURACY * greatest + np.abs(beside - truth)

@@ -399,7 +399,9 @@ def _polish_fold(seen: SeenContour, segments: Segments, angle: Floats, stop: Flo
 
     def rate(way: Floats) -> Floats:
         parameter, parameter_rate = segments.along(way)
-        return _angle_rate(seen, segments.lane, _states(seen, segments.lane, parameter, friction_angle)) * parameter_rate
+        return (
+            _angle_rate(seen, segments.lane, _states(seen, segments.lane, parameter, friction_angle)) * parameter_rate
+        )
 
     bend = chebyshev.evaluate(chebyshev.derivative(chebyshev.derivative(angle)), stop)
     at_stop, last_step = rate(stop), np.full(stop.shape, 2e-2)
