@@ -228,3 +228,23 @@ def test_a_channel_without_noise_is_refused():
     likelihood = RecordLikelihood(swept(Parabola(0.5, 0.5)), LoadCell(moment_noise=0.02))
     with pytest.raises(ParameterError, match="force_x is measured, but the load cell has no noise on it"):
         likelihood.log_likelihood(stack([Parabola(0.5, 0.5)]))
+
+
+@pytest.mark.parametrize("missing", [(), ("force_x", "force_y")])
+def test_a_moment_that_is_counted_the_other_way_round_turns_no_side(missing):
+    """The side of contact follows the moment's sign, once the cell's known gain and bias are taken out of it."""
+    upright = LoadCell(force_noise=0.05, moment_noise=0.02)
+    turned = LoadCell(
+        force_noise=0.05,
+        moment_noise=0.02,
+        gain=((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        bias=(30.0, 0.0, 0.0),
+    )
+    contour = Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0]))
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(3.0)).record
+    values = []
+    for cell in (upright, turned):
+        measured = without(cell.measure(record, seed=1), *missing)
+        values.append(RecordLikelihood(measured, cell).log_likelihood(contour)[0])
+    # Not one number: the noise on the moment has the other sign.
+    assert values[0] == pytest.approx(values[1], abs=4.0 * np.sqrt(2.0 * record.sizes["sample"]))

@@ -5,13 +5,16 @@ from __future__ import annotations
 __all__ = [
     "ClearanceWarning",
     "ContourError",
+    "DriftWarning",
     "InferenceError",
     "ParameterError",
     "ReachError",
     "RecordError",
+    "SpecificationError",
     "StrainWarning",
     "TactileBayesError",
     "TactileBayesWarning",
+    "TaskError",
 ]
 
 
@@ -39,12 +42,24 @@ class InferenceError(TactileBayesError, RuntimeError):
     """A posterior cannot be set up or sampled."""
 
 
+class SpecificationError(TactileBayesError, ValueError):
+    """A specification of a data set is impossible, or a folder holds another data set."""
+
+
+class TaskError(TactileBayesError, RuntimeError):
+    """Processes died over a task again and again."""
+
+
 class TactileBayesWarning(UserWarning):
     """Base of every warning of this package."""
 
 
 class ClearanceWarning(TactileBayesWarning):
     """After snap-off a straight rod would cut the object."""
+
+
+class DriftWarning(TactileBayesWarning):
+    """The zero of a load cell moved during a record."""
 
 
 class StrainWarning(TactileBayesWarning):

@@ -52,7 +52,8 @@ def reconstruct(
     load_cell : LoadCell, optional
         Tells noise from load; by default the data sheet that the record carries, if any. A sample is loaded if the sum
         of its squared loads in standard deviations is one that noise alone exceeds in 1 of 1000 samples. Without any
-        noise level every sample whose load is not exactly zero counts as loaded.
+        noise level every sample whose load is not exactly zero counts as loaded. What it says of bias, gain and the
+        encoder's offset is taken out first.
     rod : Rod, optional
         In place of the rod that an SI record states.
     friction : float
@@ -99,15 +100,17 @@ def reconstruct(
             f"Step 2 needs all of {', '.join(CHANNELS)}, and {', '.join(absent)} was not measured: infer_contour works "
             "without"
         )
+    cell = load_cell or LoadCell.from_record(measured) or LoadCell()
+    loaded = loaded_samples(measured, cell)
+    measured = cell.corrected(measured)
     if frame_of(measured) == "turning":
-        measured = in_frame(measured, "fixed")
+        measured = in_frame(_without_data_sheet(measured), "fixed")
     rod = rod_of(measured)
 
     def unit(name: str) -> float:
         scale = COLUMNS[name].scale
         return getattr(rod, scale) if scale else 1.0
 
-    loaded = loaded_samples(measured, load_cell)
     with np.errstate(over="ignore"):  # a load beyond all numbers has no zero of curvature
         moment, force_x, force_y = (np.where(loaded, measured[name].values, 0.0) / unit(name) for name in CHANNELS)
     angle, side = measured.drive_angle.values, contact_sides(measured)
@@ -149,16 +152,27 @@ def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> N
     ndarray of bool, shape (samples,)
     """
     load_cell = load_cell or LoadCell.from_record(measured) or LoadCell()
-    surprise, noisy, loaded = np.zeros(measured.sizes["sample"]), 0, np.zeros(measured.sizes["sample"], dtype=bool)
-    for name in present_channels(measured):
-        deviation = load_cell.standard_deviations[name]
-        if deviation > 0.0:
-            with np.errstate(over="ignore"):
-                surprise += (measured[name].values / deviation) ** 2
-            noisy += 1
+    present = present_channels(measured)
+    readings = np.full((measured.sizes["sample"], len(CHANNELS)), np.nan)
+    loaded = np.zeros(len(readings), dtype=bool)
+    for index, name in enumerate(CHANNELS):
+        if name not in present:
+            continue
+        if load_cell.unrest[index]:
+            readings[:, index] = measured[name].values
         else:
-            loaded |= measured[name].values != 0.0
-    return loaded | (surprise > chdtri(noisy, FALSE_ALARM)) if noisy else loaded
+            loaded |= measured[name].values != load_cell.bias[index]
+    noisy = int(np.count_nonzero(~np.isnan(readings).all(axis=0)))
+    return loaded | (load_cell.surprise(readings) > chdtri(noisy, FALSE_ALARM)) if noisy else loaded
+
+
+def _without_data_sheet(record: xr.Dataset) -> xr.Dataset:
+    """The record without what is said of the noise of its load cell, which holds in one frame only."""
+    bare = record.copy()
+    bare.attrs = {
+        k: v for k, v in record.attrs.items() if k == "load_cell_frame" or not str(k).startswith("load_cell_")
+    }
+    return bare
 
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:

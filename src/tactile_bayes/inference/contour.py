@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -171,8 +172,8 @@ def infer_contour(
         units=measured.attrs["units"],
         load_cell_frame=frame_of(measured),
         **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
-        load_cell_force_noise=noise.cell.force_noise,
-        load_cell_moment_noise=noise.cell.moment_noise,
+        approximations="; ".join(noise.cell.approximations),
+        **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name != "frame"},
     )
     return tree
 
@@ -209,11 +210,13 @@ def _noise(measured: xr.Dataset, load_cell: LoadCell | None) -> _Noise:
     present = present_channels(measured)
     if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
         return _Noise(cell, ("noise_scale",), (CHANNELS,), {"noise_scale": stats.lognorm(s=0.5)})
+    if cell is not None and cell.relative_noise:
+        raise ParameterError("the load cell has relative_noise alone: state its force_noise and moment_noise as well")
     rod = rod_of(measured)
     sources = {"moment_noise": (("holding_moment",), rod.moment_unit), "force_noise": (CHANNELS[1:], rod.force_unit)}
     sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
     return _Noise(
-        LoadCell(force_noise=1.0, moment_noise=1.0),
+        replace(cell or LoadCell(), force_noise=1.0, moment_noise=1.0),
         tuple(sources),
         tuple(channels for channels, _ in sources.values()),
         {name: stats.loguniform(1e-6 * unit, 10.0 * unit) for name, (_, unit) in sources.items()},
@@ -310,7 +313,8 @@ class _Model:
             out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
             if allowed.any():
                 predicted, _ = self.likelihood.predict(self.contours(points[allowed]))
-                out[allowed] = measured - predicted[..., present] / deviation[present]
+                expected = self.likelihood.load_cell.expected(predicted)
+                out[allowed] = measured - expected[..., present] / deviation[present]
             return out.reshape(len(points), -1)
 
         spread = np.array([float(self.priors[name].std()) for name in self.family.parameters])
@@ -358,19 +362,18 @@ class _Model:
     def _rough_noise(self) -> Floats:
         """Standard deviation of each channel from the median bend between neighbouring samples, shape (3,)."""
         measured = self.likelihood.measured
-        known = self.likelihood.load_cell.standard_deviations
         deviation = np.ones(len(CHANNELS))
         for i in np.flatnonzero(self.present):
-            level = rough_noise(measured[:, i]) if len(measured) > 2 else known[CHANNELS[i]]
+            level = rough_noise(measured[:, i]) if len(measured) > 2 else float(self.likelihood.load_cell.noise[i])
             deviation[i] = max(level, 1e-4 * float(np.max(np.abs(measured[:, i]))), 1e-12)
         return deviation
 
     def _fitted_noise(self, residuals: Floats) -> Floats:
         """Noise parameters that fit the optimum's residuals, shape (samples, present channels), outliers aside."""
-        known = self.likelihood.load_cell.standard_deviations
+        known = self.likelihood.load_cell.noise
         fitted = self.deviation[self.present] * np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
-        names = [name for name, there in zip(CHANNELS, self.present, strict=True) if there]
-        ratio = {name: value / (known[name] or 1.0) for name, value in zip(names, fitted, strict=True)}
+        measured = np.flatnonzero(self.present)
+        ratio = {CHANNELS[i]: value / (known[i] or 1.0) for i, value in zip(measured, fitted, strict=True)}
         return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in self.noise.channels])
 
     def _from_contacts(self) -> Floats | None:
@@ -408,8 +411,8 @@ class _Model:
             events.append(self._events(contours))
         shape = (chains, kept.size)
         coords = {"chain": np.arange(chains), "draw": kept}
-        deviation = self._deviations(points)
-        noisy = np.concatenate(predicted) + deviation[:, None] * rng.normal(size=(len(points), *predicted[0].shape[1:]))
+        cell = self.likelihood.load_cell
+        noisy = cell.simulate(np.concatenate(predicted), seed=rng, noise_scale=self.noise_scale(points))
         units = self._load_units()
         predictive, observed = {}, {}
         for i, name in enumerate(CHANNELS):
@@ -464,11 +467,6 @@ class _Model:
     def _load_units(self) -> Floats:
         rod = self.likelihood.rod
         return np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
-
-    def _deviations(self, points: Floats) -> Floats:
-        """Standard deviations of the noise, dimensionless, shape (n, 3)."""
-        known = self.likelihood.load_cell.standard_deviations
-        return self.noise_scale(points) * np.array([known[name] for name in CHANNELS])
 
     def _events(self, contours: Contour) -> dict[str, Floats]:
         """First contact and snap-off in every stroke, in the record's units, each of shape (n, strokes)."""

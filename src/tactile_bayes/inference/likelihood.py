@@ -15,7 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Paths, Reach, trace
 from tactile_bayes.reconstruction import contact_sides
-from tactile_bayes.record import CHANNELS, frame_of, rod_of, to_dimensionless, turned
+from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
 __all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood"]
 
@@ -46,7 +46,7 @@ class RecordLikelihood:
     measured : xr.Dataset
         A valid record.
     load_cell : LoadCell
-        In the record's units.
+        In the record's units. Its encoder's offset is taken out of the drive angles.
     friction : float
         Coulomb's coefficient μ.
     order : int
@@ -60,11 +60,17 @@ class RecordLikelihood:
         self.rod = rod_of(measured)
         self.friction_angle = float(np.arctan(friction))
         record = to_dimensionless(measured)
+        load_cell.refuse_other_frame(measured)
+        if load_cell.drive_angle_noise or load_cell.drive_angle_resolution:
+            raise ParameterError(
+                "the load cell's drive_angle_noise and drive_angle_resolution have no place in the likelihood of a "
+                "record: give a cell without them, and what they do to the loads as force_noise and moment_noise"
+            )
         self.load_cell = load_cell.dimensionless(self.rod)
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
-        angle = record.drive_angle.values
+        angle = record.drive_angle.values - load_cell.drive_angle_offset
         self._turn = angle if frame_of(record) == "turning" else None
-        backward = contact_sides(record) < 0.0
+        backward = contact_sides(_without_errors(measured, load_cell)) < 0.0
         place = np.stack([measured.base_x.values, measured.base_y.values, backward], axis=-1)
         kinds, which = np.unique(place, axis=0, return_inverse=True)
         self.strokes = [
@@ -133,3 +139,11 @@ class RecordLikelihood:
         values = self.load_cell.log_likelihood(self.measured, predicted, noise_scale=noise_scale, pointwise=pointwise)
         values[~reached] = -np.inf
         return values
+
+
+def _without_errors(measured: xr.Dataset, load_cell: LoadCell) -> xr.Dataset:
+    """The record with the cell's known errors taken out; where channels are missing, those of the moment alone."""
+    if len(present_channels(measured)) == len(CHANNELS):
+        return load_cell.corrected(measured)
+    bias, gain = load_cell.bias[0], load_cell.gain[0][0]
+    return measured.assign(holding_moment=(measured.holding_moment - bias) * np.sign(gain or 1.0))

@@ -18,10 +18,12 @@ __all__ = ["frame_of", "in_frame", "turned"]
 
 Floats = NDArray[np.float64]
 
-_BOUND = {"degrees_of_freedom", "relative_noise"} | {name for name in LOAD_CELL_UNITS if "force" in name} - {
-    "force_noise"
+_BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"} | {
+    "degrees_of_freedom",
+    "relative_noise",
 }
-"""Entries of a load cell's data sheet that hold along the axes it measures along, and along no others."""
+"""Entries of a load cell's data sheet that hold along the axes it measures along, and along no others; with errors of
+the encoder the angle between the two is not known."""
 
 
 def frame_of(record: xr.Dataset) -> Frame:

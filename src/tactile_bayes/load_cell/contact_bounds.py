@@ -1,0 +1,241 @@
+"""The bounds of contact in one sweep: where load began and ended, from readings alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betainc, betaln, fdtri, stdtrit
+
+__all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
+
+Floats = NDArray[np.float64]
+
+FEWEST = 3
+"""Fewest samples that tell bias and noise."""
+
+_CLIP = 3.0
+_DOUBT = 0.05
+_ROUNDS = 10
+_SHORT = 16
+_TINY = 1e-290
+
+
+@dataclass(frozen=True)
+class ContactBounds:
+    """Where contact began and ended in one sweep; the samples are [0, n).
+
+    Attributes
+    ----------
+    p_value : float
+        Bound on the probability that a sweep without contact looks so much like one with contact.
+    found : bool
+        Whether there was contact.
+    onset, snap_off : (int, int)
+        Last sample before the event and first one after it that are told apart from noise; -1 where there is none.
+    before, after : int
+        How many samples at the start and at the end of the sweep are unloaded.
+    """
+
+    p_value: float
+    found: bool
+    onset: tuple[int, int]
+    snap_off: tuple[int, int]
+    before: int
+    after: int
+
+
+def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> ContactBounds:
+    """Find contact, its onset and its snap-off in one sweep; the method is that of `zero_load`.
+
+    Parameters
+    ----------
+    readings : ndarray, shape (samples, channels)
+        In the order of measurement, without NaN.
+    false_alarm : float
+        Probability of each of the errors that `zero_load` names.
+    floor : ndarray, shape (channels,)
+        Least variance that a channel can have: of its rounding.
+    """
+    n = len(readings)
+    readings = readings - readings[0]
+    p_value, before, after = _contact(readings, floor)
+    if p_value < false_alarm:  # nor is it a few outliers that make it
+        p_value = max(p_value, _contact(_clipped(readings, floor), floor)[0])
+    if not p_value < false_alarm:
+        parts = readings, readings[: n // 2], readings[n // 2 :]
+        doubtful = p_value < _DOUBT or any(_trend(part, _DOUBT / len(parts)) for part in parts)
+        return ContactBounds(p_value, False, (-1, -1), (-1, -1), 0 if doubtful else n, 0)
+    onset, snap_off = (-1, -1), (-1, -1)
+    # Long ends reach into weak loads, which shift their mean by more than its error: start from the half of them.
+    before, after = (max(min(end, _SHORT), end // 2) for end in (before, after))
+    for _ in range(_ROUNDS):
+        bounds = _refined(readings, before, after, false_alarm, floor)
+        if bounds is None:  # no sample or block is loaded for certain: keep away from what is between
+            before, after = before // 2, after // 2
+            onset, snap_off = (before - 1, n - after - 1), (before, n - after if after else -1)
+            break
+        onset, snap_off = bounds
+        found = onset[0] + 1, n - snap_off[1] if snap_off[1] >= 0 else 0
+        if found == (before, after) or sum(found) < FEWEST:
+            before, after = found
+            break
+        before, after = found
+    if before and _trend(readings[:before], false_alarm):
+        before, onset = 0, (-1, onset[1])
+    if after and _trend(readings[n - after :], false_alarm):
+        after, snap_off = 0, (snap_off[0], -1)
+    if before + after < FEWEST:
+        return ContactBounds(p_value, True, (-1, -1), (-1, -1), 0, 0)
+    return ContactBounds(p_value, True, onset, snap_off, before, after)
+
+
+# ---- whether there is contact
+
+
+def _contact(readings: Floats, floor: Floats) -> tuple[float, int, int]:
+    """Bound on the p-value of no contact, and how many samples at each end make it."""
+    n = len(readings)
+    ends = [k for k in _grid(n) if k < n]
+    before, after = (k.ravel() for k in np.meshgrid(ends, ends))
+    tested = (before + after >= FEWEST) & (before + after < n)
+    if not tested.any():
+        return 1.0, 0, 0
+    before, after = before[tested], after[tested]
+    size = (before + after).astype(float)
+    first, second = _sums(readings), _sums(readings**2)
+    last, last_second = _sums(readings[::-1]), _sums(readings[::-1] ** 2)
+    total = second[-1] - first[-1] ** 2 / n
+    inner = second[before] + last_second[after] - (first[before] + last[after]) ** 2 / size[:, None]
+    inner = np.maximum(inner, floor * size[:, None])
+    share = np.minimum(inner / np.maximum(total, np.maximum(inner, _TINY)), 1.0)
+    share[~np.isfinite(share)] = 1.0
+    share[np.broadcast_to(total <= floor * n, share.shape)] = 1.0
+    log_p = _log_beta_cdf(share, 0.5 * (size - 1.0)[:, None], 0.5 * (n - size)[:, None])
+    # The ends are those that all channels together prefer: one of them may end at zero load in contact. Without noise,
+    # where several are impossible, it is the longest.
+    pair = np.lexsort((size, -log_p.sum(axis=1)))[-1]
+    return float(min(1.0, np.exp(min(log_p.min() + np.log(log_p.size), 0.0)))), int(before[pair]), int(after[pair])
+
+
+def _clipped(readings: Floats, floor: Floats) -> Floats:
+    """Readings that stand out from their neighbours cut off, at three deviations from the median or at the neighbour.
+
+    Nothing is cut off where half of the readings are the same.
+    """
+    off = readings - np.median(readings, axis=0)
+    deviation = 1.4826 * np.median(np.abs(off), axis=0)
+    limit = np.where(deviation > 0.0, _CLIP * np.sqrt(deviation**2 + floor), np.inf)
+    padded = np.concatenate([off[:1] * 0.0, off, off[:1] * 0.0])
+    least, most = np.minimum(padded[:-2], padded[2:]), np.maximum(padded[:-2], padded[2:])
+    return np.clip(off, np.minimum(-limit, least), np.maximum(limit, most))
+
+
+def _grid(n: int) -> list[int]:
+    """0, and steps of a half octave: 1, 2, 3, 4, 6, 8, 12, ..."""
+    return [0, 1, *sorted(factor << k for k in range(n.bit_length()) for factor in (2, 3) if factor << k < n)]
+
+
+def _sums(values: Floats) -> Floats:
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+
+
+def _log_beta_cdf(x: Floats, a: Floats, b: Floats) -> Floats:
+    """Logarithm of the regularised incomplete beta function, below the smallest number by its first term."""
+    a, b = np.broadcast_to(a, x.shape), np.broadcast_to(b, x.shape)
+    p = betainc(a, b, x)
+    with np.errstate(divide="ignore"):
+        first_term = a * np.log(x) + b * np.log1p(-np.minimum(x, 0.5)) - np.log(a) - betaln(a, b)
+        return np.where(p > _TINY, np.log(p), first_term)
+
+
+# ---- where it begins and ends
+
+
+def _refined(
+    readings: Floats, before: int, after: int, false_alarm: float, floor: Floats
+) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Bounds of onset and snap-off, with bias and noise from the ends; None if no load is certain."""
+    n, channels = readings.shape
+    ends = np.concatenate([readings[:before], readings[n - after :]])
+    freedom = len(ends) - 1
+    deviation = np.sqrt(np.maximum(((ends - ends.mean(axis=0)) ** 2).sum(axis=0) / freedom, np.maximum(floor, _TINY)))
+    z = (readings - ends.mean(axis=0)) / deviation
+    scales = [1 << k for k in range(max(1, (n // 2).bit_length()))]
+    limit = -stdtrit(freedom, 0.5 * false_alarm / (channels * n * len(scales)))
+    # An outlier alone is no load: a sample needs a neighbour, and no sample may make a block by itself.
+    first, last, width = n, -1, 1
+    limit_one = limit * np.sqrt(1.0 + 1.0 / len(ends))
+    sums = _sums(np.clip(z, -limit_one, limit_one))
+    for m in scales:
+        if m == 1:
+            certain = (np.abs(z) > limit_one) & _neighboured(z)
+        else:
+            certain = np.abs(sums[m:] - sums[:-m]) / m > limit * np.sqrt(1.0 / m + 1.0 / len(ends))
+        loaded = np.flatnonzero(certain.any(axis=1))
+        if loaded.size:
+            first = min(first, int(loaded[0]) + m - 1)
+            if loaded[-1] > last:
+                last, width = int(loaded[-1]), m
+    if last < 0:
+        return None
+    begin = _last_before_ramp(readings, first, after, false_alarm, floor)
+    end = _first_after_drop(z, last, width, float(fdtri(1, freedom, 1.0 - 2.0 * false_alarm)))
+    # Contact may begin between two samples, and of a load that only a block shows, neither may lie beyond the block.
+    begin, end = max(min(begin - 1, last - 1), -1), max(end, first + 1)
+    return (begin, first), (last, end if end < n else -1)
+
+
+def _neighboured(z: Floats) -> NDArray[np.bool_]:
+    """Whether the sample before or after lies off to the same side, by more than three deviations."""
+    padded = np.concatenate([np.zeros((1, z.shape[1])), z, np.zeros((1, z.shape[1]))])
+    return np.asarray(np.maximum(padded[:-2] * np.sign(z), padded[2:] * np.sign(z)) > _CLIP)
+
+
+def _last_before_ramp(readings: Floats, loaded: int, after: int, false_alarm: float, floor: Floats) -> int:
+    """Lower limit of the last unloaded sample, if the load grows straight from zero up to the loaded one.
+
+    Least squares of bias and slope for every place at which a ramp can start, the samples after contact counted in.
+    """
+    n, channels = readings.shape
+    known = np.concatenate([readings[: loaded + 1], readings[max(n - after, loaded + 1) :]])
+    known = known - known.mean(axis=0)
+    size = len(known)
+    if loaded == 0 or size <= FEWEST:
+        return -1
+    start = np.arange(-1, loaded)
+    height = (loaded - start).astype(float)  # of the ramp i − start at the loaded sample
+    ramp, square = 0.5 * height * (height + 1.0), height * (height + 1.0) * (2.0 * height + 1.0) / 6.0
+    product = np.cumsum(np.cumsum(known[loaded::-1], axis=0), axis=0)[::-1]
+    total = (known**2).sum(axis=0)
+    explained = product**2 / (square - ramp**2 / size)[:, None]
+    residual = np.maximum(total - explained, np.maximum(floor * size, 1e-14 * total + _TINY))
+    best = np.argmin(np.log(residual).sum(axis=1))
+    freedom = size - FEWEST
+    worse = (freedom * (residual / residual[best] - 1.0)).sum(axis=1)
+    likely = worse <= fdtri(1, channels * freedom, 1.0 - 2.0 * false_alarm)
+    return int(start[np.argmax(likely)])
+
+
+def _first_after_drop(z: Floats, loaded: int, width: int, limit: float) -> int:
+    """Upper limit of the first sample after a load that is as it was around a loaded sample drops to nothing."""
+    z = z[max(0, loaded - width + 1) :]
+    known = min(loaded + 1, width)
+    count = np.arange(1, len(z) + 1)[:, None]
+    # Relative to no load at all: of a load as constant up to sample i, the squares that it explains.
+    explained = (np.cumsum(z, axis=0) ** 2 / count).sum(axis=1)[known - 1 :]
+    likely = explained >= explained.max() - limit
+    return loaded + 1 + int(np.flatnonzero(likely)[-1])
+
+
+def _trend(stretch: Floats, false_alarm: float) -> bool:
+    """Whether a stretch has a slope that noise does not explain."""
+    n, channels = stretch.shape
+    if n <= FEWEST:
+        return False
+    time = np.arange(n) - 0.5 * (n - 1)
+    slope = time @ stretch / (time @ time)
+    residual = stretch - stretch.mean(axis=0) - time[:, None] * slope
+    error = np.sqrt((residual**2).sum(axis=0) / (n - 2) / (time @ time))
+    return bool(np.any(np.abs(slope) > -stdtrit(n - 2, 0.5 * false_alarm / channels) * error))

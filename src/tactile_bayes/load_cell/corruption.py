@@ -1,0 +1,62 @@
+"""The corruption of loads and drive angles by a sensor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.load_cell.data_sheet import DataSheet
+
+__all__ = ["corrupted_angles", "corrupted_loads"]
+
+Floats = NDArray[np.float64]
+
+
+def corrupted_loads(sheet: DataSheet, loads: Floats, rng: np.random.Generator, noise_scale: ArrayLike = 1.0) -> Floats:
+    """Readings of loads: gain and bias, drift and noise, then the range, then the steps of the reading.
+
+    Parameters
+    ----------
+    sheet : DataSheet
+        In the units of the loads.
+    loads : ndarray, shape (..., samples, 3)
+        In the order of `CHANNELS`; one record's samples in the order in which they are taken. NaN stays NaN.
+    rng : numpy.random.Generator
+        White noise is drawn first, and each part for all three channels, whatever of it is needed.
+    noise_scale : array_like, broadcastable to shape (..., 3)
+        Factor on the white noise of each channel.
+
+    Returns
+    -------
+    ndarray, shape (..., samples, 3)
+    """
+    noise = rng.standard_normal(loads.shape)
+    if any(sheet.correlation):
+        noise = noise @ np.linalg.cholesky(sheet.correlation_matrix).T
+    readings = np.array(sheet.expected(loads))
+    if any(sheet.bias_uncertainty):
+        readings += np.array(sheet.bias_uncertainty) * rng.standard_normal((*loads.shape[:-2], 1, 3))
+    if sheet.drift is not None:
+        readings += sheet.drift.draw(rng.standard_normal(loads.shape))
+    if math.isfinite(sheet.degrees_of_freedom):
+        noise /= np.sqrt(rng.chisquare(sheet.degrees_of_freedom, loads.shape) / sheet.degrees_of_freedom)
+    scale = np.asarray(noise_scale, dtype=float)
+    readings += sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale) * noise
+    return rounded(np.clip(readings, -sheet.limit, sheet.limit), sheet.resolution)
+
+
+def corrupted_angles(sheet: DataSheet, angles: Floats, rng: np.random.Generator) -> Floats:
+    """Readings of drive angles, of any shape: offset and noise, then the steps of the reading."""
+    noise = sheet.drive_angle_noise * rng.standard_normal(angles.shape)
+    return rounded(angles + sheet.drive_angle_offset + noise, np.array(sheet.drive_angle_resolution))
+
+
+def rounded(values: Floats, step: Floats) -> Floats:
+    """Values to the nearest multiple of a step, as they are where it is 0."""
+    if not np.any(step):
+        return values
+    with np.errstate(over="ignore"):
+        steps = np.round(values / np.where(step > 0.0, step, np.inf))
+    return np.where((step > 0.0) & np.isfinite(steps), steps * step, values)

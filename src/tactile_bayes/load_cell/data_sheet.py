@@ -1,0 +1,315 @@
+"""The data sheet of a load cell: everything that is known of the sensor, and its form in a record's attributes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from itertools import combinations, product
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
+from tactile_bayes.rod import Rod
+
+__all__ = ["DataSheet"]
+
+Floats = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+_IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_SCALARS = (
+    "force_noise",
+    "moment_noise",
+    "degrees_of_freedom",
+    "relative_noise",
+    "force_range",
+    "moment_range",
+    "force_resolution",
+    "moment_resolution",
+    "drive_angle_offset",
+    "drive_angle_noise",
+    "drive_angle_resolution",
+)
+_DRIFTS: dict[str, type[RandomWalk] | type[OrnsteinUhlenbeck]] = {
+    "random_walk": RandomWalk,
+    "ornstein_uhlenbeck": OrnsteinUhlenbeck,
+}
+_PAIRS = tuple(combinations(CHANNELS, 2))
+_MEANING = {
+    **dict.fromkeys(("bias", "bias_uncertainty", "row of gain"), ", ".join(CHANNELS)),
+    "correlation": ", ".join(" with ".join(pair) for pair in _PAIRS),
+}
+
+
+@dataclass(frozen=True)
+class DataSheet:
+    """What is known of a load cell; `LoadCell` says what each entry means."""
+
+    force_noise: float = 0.0
+    moment_noise: float = 0.0
+    degrees_of_freedom: float = math.inf
+    relative_noise: float = 0.0
+    correlation: Triple = (0.0, 0.0, 0.0)
+    bias: Triple = (0.0, 0.0, 0.0)
+    bias_uncertainty: Triple = (0.0, 0.0, 0.0)
+    drift: Drift | None = None
+    gain: tuple[Triple, Triple, Triple] = _IDENTITY
+    force_range: float = math.inf
+    moment_range: float = math.inf
+    force_resolution: float = 0.0
+    moment_resolution: float = 0.0
+    drive_angle_offset: float = 0.0
+    drive_angle_noise: float = 0.0
+    drive_angle_resolution: float = 0.0
+    frame: Frame | None = None
+
+    def __post_init__(self) -> None:
+        for name in _SCALARS:
+            object.__setattr__(self, name, _scalar(name, getattr(self, name)))
+        for name in ("bias", "bias_uncertainty", "correlation"):
+            object.__setattr__(self, name, _triple(name, getattr(self, name)))
+        object.__setattr__(self, "gain", _rows(self.gain))
+        self._refuse_the_impossible()
+        if self.drift is not None and not np.any(self.drift.sizes):
+            object.__setattr__(self, "drift", None)
+
+    def _refuse_the_impossible(self) -> None:
+        for name in ("noise", "resolution"):
+            for channel, unit in (("force", "N"), ("moment", "N m"), ("drive_angle", "rad")):
+                what = "a standard deviation" if name == "noise" else "a step"
+                self._need(f"{channel}_{name}", f"{what}, zero or positive [{unit}, or dimensionless]", at_least=0.0)
+        self._need("relative_noise", "a share, zero or positive", at_least=0.0)
+        self._need("drive_angle_offset", "an angle [rad]")
+        for name in ("force_range", "moment_range", "degrees_of_freedom"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise ParameterError(f"the load cell's {name} is {value!r}: give a positive number, inf for none")
+        for channel in ("force", "moment"):
+            step, limit = getattr(self, f"{channel}_resolution"), getattr(self, f"{channel}_range")
+            if not step <= limit:
+                raise ParameterError(
+                    f"the load cell's {channel}_resolution is {step!r}, more than its {channel}_range, {limit!r}: give "
+                    "the step of a reading, and the largest reading, in the same unit"
+                )
+        if min(self.bias_uncertainty) < 0.0:
+            raise ParameterError(
+                f"the load cell's bias_uncertainty is {self.bias_uncertainty!r}: give three standard deviations, each "
+                "zero or positive"
+            )
+        if np.linalg.eigvalsh(self.correlation_matrix)[0] <= 1e-9:
+            raise ParameterError(
+                f"the load cell's correlation is {self.correlation!r}: no noise has these coefficients between holding "
+                "moment and force_x, holding moment and force_y, force_x and force_y: give smaller ones"
+            )
+        if np.linalg.cond(self.gain_matrix) > 1e9:
+            raise ParameterError(
+                f"the load cell's gain is {self.gain!r}: such a cell cannot tell three loads apart: give rows "
+                "that are independent, like ((1, 0, 0), (0, 1, 0), (0, 0, 1))"
+            )
+        if self.drift is not None and not isinstance(self.drift, RandomWalk | OrnsteinUhlenbeck):
+            raise ParameterError(
+                f"the load cell's drift is {self.drift!r}: give RandomWalk(...) or OrnsteinUhlenbeck(...)"
+            )
+        if self.frame is not None and not (isinstance(self.frame, str) and self.frame in FRAMES):
+            raise ParameterError(f"the load cell's frame is {self.frame!r}: choose 'fixed' or 'turning', or None")
+        if math.isfinite(self.degrees_of_freedom) and any(self.correlation):
+            raise ParameterError(
+                "noise with outliers (degrees_of_freedom) and noise that is correlated between channels go together in "
+                "more than one way: leave one of the two out"
+            )
+
+    def _need(self, name: str, what: str, at_least: float = -math.inf) -> None:
+        value = getattr(self, name)
+        if not (math.isfinite(value) and value >= at_least):
+            raise ParameterError(f"the load cell's {name} is {value!r}: give {what}")
+
+    # ---- by channel, in the order of CHANNELS
+
+    @property
+    def noise(self) -> Floats:
+        """Scale of the white noise, shape (3,)."""
+        return np.array([self.moment_noise, self.force_noise, self.force_noise])
+
+    @property
+    def unrest(self) -> NDArray[np.bool_]:
+        """Which channels move without load, shape (3,)."""
+        drift = 0.0 if self.drift is None else self.drift.sizes
+        return np.asarray(self.noise + self.resolution + np.array(self.bias_uncertainty) + drift > 0.0)
+
+    @property
+    def resolution(self) -> Floats:
+        """Steps of the reading, shape (3,); 0 where it is continuous."""
+        return np.array([self.moment_resolution, self.force_resolution, self.force_resolution])
+
+    @property
+    def limit(self) -> Floats:
+        """Largest size of a reading, shape (3,): the last step of the reading in the range."""
+        limit = np.array([self.moment_range, self.force_range, self.force_range])
+        whole = (self.resolution > 0.0) & np.isfinite(limit)
+        with np.errstate(over="ignore"):
+            steps = limit[whole] / self.resolution[whole]
+        # A range of so many steps is one in other units, too, where it is less by a rounding.
+        limit[whole] = np.where(np.isinf(steps), limit[whole], np.floor(steps + 1e-9) * self.resolution[whole])
+        return limit
+
+    @property
+    def gain_matrix(self) -> Floats:
+        """Reading of each channel (rows) by each load (columns), shape (3, 3)."""
+        return np.array(self.gain)
+
+    @property
+    def correlation_matrix(self) -> Floats:
+        """Of the white noise of the channels, shape (3, 3)."""
+        matrix = np.eye(3)
+        for (i, j), value in zip(combinations(range(3), 2), self.correlation, strict=True):
+            matrix[i, j] = matrix[j, i] = value
+        return matrix
+
+    def expected(self, loads: Floats) -> Floats:
+        """What the cell reads of loads, shape (..., 3), without noise: gain and bias.
+
+        A channel that was not measured is NaN throughout, and is felt by the others only if they have cross-talk.
+        """
+        if self.gain == _IDENTITY:
+            return loads + np.array(self.bias) if any(self.bias) else loads
+        gain = self.gain_matrix
+        read = [sum(loads[..., j] * gain[i, j] for j in range(3) if gain[i, j]) for i in range(3)]
+        return np.stack(np.broadcast_arrays(*read), axis=-1) + np.array(self.bias)
+
+    def deviation(self, loads: Floats) -> Floats:
+        """Scale of the white noise on the readings of loads, shape (..., 3); (3,) where it is the same for all."""
+        if not self.relative_noise:
+            return self.noise
+        return np.hypot(self.noise, self.relative_noise * (self.expected(loads) - np.array(self.bias)))
+
+    # ---- units and attributes
+
+    def dimensionless(self, rod: Rod) -> Self:
+        """The same load cell in the units of a rod: forces in EI/L², moments in EI/L.
+
+        Parameters
+        ----------
+        rod : Rod
+            The rod that the cell is used with.
+
+        Examples
+        --------
+        >>> DataSheet(force_noise=0.5, moment_noise=0.25).dimensionless(Rod(0.5, 2.0)).noise
+        array([0.0625, 0.0625, 0.0625])
+        """
+        sizes = {"N": rod.force_unit, "N m": rod.moment_unit, "m": rod.length_unit, "1/m": 1.0 / rod.length_unit}
+        entries = dict(self._all_entries())
+        for name, unit in LOAD_CELL_UNITS.items():
+            if name in entries and unit in sizes:
+                entries[name] /= sizes[unit]
+        return self.from_entries(entries)
+
+    def entries(self) -> dict[str, float | str]:
+        """What differs from an ideal sensor, by the names in `LOAD_CELL_UNITS` and "frame"; see `from_entries`.
+
+        Examples
+        --------
+        >>> DataSheet(force_noise=0.05, bias=(0.0, 0.1, 0.0), drift=RandomWalk(force=1e-3)).entries()
+        {'force_noise': 0.05, 'bias_force_x': 0.1, 'random_walk_force': 0.001}
+        """
+        ideal = dict(DataSheet()._all_entries())
+        return {name: value for name, value in self._all_entries() if value != ideal.get(name, 0.0)}
+
+    def _all_entries(self) -> Iterator[tuple[str, Any]]:
+        for name in _SCALARS:
+            yield name, float(getattr(self, name))
+        for name in ("bias", "bias_uncertainty"):
+            yield from ((f"{name}_{c}", v) for c, v in zip(CHANNELS, getattr(self, name), strict=True))
+        for law, kind in _DRIFTS.items():
+            if isinstance(self.drift, kind):
+                yield from ((f"{law}_{field.name}", float(getattr(self.drift, field.name))) for field in fields(kind))
+        for i, j in product(range(3), range(3)):
+            yield f"gain_{CHANNELS[i]}_{CHANNELS[j]}", self.gain[i][j]
+        for (one, other), value in zip(_PAIRS, self.correlation, strict=True):
+            yield f"correlation_{one}_{other}", value
+        if self.frame is not None:
+            yield "frame", self.frame
+
+    @classmethod
+    def from_entries(cls, entries: Mapping[str, Any]) -> Self:
+        """The load cell with these entries, ideal in everything else.
+
+        Parameters
+        ----------
+        entries : mapping of str to float or str
+            Names are those of `LOAD_CELL_UNITS`, and "frame".
+
+        Raises
+        ------
+        ParameterError
+            If a name is not known, or a value impossible.
+
+        Examples
+        --------
+        >>> DataSheet.from_entries({"moment_noise": 0.02, "gain_force_x_force_y": 0.01}).gain[1]
+        (0.0, 1.0, 0.01)
+        """
+        unknown = [name for name in entries if name not in LOAD_CELL_UNITS and name != "frame"]
+        if unknown:
+            raise ParameterError(
+                f"a load cell has no entry {unknown[0]!r}: there are frame, {', '.join(LOAD_CELL_UNITS)}; call an "
+                "attribute of a record that is something else by a name that does not begin with 'load_cell_'"
+            )
+
+        def triple(stem: str, of: tuple[float, ...], names: tuple[str, ...] = CHANNELS) -> tuple[float, ...]:
+            return tuple(entries.get(f"{stem}_{name}", value) for name, value in zip(names, of, strict=True))
+
+        options: dict[str, Any] = {name: entries[name] for name in (*_SCALARS, "frame") if name in entries}
+        for name in ("bias", "bias_uncertainty"):
+            options[name] = triple(name, (0.0, 0.0, 0.0))
+        options["gain"] = tuple(triple(f"gain_{c}", row) for c, row in zip(CHANNELS, _IDENTITY, strict=True))
+        options["correlation"] = triple("correlation", (0.0, 0.0, 0.0), tuple(f"{a}_{b}" for a, b in _PAIRS))
+        laws = [law for law in _DRIFTS if any(name.startswith(f"{law}_") for name in entries)]
+        if len(laws) > 1:
+            raise ParameterError("a load cell drifts by a random walk or an Ornstein-Uhlenbeck process, not by both")
+        for law in laws:
+            kind = _DRIFTS[law]
+            sizes = {field.name: entries.get(f"{law}_{field.name}") for field in fields(kind)}
+            options["drift"] = kind(**{name: value for name, value in sizes.items() if value is not None})
+        return cls(**options)
+
+
+def _scalar(name: str, value: Any) -> float:
+    number = _number(value)
+    if number is None:
+        raise ParameterError(f"the load cell's {name} is {value!r}: give a number")
+    return number
+
+
+def _triple(name: str, values: Any) -> Triple:
+    numbers = [_number(value) for value in values] if np.iterable(values) and not isinstance(values, str) else []
+    one, two, three = numbers if len(numbers) == 3 else (None, None, None)
+    if one is None or two is None or three is None or not all(map(math.isfinite, (one, two, three))):
+        raise ParameterError(f"the load cell's {name} is {values!r}: give three finite numbers ({_MEANING[name]})")
+    return one, two, three
+
+
+def _rows(gain: Any) -> tuple[Triple, Triple, Triple]:
+    rows = tuple(gain) if np.iterable(gain) else ()
+    if len(rows) != 3 or not all(np.iterable(row) and not isinstance(row, str) for row in rows):
+        raise ParameterError(
+            f"the load cell's gain is {gain!r}: give three rows of three numbers, ((1, 0, 0), (0, 1, 0), (0, 0, 1)) "
+            "being that of an ideal cell"
+        )
+    one, two, three = (_triple("row of gain", row) for row in rows)
+    return one, two, three
+
+
+def _number(value: Any) -> float | None:
+    """A number as such, and not in words."""
+    if isinstance(value, str | bytes):
+        return None
+    try:
+        return float(value) if np.ndim(value) == 0 else None
+    except (TypeError, ValueError):
+        return None

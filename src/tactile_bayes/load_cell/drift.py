@@ -1,0 +1,152 @@
+"""Drift: the slow wandering of a sensor's zero from sample to sample."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["Drift", "OrnsteinUhlenbeck", "RandomWalk"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Law:
+    """d of the first sample is normal; then d(i+1) = kept · d(i) + a normal step, channel by channel."""
+
+    moment: float = 0.0
+    force: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            try:
+                number = math.nan if isinstance(value, str) else float(value)
+            except (TypeError, ValueError):
+                number = math.nan
+            if not (math.isfinite(number) and number >= 0.0):
+                raise ParameterError(
+                    f"{type(self).__name__}: {field.name} is {value!r}: give zero or a positive number"
+                )
+            object.__setattr__(self, field.name, number)
+
+    @property
+    def sizes(self) -> Floats:
+        """`moment`, `force`, `force`: a size for each channel, shape (3,)."""
+        return np.array([self.moment, self.force, self.force])
+
+    @property
+    def kept(self) -> float:
+        """What is left of a drift after one sample."""
+        raise NotImplementedError
+
+    @property
+    def first(self) -> float:
+        """Variance of the drift at the first sample, over the square of its size."""
+        raise NotImplementedError
+
+    @property
+    def step(self) -> float:
+        """Variance of a step, over the square of the size."""
+        raise NotImplementedError
+
+    def draw(self, normal: Floats) -> Floats:
+        """Drift made from independent standard normal numbers, shape (..., samples, 3)."""
+        steps = math.sqrt(self.step) * normal
+        steps[..., :1, :] = math.sqrt(self.first) * normal[..., :1, :]
+        return np.asarray(lfilter([1.0], [1.0, -self.kept], steps, axis=-2)) * self.sizes
+
+
+@dataclass(frozen=True)
+class RandomWalk(_Law):
+    """A zero that walks away without end, from nothing at the first sample of the record.
+
+    It is what warming up looks like after the cell was tared. After n samples the drift has the standard deviation
+    √n · step, and it does not forget: typically 1e-3 to 1e-1 of the white noise per sample.
+
+    Parameters
+    ----------
+    moment, force : float
+        Standard deviation of the step from one sample to the next, of the moment [N m, or EI/L] and of each force
+        [N, or EI/L²].
+
+    Raises
+    ------
+    ParameterError
+        If a size is negative or not finite.
+
+    Examples
+    --------
+    >>> walk = RandomWalk(force=1e-3).draw(np.random.default_rng(1).standard_normal((20_000, 100, 3)))
+    >>> walk[:, -1].std(axis=0).round(4)  # √99 steps
+    array([0.  , 0.01, 0.01])
+    """
+
+    @property
+    def kept(self) -> float:
+        return 1.0
+
+    @property
+    def first(self) -> float:
+        return 0.0
+
+    @property
+    def step(self) -> float:
+        return 1.0
+
+
+@dataclass(frozen=True)
+class OrnsteinUhlenbeck(_Law):
+    """A zero that wanders about its mean and forgets where it was in about `time` samples.
+
+    It is what draughts and a switching temperature control look like. It is stationary: the first sample
+    drifts as much as any. Two samples k apart have the correlation exp(−k/time), exactly.
+
+    Parameters
+    ----------
+    moment, force : float
+        Standard deviation of the drift of the moment [N m, or EI/L] and of each force [N, or EI/L²]; typically of the
+        size of the white noise.
+    time : float
+        Correlation time [samples], > 0.
+
+    Raises
+    ------
+    ParameterError
+        If a size is negative or not finite, or the time is not positive.
+
+    Examples
+    --------
+    >>> normal = np.random.default_rng(1).standard_normal((20_000, 21, 3))
+    >>> wander = OrnsteinUhlenbeck(moment=0.1, time=20.0).draw(normal)
+    >>> round(float(np.corrcoef(wander[:, 0, 0], wander[:, 20, 0])[0, 1]), 2)  # exp(−1)
+    0.37
+    """
+
+    time: float = 100.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.time == 0.0:
+            raise ParameterError("OrnsteinUhlenbeck: time is 0: give a positive number of samples")
+
+    @property
+    def kept(self) -> float:
+        return math.exp(-1.0 / self.time)
+
+    @property
+    def first(self) -> float:
+        return 1.0
+
+    @property
+    def step(self) -> float:
+        return -math.expm1(-2.0 / self.time)
+
+
+Drift = RandomWalk | OrnsteinUhlenbeck

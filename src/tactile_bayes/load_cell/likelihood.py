@@ -1,0 +1,354 @@
+"""How likely the readings of a sensor are, given the loads."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import betaln, gammaln, hyp2f1, log_ndtr, stdtr
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["approximations", "checked_noise_scale", "log_likelihood"]
+
+Floats = NDArray[np.float64]
+
+_LOG_2PI = math.log(2.0 * math.pi)
+
+_NARROW = 1e-5
+"""Width of a step of the reading, in scales of the noise, below which the density is the same all over it."""
+
+_FAR = -600.0
+"""Logarithm of the probabilities that are too small to be numbers, or soon will be."""
+
+_AT_LIMIT = 1e-9
+"""Share of the range by which a reading may differ from its end and still be at it."""
+
+
+def log_likelihood(
+    sheet: DataSheet, measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike = 1.0, pointwise: bool = False
+) -> Floats:
+    """Log-density of readings; see `LoadCell.log_likelihood`."""
+    readings, loads, scale = _checked(measured, predicted, noise_scale)
+    present = _present(sheet, readings)
+    if not present.size:
+        batch = np.broadcast_shapes(scale.shape[:-1], loads.shape[:-2])
+        return np.zeros((*batch, len(readings)) if pointwise else batch)
+    expected = sheet.expected(loads)
+    deviation = np.asarray(sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale))
+    if present.size < len(CHANNELS):
+        readings, expected, deviation = readings[:, present], expected[..., present], deviation[..., present]
+    if _is_plain(sheet):
+        return _white(readings, expected, deviation, pointwise)
+
+    wanders = bool(np.any(_wandering_sizes(sheet)[present]))
+    correlation = sheet.correlation_matrix[np.ix_(present, present)]
+    correlated = bool(np.any(correlation != np.eye(present.size)))
+    outliers = math.isfinite(sheet.degrees_of_freedom)
+    step, limit = sheet.resolution[present], sheet.limit[present]
+    _refuse_beyond(readings, step, limit, present)
+    if wanders or correlated:
+        _refuse_inexact(sheet, readings, step, limit, present, wanders, correlated)
+        steps = step**2 / 12.0
+        if not correlated:
+            by_sample = _wandering(sheet, readings - expected, deviation**2 + steps, present)
+        elif wanders:
+            by_sample = _wandering_together(sheet, readings - expected, deviation, steps, present, correlation)
+        else:
+            by_sample = _correlated(readings - expected, deviation, steps, correlation)
+    elif outliers or np.any(step) or np.any(np.isfinite(limit)):
+        by_sample = np.zeros(np.broadcast_shapes(expected.shape[:-1], deviation.shape[:-1]))
+        for c, (c_step, c_limit) in enumerate(zip(step.tolist(), limit.tolist(), strict=True)):
+            by_sample += _channel(
+                readings[:, c], expected[..., c], deviation[..., c], c_step, c_limit, sheet.degrees_of_freedom
+            )
+    else:
+        return _white(readings, expected, deviation, pointwise)
+    return np.asarray(by_sample if pointwise else by_sample.sum(axis=-1))
+
+
+def _is_plain(sheet: DataSheet) -> bool:
+    """Whether noise is normal and white, and readings as they are: what is called in inner loops."""
+    limits = sheet.force_range, sheet.moment_range, sheet.degrees_of_freedom
+    return all(map(math.isinf, limits)) and not (
+        sheet.drift
+        or sheet.force_resolution
+        or sheet.moment_resolution
+        or any(sheet.bias_uncertainty)
+        or any(sheet.correlation)
+    )
+
+
+def approximations(sheet: DataSheet) -> tuple[str, ...]:
+    """In words, where the likelihood of a sensor's readings is not exact."""
+    wanders = bool(np.any(_wandering_sizes(sheet)))
+    if np.any(sheet.resolution) and (wanders or any(sheet.correlation)):
+        beside = "drift or an unknown bias" if wanders else "correlated noise"
+        return (f"beside {beside}, the steps of the reading are taken for white noise of a twelfth of their square",)
+    return ()
+
+
+def checked_noise_scale(noise_scale: ArrayLike, loads: tuple[int, ...]) -> Floats:
+    """Factors on the white noise for loads of a shape, or why they are none."""
+    scale = np.asarray(noise_scale, dtype=np.float64)
+    if not (scale > 0).all():
+        raise ParameterError(f"a noise_scale is {float(np.min(scale))!r}: give positive factors")
+    try:
+        np.broadcast_shapes(scale.shape, (*loads[:-2], len(CHANNELS)))
+    except ValueError:
+        raise ParameterError(
+            f"noise_scale has shape {scale.shape} and predicted {loads}: give factors that broadcast to "
+            f"{(*loads[:-2], len(CHANNELS))}, the last axis for the channels {', '.join(CHANNELS)}"
+        ) from None
+    return scale
+
+
+# ---- independent samples
+
+
+def _white(readings: Floats, expected: Floats, deviation: Floats, pointwise: bool) -> Floats:
+    """Normal, independent samples and channels."""
+    # Samples and channels as one axis, and a product for the sum: an axis of three is several times slower.
+    squares = expected.reshape(*expected.shape[:-2], readings.size) - readings.ravel()
+    squares *= squares
+    squares = squares.reshape(expected.shape)
+    if deviation.ndim > 1 and deviation.shape[-2] > 1:  # by sample
+        by_sample = -0.5 * squares / deviation**2 - np.log(deviation) - 0.5 * _LOG_2PI
+        return np.asarray(by_sample.sum(axis=-1 if pointwise else (-2, -1)))
+    deviation = deviation[..., 0, :] if deviation.ndim > 1 else deviation
+    weight = -0.5 / deviation**2
+    offset = -(np.log(deviation) + 0.5 * _LOG_2PI).sum(axis=-1)
+    if pointwise:
+        return np.asarray((squares @ weight[..., None])[..., 0] + offset[..., None])
+    return np.asarray((np.ones(readings.shape[0]) @ squares * weight).sum(-1) + readings.shape[0] * offset)
+
+
+def _correlated(residual: Floats, deviation: Floats, steps: Floats, correlation: Floats) -> Floats:
+    if np.any(steps):
+        root = np.linalg.cholesky(_covariance(deviation, steps, correlation))
+        deviation = np.ones(1)
+        white = (np.linalg.inv(root) @ residual[..., None])[..., 0]
+    else:
+        root = np.linalg.cholesky(correlation)
+        white = residual / deviation @ np.linalg.inv(root).T
+    volume = np.log(deviation).sum(axis=-1) + np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
+    return np.asarray(-0.5 * (white**2).sum(axis=-1) - volume - 0.5 * correlation.shape[0] * _LOG_2PI)
+
+
+def _covariance(deviation: Floats, steps: Floats, correlation: Floats) -> Floats:
+    """Between the channels of a reading: noise that they may share, and steps that they do not."""
+    return np.asarray(deviation[..., :, None] * correlation * deviation[..., None, :] + np.diag(steps))
+
+
+def _channel(
+    readings: Floats, expected: Floats, scale: Floats, step: float, limit: float, degrees_of_freedom: float
+) -> Floats:
+    """One channel, whose readings may be steps, and those at the end of its range anything beyond."""
+    residual = (readings - expected) / scale
+    half = 0.5 * step / scale
+    if step > 0.0:
+        logs = _log_between(residual, half, degrees_of_freedom)
+    else:
+        logs = _log_density(residual, degrees_of_freedom) - np.log(scale)
+    if math.isfinite(limit):
+        at_limit = np.abs(readings) >= limit - max(0.5 * step, _AT_LIMIT * limit)
+        half = np.broadcast_to(half, residual.shape)[..., at_limit]
+        logs[..., at_limit] = _log_below(
+            half - np.sign(readings[at_limit]) * residual[..., at_limit], degrees_of_freedom
+        )
+    return logs
+
+
+def _log_density(z: Floats, degrees_of_freedom: float) -> Floats:
+    if math.isinf(degrees_of_freedom):
+        return -0.5 * z**2 - 0.5 * _LOG_2PI
+    nu = degrees_of_freedom
+    height = gammaln(0.5 * (nu + 1.0)) - gammaln(0.5 * nu) - 0.5 * math.log(nu * math.pi)
+    return np.asarray(height - 0.5 * (nu + 1.0) * np.log1p(z**2 / nu))
+
+
+def _log_below(z: Floats, degrees_of_freedom: float) -> Floats:
+    if math.isinf(degrees_of_freedom):
+        return np.asarray(log_ndtr(z))
+    with np.errstate(divide="ignore"):
+        logs = np.asarray(np.log(stdtr(degrees_of_freedom, z)))
+    far = logs < _FAR
+    if far.any():
+        # The incomplete beta function, as a hypergeometric one: DLMF 8.17.8.
+        half, log_x = 0.5 * degrees_of_freedom, -np.log1p(z[far] ** 2 / degrees_of_freedom)
+        x = np.exp(log_x)
+        series = hyp2f1(half + 0.5, 1.0, half + 1.0, x)
+        logs[far] = (
+            half * log_x + 0.5 * np.log1p(-x) + np.log(series) - math.log(degrees_of_freedom) - betaln(half, 0.5)
+        )
+    return logs
+
+
+def _log_between(place: Floats, half: Floats, degrees_of_freedom: float) -> Floats:
+    """Logarithm of the probability within half a step of a place, standardised."""
+    place = -np.abs(place)  # in the tail in which probabilities have their digits
+    high = _log_below(place + half, degrees_of_freedom)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        wide = high + np.log1p(-np.exp(_log_below(place - half, degrees_of_freedom) - high))
+    narrow = _log_density(place, degrees_of_freedom) + np.log(2.0 * half)
+    return np.where((2.0 * half < _NARROW) | ~np.isfinite(wide), narrow, wide)
+
+
+# ---- samples that know of one another
+
+
+def _wandering_sizes(sheet: DataSheet) -> Floats:
+    """Sizes of what is not known of the zero, shape (3,)."""
+    bias = np.array(sheet.bias_uncertainty)
+    return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
+
+
+def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: NDArray[np.intp]) -> Floats:
+    """Log-density of each sample given those before it, the noise of the channels being independent."""
+    bias = np.array(sheet.bias_uncertainty)[present] ** 2
+    if sheet.drift is None:
+        return _normal(*_filtered(residual, noise, bias, 1.0, np.zeros_like(bias)))
+    drift = sheet.drift.sizes[present] ** 2
+    first, kept, step = sheet.drift.first * drift, sheet.drift.kept, sheet.drift.step * drift
+    if kept == 1.0 or not np.any(bias):
+        return _normal(*_filtered(residual, noise, bias + first, kept, step))
+    # A bias beside a drift that forgets is regressed on: what the filter makes of 1 in every sample, it has that often.
+    residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
+    (new, of_one), total = _filtered(np.stack([residual, ones]), noise, first, kept, step)
+    with np.errstate(divide="ignore"):
+        known = 1.0 / bias + _sum_before(of_one**2 / total)
+    new = new - of_one * _sum_before(of_one * new / total) / known
+    return _normal(new, total + of_one**2 / known)
+
+
+def _wandering_together(
+    sheet: DataSheet,
+    residual: Floats,
+    deviation: Floats,
+    steps: Floats,
+    present: NDArray[np.intp],
+    correlation: Floats,
+) -> Floats:
+    """The same for noise that is correlated between the channels, and the same in all samples."""
+    # Coordinates in which white noise is one, and the wandering of each is independent of the others'.
+    deviation = deviation[..., 0, :] if deviation.ndim > 1 else deviation
+    root = np.linalg.cholesky(_covariance(deviation, steps, correlation))
+    inverse = np.linalg.inv(root)
+    share, axes = np.linalg.eigh(inverse * _wandering_sizes(sheet)[present] ** 2 @ np.swapaxes(inverse, -1, -2))
+    residual = residual @ np.swapaxes(np.swapaxes(axes, -1, -2) @ inverse, -1, -2)
+    volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)[..., None]
+    first, kept, step = (
+        (1.0, 1.0, 0.0) if sheet.drift is None else (sheet.drift.first, sheet.drift.kept, sheet.drift.step)
+    )
+    return _normal(*_filtered(residual, np.ones(present.size), first * share, kept, step * share)) - volume
+
+
+def _filtered(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
+    """What is new in each sample, shape (..., samples, channels), and its variance: Kalman's filter by channel.
+
+    What is filtered is a zero of variance `first` at the first sample, with white noise on top of it.
+    """
+    residual = np.moveaxis(residual, -2, 0)
+    noise = np.atleast_2d(noise)
+    white = np.broadcast_to(np.moveaxis(noise, -2, 0), (len(residual), *noise.shape[:-2], noise.shape[-1]))
+    total = np.empty((len(residual), *np.broadcast_shapes(white.shape[1:], first.shape)))
+    new = np.empty((len(residual), *np.broadcast_shapes(residual.shape[1:], total.shape[1:])))
+    place: Floats | float = 0.0
+    variance = first
+    for i in range(len(residual)):
+        total[i] = variance + white[i]
+        new[i] = residual[i] - place
+        share = variance / total[i]
+        place = kept * (place + share * new[i])
+        variance = kept * kept * share * white[i] + step
+    return np.moveaxis(new, 0, -2), np.moveaxis(total, 0, -2)
+
+
+def _normal(deviation: Floats, variance: Floats) -> Floats:
+    """Log-density of independent channels."""
+    return np.asarray(-0.5 * (deviation**2 / variance + np.log(variance) + _LOG_2PI).sum(axis=-1))
+
+
+def _sum_before(values: Floats) -> Floats:
+    """Over the samples before each."""
+    sums = np.zeros_like(values)
+    np.cumsum(values[..., :-1, :], axis=-2, out=sums[..., 1:, :])
+    return sums
+
+
+# ---- what cannot be
+
+
+def _checked(measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    readings = np.asarray(measured, dtype=np.float64)
+    loads = np.asarray(predicted, dtype=np.float64)
+    if readings.shape[1:] != (len(CHANNELS),) or loads.shape[-2:] != readings.shape:
+        raise ParameterError(
+            f"measured has shape {readings.shape} and predicted {loads.shape}: give (n_samples, 3) and "
+            f"(..., n_samples, 3), with the channels {', '.join(CHANNELS)}"
+        )
+    return readings, loads, checked_noise_scale(noise_scale, loads.shape)
+
+
+def _present(sheet: DataSheet, readings: Floats) -> NDArray[np.intp]:
+    """Indices of the channels that are not missing."""
+    absent = np.isnan(readings)
+    present = np.flatnonzero(~absent.all(axis=0))
+    for index in present:
+        name = CHANNELS[index]
+        if absent[:, index].any():
+            raise ParameterError(
+                f"measured misses sample {int(np.argmax(absent[:, index]))} of {name}, but has others: remove the "
+                "sample, or set the whole channel to NaN"
+            )
+        if sheet.noise[index] == 0:
+            source = "moment_noise" if name == "holding_moment" else "force_noise"
+            raise ParameterError(
+                f"{name} is measured, but the load cell has no noise on it: give LoadCell({source}=...) a positive "
+                "standard deviation"
+            )
+    return present
+
+
+def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: NDArray[np.intp]) -> None:
+    over = np.abs(readings) > limit * (1.0 + _AT_LIMIT) + 0.5 * step
+    if np.any(over):
+        sample, channel = np.argwhere(over)[0]
+        raise ParameterError(
+            f"sample {sample} of {CHANNELS[present[channel]]} reads {float(readings[sample, channel])!r}, beyond the "
+            f"load cell's range of {float(limit[channel])!r}: is the range in the record's units?"
+        )
+
+
+def _refuse_inexact(
+    sheet: DataSheet,
+    readings: Floats,
+    step: Floats,
+    limit: Floats,
+    present: NDArray[np.intp],
+    wanders: bool,
+    correlated: bool,
+) -> None:
+    """Refuse combinations whose likelihood has no exact form, nor one that is nearly exact."""
+    what = "drift or an unknown bias" if wanders else "correlated noise"
+    if math.isfinite(sheet.degrees_of_freedom):
+        raise ParameterError(
+            f"the likelihood of {what} with outliers (degrees_of_freedom) has no closed form: leave one of them out"
+        )
+    at_limit = np.abs(readings) >= limit * (1.0 - _AT_LIMIT) - 0.5 * step
+    if np.any(at_limit):
+        sample, channel = np.argwhere(at_limit)[0]
+        raise ParameterError(
+            f"sample {sample} of {CHANNELS[present[channel]]} is at the end of the load cell's range, and with {what} "
+            "the likelihood of such a sample has no closed form: remove it, or leave one of the two out"
+        )
+    if wanders and correlated:
+        if sheet.relative_noise:
+            raise ParameterError(
+                "drift or an unknown bias, correlated noise and relative_noise together are not offered: leave one out"
+            )
+        if sheet.drift is not None and any(sheet.bias_uncertainty[i] for i in present):
+            raise ParameterError("drift, an unknown bias and correlated noise together are not offered: leave one out")

@@ -1,0 +1,79 @@
+"""The measurement of a record by a sensor: its columns as the sensor reads them, the truth beside them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
+from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, present_channels, validate
+
+__all__ = ["measured", "stated_entries"]
+
+_PREFIX = "load_cell_"
+
+
+def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
+    """The record as a sensor gives it; see `LoadCell.measure`."""
+    made = validate(record if sheet.frame is None else in_frame(record, sheet.frame))
+    entries = _after(sheet, stated_entries(made)).entries()
+    present = present_channels(made)
+    readings = corrupted_loads(sheet, np.stack([made[name].values for name in CHANNELS], axis=-1), rng)
+    for index, channel in enumerate(CHANNELS):
+        if channel not in present:
+            continue
+        if np.isnan(readings[:, index]).any():
+            raise ParameterError(
+                f"the load cell has cross-talk on {channel} from a channel that the record misses "
+                f"({', '.join(name for name in CHANNELS if name not in present)}): measure the complete record"
+            )
+        _put(made, channel, readings[:, index])
+    if sheet.drive_angle_offset or sheet.drive_angle_noise or sheet.drive_angle_resolution:
+        _put(made, "drive_angle", corrupted_angles(sheet, made["drive_angle"].values, rng))
+    made.attrs |= {_PREFIX + name: value for name, value in entries.items()}
+    return validate(made)
+
+
+def stated_entries(record: xr.Dataset) -> dict[str, Any]:
+    """What the attributes of a record say of its load cell, but for its frame."""
+    return {
+        str(name).removeprefix(_PREFIX): value
+        for name, value in record.attrs.items()
+        if str(name).startswith(_PREFIX) and not isinstance(value, str)
+    }
+
+
+def _put(made: xr.Dataset, name: str, readings: NDArray[np.float64]) -> None:
+    """Put readings in place of a column, which is kept as the truth unless there is one."""
+    ideal, truth = made[name], column_of(f"truth_{name}")
+    if truth is not None and truth.name not in made:
+        attrs = {"units": ideal.attrs["units"], "long_name": truth.long_name_in(frame_of(made))}
+        made[truth.name] = ("sample", ideal.values.copy(), attrs)
+    made[name] = ("sample", readings, ideal.attrs)
+
+
+def _after(sheet: DataSheet, stated: dict[str, Any]) -> DataSheet:
+    """What has measured a record that another sensor had measured before."""
+    ideal = DataSheet()
+    here, before = DataSheet.from_entries({**sheet.entries(), "frame": None}), DataSheet.from_entries(stated)
+    if ideal in (here, before):
+        return here if before == ideal else before
+    white = DataSheet(
+        force_noise=math.hypot(before.force_noise, here.force_noise),
+        moment_noise=math.hypot(before.moment_noise, here.moment_noise),
+    )
+    for one in (before, here):
+        if replace(one, force_noise=white.force_noise, moment_noise=white.moment_noise) != white:
+            raise ParameterError(
+                "the record has been measured before, and two load cells of which one has more than white normal "
+                "noise make none that can be described: measure the ideal record, or remove its load_cell_ "
+                "attributes"
+            )
+    return white
