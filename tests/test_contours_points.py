@@ -13,7 +13,7 @@ from scipy.stats import t as student_t
 
 from tactile_bayes import scan
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
-from tactile_bayes.contours.bends import FALSE_ALARM, Bends
+from tactile_bayes.contours.bends import FALSE_ALARM, Bends, refuse_two_bands
 from tactile_bayes.contours.points import _FLOOR, from_points
 from tactile_bayes.errors import ContourError
 
@@ -331,6 +331,31 @@ X = np.linspace(-1.0, 1.0, 20)
 def test_refusals(x, y, scatter, message):
     with pytest.raises(ContourError, match=message):
         from_points(x, y, scatter=scatter)
+
+
+@pytest.mark.parametrize("count", [30, 50, 101, 400])
+@pytest.mark.parametrize("scatter", [0.0, 0.03])
+@pytest.mark.parametrize("tilt", [0.0, 0.4])
+def test_a_closed_outline_is_told_from_a_straight_line(count, scatter, tilt):
+    t, rng = np.linspace(0.0, 2.0 * np.pi, count), np.random.default_rng(count)
+    x = np.cos(t) + scatter * rng.standard_normal(count)
+    y = 1.3 + np.sin(t) + tilt * x + scatter * rng.standard_normal(count)
+    with pytest.raises(ContourError, match=r"near x = .* points at y = .* and at y = .*give the lower boundary only"):
+        from_points(x, y)
+
+
+def test_scatter_and_repeated_points_are_no_outline():
+    """Found is none in 1000 sets of points about a parabola; about a line, which is refused anyway, 1 of 5000."""
+    rng, alarms = np.random.default_rng(15), 0
+    for _ in range(1000):
+        count, bend = rng.integers(6, 60), rng.choice([0.0, 1.0])
+        x = np.round(rng.uniform(-1, 1, count), rng.integers(0, 4))
+        y = bend * x**2 + rng.choice([0.1, 0.001]) * rng.standard_normal(count)
+        try:
+            refuse_two_bands(x, y)
+        except ContourError:
+            alarms += 1
+    assert alarms <= most(1000, FALSE_ALARM)
 
 
 # The rod on it

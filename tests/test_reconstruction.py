@@ -74,8 +74,8 @@ def test_a_record_without_noise_gives_the_contour_back(profile, q, base, frictio
     ("contour", "base", "rod", "friction"),
     [
         (Parabola(2.5, 0.1, 0.01), (0.02, -0.01), WIRE, 0.2),
-        (Circle(0.2, 0.1), (0.0, 0.0), Rod(0.2, 2.4e-3, diameter=8e-3), 0.0),
-        (Parabola(0.5, 0.5), (0.0, 0.0), Rod(diameter=0.05), 0.0),
+        (Circle(0.2, 0.1), (0.0, 0.0), Rod(0.2, 2.4e-3, diameter=4e-3), 0.0),
+        (Parabola(0.5, 0.5), (0.0, 0.0), Rod(diameter=0.03), 0.0),
     ],
 )
 def test_units_and_thickness_of_the_rod_come_out_right(contour, base, rod, friction):

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from helpers import exact_rod
 from helpers.integration import shoot
 from helpers.legendre import equilibrium, tangential_arclength
-from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, paper_profile
+from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_function, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import equilibria, scan
@@ -87,6 +87,8 @@ def test_none_where_the_rod_cannot_reach():
     for name, values in states.data_vars.items():
         if name != "contact_phase":
             np.testing.assert_array_equal(np.isnan(values), [True, False, True], err_msg=name)
+    gentle = equilibria(from_function(lambda x: 0.5 + 0.1 * x**2, (-1.0, 1.0)), [0.05, 1.2])  # no such slope
+    np.testing.assert_array_equal(np.isnan(gentle.drive_angle), [False, True])
     circle = equilibria(Circle(0.3, 0.4), [1.5, 0.1])
     assert circle.contact_phase.values.tolist() == ["none", "tangential"]
 
@@ -117,7 +119,7 @@ def test_si_is_the_dimensionless_answer_in_units():
 
 def test_a_thick_rod_is_a_thin_one_on_the_parallel_curve():
     """Around a circle the parallel curve is a circle: same centre, radius larger by half the diameter."""
-    d = 0.06
+    d = 0.02
     thick, thin = Circle(0.5, 0.4, 0.1), Circle(0.5 + d / 2, 0.4 - d / 2, 0.1)
     alpha = [0.3, 0.45, 0.6]
     for direction in ("forward", "backward"):
@@ -268,7 +270,7 @@ def test_profile_four_goes_from_tangential_to_tip():
 
 def test_profile_four_lets_go_at_its_vertex():
     last = scan(paper_profile("IV", 0.3), direction="forward").events["forward"].snap_off
-    assert last.kind in ("fold", "thrust")  # both: the curvature vanishes, and so does the moment
+    assert last.kind == "thrust"  # a fold, too: the rate of the drive angle vanishes with the moment
     assert last.slope_angle == pytest.approx(0.0, abs=1e-13)
     assert last.drive_angle == pytest.approx(np.pi, abs=1e-12)
     assert last.holding_moment == pytest.approx(0.0, abs=1e-12)
@@ -383,6 +385,8 @@ II = paper_profile("II", 0.5)
         (lambda: scan(II, direction="sideways"), ParameterError, "'sideways': choose 'forward' or 'backward'"),
         (lambda: equilibria(II, [0.1], direction="both"), ParameterError, "direction is 'both'"),
         (lambda: scan(II, drive_step=-0.1), ParameterError, r"drive_step is -0\.1: give a positive angle"),
+        (lambda: scan(II, drive_step=1), ParameterError, r"drive_step is 1: .*in radians, at most 0\.5; .*np\.radians"),
+        (lambda: scan(II, drive_step="1"), ParameterError, "drive_step is '1'"),
         (lambda: scan(II, drive_step=np.nan), ParameterError, "drive_step is nan"),
         (lambda: scan(II, drive_angles=np.arange(0, 181)), ParameterError, "radians, at most a turn"),
         (lambda: scan(II, drive_angles=[]), ParameterError, "drive_angles must be finite"),
@@ -392,6 +396,19 @@ II = paper_profile("II", 0.5)
         (lambda: equilibria(II, [10.0]), ParameterError, r"slope_angles must be a list of angles in \(−π/2, π/2\)"),
         (lambda: equilibria(II, [np.nan]), ParameterError, "slope_angles"),
         (lambda: equilibria(II, [[0.1]]), ParameterError, "slope_angles"),
+        (lambda: equilibria(II, "steep"), ParameterError, "slope_angles must be a list of angles"),
+        (lambda: equilibria(II, [0.1], base=[(0, 0), (1, 0)]), ParameterError, r"base is .*equilibria takes one pivot"),
+        (lambda: equilibria(II, [0.1], base=(0, 0, 0)), ParameterError, r"base is \(0, 0, 0\): give a pivot \(x, y\)"),
+        (lambda: equilibria(II, [0.1], base=(np.nan, 0)), ParameterError, "base is .*nan.*: give a pivot"),
+        (lambda: scan(II, drive_angles="all"), ParameterError, "drive_angles must be finite"),
+        (lambda: scan(None), ParameterError, "the contour is None: give one, such as tb.contours.Parabola"),
+        (lambda: equilibria(np.square, [0.1]), ParameterError, "the contour is <ufunc 'square'>"),
+        (lambda: scan(II, rod=1.0), ParameterError, r"the rod is 1\.0: give a Rod, such as tb\.Rod\(length="),
+        (lambda: equilibria(II, [0.1], rod=0.0), ParameterError, r"the rod is 0\.0: give a Rod"),
+        (lambda: scan(II, friction="0.3"), ParameterError, r"friction is '0\.3': .*a number from 0 to 0\.84"),
+        (lambda: scan(II, friction=-0.1), ParameterError, r"friction is -0\.1: give Coulomb's coefficient"),
+        (lambda: scan(II, friction=np.nan), ParameterError, "friction is nan"),
+        (lambda: equilibria(II, [0.1], friction=0.85), ParameterError, r"friction is 0\.85: .* from 0 to 0\.84"),
     ],
 )
 def test_refusals(call, error, message):

@@ -113,6 +113,17 @@ def test_contact_beyond_an_end_is_refused_with_its_name(contour, base, direction
         scan(contour, base=base, direction=direction)
 
 
+@pytest.mark.parametrize(
+    ("left", "right", "what"), [(-0.9, 0.5, "would first touch beyond"), (0.2, 1.2, "would still touch at")]
+)
+def test_of_several_bases_the_one_that_is_refused_is_named(left, right, what):
+    contour = from_function(lambda x: 0.3 + 0.5 * x**2, (left, right))
+    good = (-0.45, 0.15) if left < 0 else (0.6, 0.0)
+    assert scan(contour, base=good, direction="forward").sweeps[0].base == good
+    with pytest.raises(ContourError, match=rf"in a forward sweep from the pivot at \(0, 0\.05\) the rod {what}"):
+        scan(contour, base=[good, (0.0, 0.05)], direction="forward")
+
+
 def test_half_a_contour_will_do_if_the_rod_lets_go_before_its_end():
     whole = scan(Parabola(0.5, 0.5), direction="forward")
     half = scan(from_function(lambda x: 0.5 + 0.5 * x**2, (0.0, 2.0)), direction="forward")
@@ -134,6 +145,18 @@ def test_a_rod_that_would_be_stopped_again_is_said_so():
     last = result.record.drive_angle.values[-1]
     assert sweep.snap_off.drive_angle - 0.01 <= last <= sweep.snap_off.drive_angle
     assert result.record.force_y.values[-1] > 0.0
+
+
+def test_a_grid_after_a_snap_off_that_is_not_clear_is_refused():
+    contour = PowerLaw(0.0954, 1.549, 0.33, 0.892)
+    with (
+        pytest.warns(ClearanceWarning),
+        pytest.raises(ParameterError, match=r"drive_angles: all of them are after the snap-off, at 1\.04795 rad"),
+    ):
+        scan(contour, direction="forward", drive_angles=[2.0, 3.0])
+    with pytest.warns(ClearanceWarning):
+        record = scan(contour, direction="forward", drive_angles=[1.0, 2.0, 3.0]).record
+    np.testing.assert_array_equal(record.drive_angle, [1.0])
 
 
 @settings(deadline=None, max_examples=40)
@@ -188,8 +211,36 @@ def test_a_rod_bent_beyond_its_limit_is_warned_of():
         scan(Parabola(2.5, 0.1), rod=Rod.circular(0.2, 0.5e-3, 206e9, elastic_strain=0.001), direction="forward")
     assert scan(Parabola(2.5, 0.1), rod=WIRE, direction="forward").sweeps[0].largest_strain < 0.02  # and no warning
     assert scan(Parabola(0.5, 0.5)).sweeps[0].largest_strain == 0.0
-    with pytest.raises(ParameterError, match=r"the rod's elastic strain is -0\.1: give a positive number, or none"):
-        Rod(elastic_strain=-0.1)
+
+
+def test_a_strain_beyond_the_model_is_warned_of_whatever_the_rod_bears():
+    with pytest.warns(StrainWarning, match=r"strained by 0\.6: beyond 0\.1 it is neither slender nor linearly elastic"):
+        scan(Parabola(0.5, 0.5), rod=Rod(diameter=0.2, elastic_strain=0.9), direction="forward")
+
+
+def test_rods_are_equal_and_print_alike_if_they_bear_the_same():
+    assert Rod(0.2, elastic_strain=0.1) != Rod(0.2, elastic_strain=0.2)
+    assert repr(Rod(0.2, elastic_strain=0.1)) == (
+        "Rod(length=0.2, flexural_rigidity=1.0, diameter=0.0, elastic_strain=0.1)"
+    )
+    assert repr(Rod(0.2)) == "Rod(length=0.2, flexural_rigidity=1.0, diameter=0.0)"
+    assert eval(repr(WIRE)) == WIRE
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Rod(elastic_strain=-0.1), r"the rod's elastic strain is -0\.1: give a positive number, or none"),
+        (lambda: Rod(elastic_strain=np.inf), r"the rod's elastic strain is inf"),
+        (lambda: Rod(length="0.1"), r"the rod's length is '0\.1': give a positive number \[m\]"),
+        (lambda: Rod(flexural_rigidity=None), r"the rod's flexural_rigidity is None: .*\[N m²\]"),
+        (lambda: Rod(diameter="thin"), r"the rod's diameter is 'thin': give zero or a positive number"),
+        (lambda: Rod.circular(0.1, 1e-3, "steel"), r"the rod's youngs_modulus is 'steel': give a positive number"),
+    ],
+)
+def test_what_is_no_rod_is_refused(build, message):
+    with pytest.raises(ParameterError, match=message):
+        build()
 
 
 @settings(deadline=None, max_examples=30)

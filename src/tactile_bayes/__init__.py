@@ -17,10 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("contours", "elastica", "errors", "plotting")
+_MODULES = ("contours", "datasets", "elastica", "errors", "plotting")
 
 _HOMES = {
     "LoadCell": "load_cell",
+    "OrnsteinUhlenbeck": "load_cell",
+    "RandomWalk": "load_cell",
     "Rod": "rod",
     "SamplerSettings": "inference.ensembles",
     "contour_band": "uncertainty.band",
@@ -35,15 +37,18 @@ _HOMES = {
     "read_result": "inference.result",
     "reconstruct": "reconstruction",
     "scan": "scanning",
+    "scan_many": "scanning_many",
     "to_arviz": "inference.result",
     "write_record": "record",
     "write_result": "inference.result",
+    "zero_load": "load_cell",
 }
 
 __all__ = ["__version__", *_MODULES, *_HOMES]
 
 if TYPE_CHECKING:
     from tactile_bayes import contours as contours
+    from tactile_bayes import datasets as datasets
     from tactile_bayes import elastica as elastica
     from tactile_bayes import errors as errors
     from tactile_bayes import plotting as plotting
@@ -54,6 +59,9 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.result import to_arviz as to_arviz
     from tactile_bayes.inference.result import write_result as write_result
     from tactile_bayes.load_cell import LoadCell as LoadCell
+    from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+    from tactile_bayes.load_cell import RandomWalk as RandomWalk
+    from tactile_bayes.load_cell import zero_load as zero_load
     from tactile_bayes.reconstruction import reconstruct as reconstruct
     from tactile_bayes.record import in_frame as in_frame
     from tactile_bayes.record import make_record as make_record
@@ -62,6 +70,7 @@ if TYPE_CHECKING:
     from tactile_bayes.rod import Rod as Rod
     from tactile_bayes.scanning import equilibria as equilibria
     from tactile_bayes.scanning import scan as scan
+    from tactile_bayes.scanning_many import scan_many as scan_many
     from tactile_bayes.uncertainty.band import contour_band as contour_band
     from tactile_bayes.uncertainty.gap import gap as gap
     from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from numbers import Real
 
 from tactile_bayes.errors import ParameterError
 
@@ -28,7 +29,8 @@ class Rod:
         its centreline; 0 (the default) is a rod without thickness.
     elastic_strain : float, optional
         Largest bending strain that the material takes without staying bent: about 0.002 for mild steel, 0.005 for
-        spring steel, 0.05 for nitinol. `scan` warns where a rod with a diameter is bent beyond it.
+        spring steel, 0.05 for nitinol. `scan` warns where a rod with a diameter is bent beyond it. Records do not state
+        it.
 
     Raises
     ------
@@ -46,19 +48,26 @@ class Rod:
     length: float = 1.0
     flexural_rigidity: float = 1.0
     diameter: float = 0.0
-    elastic_strain: float | None = field(default=None, repr=False, compare=False)
+    elastic_strain: float | None = None
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
+            if not _is_positive(value):
                 raise ParameterError(f"the rod's {name} is {value!r}: give a positive number [{unit}]")
-        if not (math.isfinite(self.diameter) and self.diameter >= 0):
+        if not (_is_positive(self.diameter) or self.diameter == 0):
             raise ParameterError(f"the rod's diameter is {self.diameter!r}: give zero or a positive number [m]")
-        if self.elastic_strain is not None and not self.elastic_strain > 0.0:
+        if self.elastic_strain is not None and not _is_positive(self.elastic_strain):
             raise ParameterError(
                 f"the rod's elastic strain is {self.elastic_strain!r}: give a positive number, or none"
             )
+
+    def __repr__(self) -> str:
+        strain = "" if self.elastic_strain is None else f", elastic_strain={self.elastic_strain!r}"
+        return (
+            f"Rod(length={self.length!r}, flexural_rigidity={self.flexural_rigidity!r}, "
+            f"diameter={self.diameter!r}{strain})"
+        )
 
     @classmethod
     def circular(
@@ -82,7 +91,7 @@ class Rod:
         0.002428
         """
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
-            if not (math.isfinite(value) and value > 0):
+            if not _is_positive(value):
                 raise ParameterError(f"the rod's {name} is {value!r}: give a positive number")
         return cls(length, youngs_modulus * math.pi * diameter**4 / 64, diameter, elastic_strain)
 
@@ -105,3 +114,7 @@ class Rod:
     def force_unit(self) -> float:
         """What a dimensionless force of one is, EI/L² [N]."""
         return self.flexural_rigidity / self.length**2
+
+
+def _is_positive(value: object) -> bool:
+    return isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0

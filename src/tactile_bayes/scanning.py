@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -19,7 +20,8 @@ from tactile_bayes.path import Paths, States
 from tactile_bayes.record import COLUMNS, make_record
 from tactile_bayes.rod import Rod
 from tactile_bayes.sweep_events import SweepEvents, events_of
-from tactile_bayes.sweep_path import Direction, in_world, seen_from, sweep_paths
+from tactile_bayes.sweep_path import Direction, friction_angle_of, seen_from, sweep_paths
+from tactile_bayes.world import in_world
 
 __all__ = ["Scan", "equilibria", "scan"]
 
@@ -27,6 +29,12 @@ Floats = NDArray[np.float64]
 
 _MARGIN = 15
 """Steps of the drive before first contact and after snap-off."""
+
+_COARSEST = 0.5
+"""Steps of the drive [rad] above this are taken for degrees: a sweep would have a handful of samples."""
+
+_LARGEST_STRAIN = 0.1
+"""Bending strain up to which a rod is slender and its bending moment proportional to its curvature."""
 
 
 class _ByDirection(dict[str, SweepEvents]):
@@ -36,7 +44,7 @@ class _ByDirection(dict[str, SweepEvents]):
         raise ParameterError(f"the scan has no events of direction {direction!r}: {hint}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scan:
     """What `scan` returns.
 
@@ -95,7 +103,8 @@ def equilibria(
     -------
     xr.Dataset
         Over "slope_angle": drive_angle, holding_moment, force_x, force_y, contact_arclength, contact_phase ("tip",
-        "tangential" or "none"), contact_x, contact_y, tip_angle; NaN where the rod cannot reach.
+        "tangential" or "none"), contact_x, contact_y, tip_angle; NaN where the rod
+        cannot reach, and where the contour has no such slope.
 
     Raises
     ------
@@ -109,16 +118,20 @@ def equilibria(
     >>> states.drive_angle.values.round(6), states.contact_phase.values.tolist()
     (array([3.154275, 1.994616]), ['tip', 'tangential'])
     """
-    alpha = np.atleast_1d(np.asarray(slope_angles, dtype=float))
+    alpha = np.atleast_1d(_floats(slope_angles))
     if alpha.ndim != 1 or not np.all(np.abs(alpha) < 0.5 * np.pi):
         raise ParameterError("slope_angles must be a list of angles in (−π/2, π/2) radians")
-    seen = seen_from(contour, base, direction, rod or Rod())
+    pivots = _pivots(base)
+    if len(pivots) > 1:
+        raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
+    units = Rod() if rod is None else rod
+    seen = seen_from(contour, pivots[0], direction, units)
     lane = np.zeros(alpha.size, dtype=np.intp)
     parameter = (-1.0 if seen.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
     locus = seen.locate(lane, parameter)
-    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, np.arctan(friction))
+    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle_of(friction))
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
-    columns = in_world(seen, states, rod or Rod())
+    columns = in_world(seen, lane, states, units)
     reached = columns["contact_phase"] != "none"
     data = {}
     for name, values in columns.items():
@@ -152,10 +165,11 @@ def scan(
         The pivot, in the contour's unit of length. The contour must lie above it. With several pivots (a support that
         is moved, or an array of whiskers) each is visited in turn, and the sweeps are numbered through.
     drive_step : float
-        Step of the drive [rad]; the grid consists of its multiples, and reaches 15 steps beyond contact on both sides,
-        as far as a turn goes.
+        Step of the drive [rad], at most 0.5; the grid consists of its multiples, and reaches 15 steps beyond contact on
+        both sides, as far as a turn goes.
     drive_angles : array_like, shape (n,), optional
-        A grid of one's own [rad], used in increasing order forward and in decreasing order backward.
+        A grid of one's own [rad], used in increasing order forward and in decreasing order backward; of equal angles
+        one is kept.
     rod : Rod, optional
         By default the dimensionless rod. One with a diameter touches with its surface.
     friction : float
@@ -172,7 +186,8 @@ def scan(
         If the straight rod would cut the object after snap-off: what it does then is not known, and the samples are
         left out.
     StrainWarning
-        If the rod is bent beyond its elastic strain.
+        If the rod is bent beyond its elastic strain, or beyond a strain of 0.1, where the model of a slender, linearly
+        elastic rod ends.
 
     Raises
     ------
@@ -191,10 +206,13 @@ def scan(
     3.154275
     """
     directions: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
-    rod = rod or Rod()
-    if not (np.isfinite(drive_step) and drive_step > 0.0):
-        raise ParameterError(f"drive_step is {drive_step!r}: give a positive angle in radians")
-    grid = None if drive_angles is None else np.unique(np.asarray(drive_angles, dtype=float))
+    rod = Rod() if rod is None else rod
+    if not (isinstance(drive_step, Real) and 0.0 < drive_step <= _COARSEST):
+        raise ParameterError(
+            f"drive_step is {drive_step!r}: give a positive angle in radians, at most {_COARSEST}; one in degrees is "
+            "converted by np.radians"
+        )
+    grid = None if drive_angles is None else np.unique(_floats(drive_angles))
     if grid is not None and not (grid.size and np.all(np.isfinite(grid)) and np.all(np.abs(grid) <= 2.0 * np.pi)):
         raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
 
@@ -216,15 +234,26 @@ def scan(
             angles = angles[onward * (sweep.snap_off.drive_angle - angles) >= 0.0]
         columns.append(_sweep(paths, angles[:: 1 if sense == "forward" else -1], len(sweeps), sense, pivot, rod))
         sweeps.append(sweep)
+    if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
+        snaps = ", ".join(f"{sweep.snap_off.drive_angle:.6g} rad ({sweep.direction})" for sweep in sweeps)
+        raise ParameterError(
+            f"drive_angles: all of them are after the snap-off, at {snaps}, from where on nothing is known, since the "
+            "rod does not come free of the object: give angles before it too"
+        )
     record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
     return Scan(make_record(record, rod=rod), tuple(sweeps), contour)
 
 
-def _pivots(base: tuple[float, float] | Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+def _floats(values: ArrayLike) -> Floats:
+    """Numbers as an array, NaN if they are none."""
     try:
-        pivots = np.asarray(base, dtype=float)
+        return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        pivots = np.empty(0)
+        return np.asarray(np.nan)
+
+
+def _pivots(base: tuple[float, float] | Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    pivots = _floats(base)
     if pivots.shape == (2,):
         pivots = pivots[None]
     if pivots.ndim != 2 or pivots.shape[1] != 2 or not pivots.size or not np.all(np.isfinite(pivots)):
@@ -241,6 +270,13 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
             ClearanceWarning,
             stacklevel=3,
         )
+    if sweep.largest_strain > _LARGEST_STRAIN:
+        warnings.warn(
+            f"{where} the rod is strained by {sweep.largest_strain:.3g}: beyond {_LARGEST_STRAIN:g} it is neither "
+            "slender nor linearly elastic, and the loads are not to be trusted; take a thinner or longer rod",
+            StrainWarning,
+            stacklevel=3,
+        )
     if rod.elastic_strain is not None and sweep.largest_strain > rod.elastic_strain:
         warnings.warn(
             f"{where} the rod is strained by {sweep.largest_strain:.3g}, more than the {rod.elastic_strain:g} that it "
@@ -255,7 +291,7 @@ def _sweep(
 ) -> dict[str, NDArray[np.generic]]:
     lane = np.zeros(angles.size, dtype=np.intp)
     states = paths.states(lane, np.pi - angles if paths.seen.mirrored[0] else angles)
-    columns = in_world(paths.seen, states, rod)
+    columns = in_world(paths.seen, lane, states, rod)
     loaded = columns["contact_phase"] != "none"
     sweep: dict[str, NDArray[np.generic]] = {
         "sweep": np.full(angles.size, number),

@@ -10,7 +10,8 @@ from tactile_bayes.elastica import TANGENTIAL, TIP, Wrench, largest_curvature
 from tactile_bayes.path import Paths, SnapOff, States
 from tactile_bayes.reach import clear_angle
 from tactile_bayes.rod import Rod
-from tactile_bayes.sweep_path import Direction, in_world
+from tactile_bayes.sweep_path import Direction
+from tactile_bayes.world import in_world
 
 __all__ = ["Event", "SweepEvents", "events_of"]
 
@@ -64,7 +65,7 @@ class SweepEvents:
         Whether the straight rod is free of the object after snap-off. If it is not, the rod comes to rest in another
         contact, which no sweep leads to.
     largest_strain : float
-        Largest bending strain of the rod up to snap-off, to about 1e-5 of it; 0 for a rod without thickness.
+        Largest bending strain of the rod up to snap-off, to 1e-4 of it; 0 for a rod without thickness.
     """
 
     direction: str
@@ -80,10 +81,11 @@ def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod
     segments = paths.segments
     inner = np.flatnonzero(segments.tip[1:] != segments.tip[:-1])
     parameters = np.concatenate([paths.first_parameter, segments.end[inner], paths.snap_parameter])
-    states = paths.states_at(np.zeros(parameters.size, dtype=np.intp), parameters)
+    lane = np.zeros(parameters.size, dtype=np.intp)
+    states = paths.states_at(lane, parameters)
     # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
     wrench = _at_rest_first(states, bool(segments.tip[0]))
-    columns = in_world(paths.seen, states._replace(wrench=wrench), rod)
+    columns = in_world(paths.seen, lane, states._replace(wrench=wrench), rod)
     words = ["tip" if tip else "tangential" for tip in segments.tip]
     kinds = [
         words[0],

@@ -1,24 +1,22 @@
-"""One sweep along one contour: its exact path, or a refusal, and its states in the world's signs and units."""
+"""One sweep along one contour: its exact path, or a refusal that says why there is none."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from numbers import Real
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import PHASE_NAMES
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.path import CLEARANCE, Paths, Reach, States, trace
+from tactile_bayes.path import CLEARANCE, Paths, Reach, trace
 from tactile_bayes.rod import Rod
 
-__all__ = ["Direction", "in_world", "seen_from", "sweep_paths"]
+__all__ = ["Direction", "friction_angle_of", "seen_from", "sweep_paths"]
 
 Direction = Literal["forward", "backward"]
-Floats = NDArray[np.float64]
-
 _ORDER = 32
 
 
@@ -34,15 +32,17 @@ def sweep_paths(
 
     Parameters and errors are those of `scan`.
     """
-    rod = rod or Rod()
+    rod = Rod() if rod is None else rod
     seen = seen_from(contour, base, direction, rod)
+    friction_angle = friction_angle_of(friction)
     height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
     if np.any(height <= base[1]):
         raise ContourError(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = trace(seen, friction_angle=float(np.arctan(friction)), order=_ORDER)
+    paths = trace(seen, friction_angle=friction_angle, order=_ORDER)
+    sweep = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
     match Reach(int(paths.reach[0])):
         case Reach.TOO_FAR:
             raise ReachError(
@@ -62,12 +62,12 @@ def sweep_paths(
             )
         case Reach.ENDS:
             raise ContourError(
-                f"in a {direction} sweep the rod would first touch beyond {_end(contour, direction == 'forward')}, "
+                f"{sweep} the rod would first touch beyond {_end(contour, direction == 'forward')}, "
                 "and nothing is known of the object there: extend the contour, or move the pivot"
             )
         case Reach.RUNS_OUT:
             raise ContourError(
-                f"in a {direction} sweep the rod would still touch at {_end(contour, direction == 'backward')}, and "
+                f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
                 "nothing is known of the object beyond: extend the contour, or move the pivot"
             )
     return paths
@@ -80,36 +80,33 @@ def _end(contour: Contour, at_right: bool) -> str:
 
 
 def seen_from(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SeenContour:
+    """One contour as one rod sees it from one pivot.
+
+    Raises
+    ------
+    ParameterError
+        If one of them is none, or there are several contours.
+    """
+    if not isinstance(contour, Contour):
+        raise ParameterError(f"the contour is {contour!r}: give one, such as tb.contours.Parabola(a=0.5, q=0.5)")
+    if not isinstance(rod, Rod):
+        raise ParameterError(f"the rod is {rod!r}: give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
     if direction not in ("forward", "backward"):
         raise ParameterError(f"direction is {direction!r}: choose 'forward' or 'backward'")
     if contour.shape != ():
-        raise ParameterError(f"one contour is wanted here, not an array of shape {contour.shape}")
+        raise ParameterError(
+            f"one contour is wanted here, not an array of shape {contour.shape}: scan_many takes those of shape (n,)"
+        )
     x, y = (np.full(1, float(b)) for b in base)
     return SeenContour(
         contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, np.array([direction == "backward"])
     )
 
 
-def in_world(seen: SeenContour, states: States, rod: Rod) -> dict[str, NDArray[Any]]:
-    """States in the world's signs and units; the contact point is the object's, not the centreline's."""
-    sign = -1.0 if seen.mirrored[0] else 1.0
-    wrench = states.wrench
-    standoff = seen.standoff / seen.length
-    x = states.x - standoff * np.sin(states.slope_angle)
-    y = states.y + standoff * np.cos(states.slope_angle)
-
-    def turned(angle: Floats) -> Floats:
-        return np.pi - angle if seen.mirrored[0] else angle
-
-    return {
-        "drive_angle": turned(wrench.drive_angle),
-        "holding_moment": sign * wrench.holding_moment * rod.moment_unit + 0.0,  # never −0
-        "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
-        "force_y": wrench.force_y * rod.force_unit,
-        "contact_arclength": wrench.contact_arclength * rod.length_unit,
-        "contact_phase": np.array(PHASE_NAMES)[wrench.phase],
-        "contact_x": seen.base_x[0] + sign * x * rod.length_unit,
-        "contact_y": seen.base_y[0] + y * rod.length_unit,
-        "tip_angle": turned(wrench.tip_angle),
-        "slope_angle": sign * states.slope_angle,
-    }
+def friction_angle_of(friction: float) -> float:
+    """The angle arctan μ [rad] by which friction turns the contact force, refused where the rod's map would fold."""
+    if not isinstance(friction, Real) or not 0.0 <= friction <= np.tan(MAX_FRICTION_ANGLE):
+        raise ParameterError(
+            f"friction is {friction!r}: give Coulomb's coefficient, a number from 0 to {np.tan(MAX_FRICTION_ANGLE):.2f}"
+        )
+    return float(np.arctan(friction))

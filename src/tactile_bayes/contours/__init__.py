@@ -1,6 +1,7 @@
 """Strictly convex contours by slope angle; one family a class on one small base."""
 
 from tactile_bayes.contours.base import Contour, Graph, Locus, Single
+from tactile_bayes.contours.checking import check
 from tactile_bayes.contours.circle import Circle
 from tactile_bayes.contours.ellipse import Ellipse
 from tactile_bayes.contours.function import from_function
@@ -23,6 +24,7 @@ __all__ = [
     "PowerLaw",
     "ShapeFree",
     "Single",
+    "check",
     "from_function",
     "from_points",
     "paper_profile",

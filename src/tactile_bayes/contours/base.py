@@ -12,7 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.errors import ContourError
 from tactile_bayes.roots import falling_root
 
-__all__ = ["Contour", "Floats", "Graph", "Index", "Locus", "Parameter", "Single", "finite", "refuse_unless"]
+__all__ = [
+    "Contour",
+    "Floats",
+    "Graph",
+    "Index",
+    "Locus",
+    "Parameter",
+    "Single",
+    "as_parameter",
+    "common_shape",
+    "finite",
+    "refuse_unless",
+]
 
 Floats = NDArray[np.float64]
 Parameter = float | Floats
@@ -29,7 +41,8 @@ class Locus(NamedTuple):
     y: Floats
     slope_angle: Floats
     arclength_rate: Floats
-    """dσ/dp ≥ 0, σ the arc length; zero only in an edge, where the contour turns on the spot."""
+    """dσ/dp ≥ 0, σ the arc length; zero only where the radius of curvature is: in an edge, where the contour turns on
+    the spot, and at a vertex as sharp as that of |x|ⁿ with n < 2."""
     slope_rate: Floats
     """dα/dp ≥ 0; zero only where the radius of curvature is infinite."""
 
@@ -40,8 +53,33 @@ class Contour(ABC):
     A family is a frozen dataclass of its parameters, which are scalars or arrays that broadcast: one contour object may
     hold many contours. Its own parameter p may be whatever makes point and slope angle continuous functions of it.
     A family must say how to go from p to the point (`locate`) and where it ends (`domain`); everything else follows by
-    root search, and is overridden where there is a formula.
+    root search, and is overridden where there is a formula. `check` tells whether a family of one's own is right.
+
+    Contours are equal if they are of one family and all their parameters are, shapes included; a family that is to
+    inherit this is a `dataclass(frozen=True, eq=False)`.
     """
+
+    def __post_init__(self) -> None:
+        """Make the parameters numbers, or arrays of numbers that broadcast."""
+        family, given = type(self).__name__, vars(self)
+        self.__dict__.update({name: as_parameter(family, name, value) for name, value in given.items()})
+        common_shape(family, **{name: np.shape(value) for name, value in given.items()})
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return self._identity() == other._identity()
+
+    def __hash__(self) -> int:
+        return hash((type(self), self._identity()))
+
+    def _identity(self) -> tuple[Any, ...]:
+        """The parameters as what can be compared and hashed."""
+        return tuple(
+            (name, v.shape, tuple(v.ravel().tolist())) if isinstance(v, np.ndarray) else (name, v)
+            for name, v in vars(self).items()
+            if not name.startswith("_")
+        )
 
     @abstractmethod
     def locate(self, parameter: ArrayLike) -> Locus:
@@ -76,7 +114,10 @@ class Contour(ABC):
 
     @property
     def knots(self) -> tuple[Floats, ...]:
-        """Parameters between the ends at which the radius of curvature jumps."""
+        """Parameters between the ends beside which the contour is smooth, but perhaps not there.
+
+        Wherever the radius of curvature jumps or the slope does there must be one; others do no harm.
+        """
         return ()
 
     @property
@@ -86,7 +127,9 @@ class Contour(ABC):
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Self:
         """The same contours with every parameter an array of one shape, as `take` wants them."""
-        return type(self)(**{k: np.broadcast_to(np.asarray(v, dtype=float), shape) for k, v in vars(self).items()})
+        many = object.__new__(type(self))  # the parameters have been checked
+        many.__dict__.update({name: np.broadcast_to(value, shape) for name, value in vars(self).items()})
+        return many
 
     def take(self, index: Index) -> Self:
         """The contours at `index`, of a contour whose parameters are all arrays of one shape."""
@@ -149,7 +192,13 @@ class Contour(ABC):
 
 
 class Single(Contour):
-    """A contour that stands alone, without parameters of a family."""
+    """A contour that stands alone, without parameters of a family; it equals itself only."""
+
+    def __post_init__(self) -> None:
+        pass
+
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -163,7 +212,28 @@ class Single(Contour):
 
 
 class Graph(Contour):
-    """A contour that is easiest to give as the graph y = g(x): its parameter is x."""
+    """A contour that is easiest to give as the graph y = g(x): its parameter is x.
+
+    A family of one's own is a frozen dataclass of its parameters, with a method for g and its first two derivatives;
+    `domain` is to be overridden where it ends, and `check` tells whether it is right. Parameters may be arrays, so
+    formulas must work on arrays. A contour without parameters derives from `Graph` and `Single`.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from tactile_bayes.contours import check
+    >>> @dataclass(frozen=True, eq=False)
+    ... class Catenary(Graph):
+    ...     size: float
+    ...     q: float
+    ...
+    ...     def derivatives(self, x):
+    ...         u = x / self.size
+    ...         return self.q + self.size * (np.cosh(u) - 1.0), np.sinh(u), np.cosh(u) / self.size
+    >>> check(Catenary(size=[0.5, 1.0], q=0.3))
+    >>> Catenary(0.5, 0.3).radius_of_curvature([0.0, 0.5]).round(12)  # size/cos²α
+    array([0.5       , 0.64922321])
+    """
 
     @abstractmethod
     def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
@@ -180,10 +250,31 @@ class Graph(Contour):
 
     def locate(self, parameter: ArrayLike) -> Locus:
         x = np.asarray(parameter, dtype=float)
-        g, slope, bend = self.derivatives(x)
-        x, g = np.broadcast_arrays(x, g)
+        x, g, slope, bend = np.broadcast_arrays(x, *self.derivatives(x))
         steepness = 1.0 + slope * slope
         return Locus(x, g, np.arctan(slope), np.sqrt(steepness), bend / steepness)
+
+
+def as_parameter(family: str, name: str, given: Any) -> Parameter:
+    """A parameter as a number, or a copy of it as an array of numbers."""
+    try:
+        values = np.array(given)
+    except ValueError:  # a list of lists of unlike lengths
+        values = np.array(None)
+    if values.dtype.kind not in "iuf":
+        raise ContourError(f"{family}: {name} is {given!r}: give a number, or an array of numbers")
+    return values.astype(float) if values.ndim else float(values)
+
+
+def common_shape(family: str, **shapes: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape that the shapes of some parameters broadcast to."""
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        found = ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items() if shape)
+        raise ContourError(
+            f"{family}: {found} do not broadcast: give numbers, and arrays of one shape or of shapes that broadcast"
+        ) from None
 
 
 def refuse_unless(holds: Any, family: str, rule: str, **values: Parameter) -> None:

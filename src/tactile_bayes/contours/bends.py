@@ -1,4 +1,4 @@
-"""Bends of measured points: whether heights along a line may be those of a convex contour."""
+"""Whether measured points may be those of a convex contour: in one band, and nowhere bent downward."""
 
 from __future__ import annotations
 
@@ -12,15 +12,18 @@ from scipy.stats import t as student_t
 from tactile_bayes.contours.base import Floats
 from tactile_bayes.errors import ContourError
 
-__all__ = ["FALSE_ALARM", "STRAIGHT", "Bends", "refuse_unless_convex"]
+__all__ = ["FALSE_ALARM", "STRAIGHT", "Bends", "refuse_two_bands", "refuse_unless_convex"]
 
-STRAIGHT = "; a contour must be curved: measure a longer stretch or more points"
+STRAIGHT = "; a contour must be curved: measure a longer stretch or more points, of the lower boundary only"
 
 FALSE_ALARM = 1e-3
 """How often points of a contour that is convex may be refused."""
 
 _SEEN = 3.0
 """Standard errors by which the points must bend upward as a whole."""
+
+_NEIGHBOURS, _FEWEST_BANDED = 8, 20
+"""Neighbouring points of which it is asked whether they are in two bands, and how many there must be in all."""
 
 
 class Bends(NamedTuple):
@@ -91,4 +94,32 @@ def refuse_unless_convex(bends: Bends, freedom: float, place: Callable[[float], 
         raise ContourError(
             f"from_points: the points cannot be told from a straight line: as a whole they bend upward by "
             f"{bends.errors[-1]:.1f} standard errors, and it takes {_SEEN:g} ({remark}){STRAIGHT}"
+        )
+
+
+def refuse_two_bands(x: Floats, y: Floats) -> None:
+    """Refuse points with two heights at about the same x, as those of a closed outline.
+
+    The heights of eight neighbours are parted at their widest gap. The lower ones of a convex contour are neighbours
+    again. Here upper and lower ones must take turns, with a gap twice as wide as what either part spans, in more than a
+    third of all such groups: of heights that only scatter one in 150 does so.
+    """
+    if x.size < _FEWEST_BANDED:
+        return
+    _, place = np.unique(x, return_inverse=True)
+    order = np.lexsort((np.where(place % 2, -y, y), x))  # where an x repeats, with as few turns as there can be
+    groups = sliding_window_view(y[order], _NEIGHBOURS)
+    heights = np.sort(groups, axis=1)
+    last = 1 + np.argmax(np.diff(heights, axis=1)[:, 1:-1], axis=1)  # at least two in either part
+    group = np.arange(len(groups))
+    below, above = heights[group, last], heights[group, last + 1]
+    spans = np.maximum(below - heights[:, 0], heights[:, -1] - above)
+    turns = np.count_nonzero(np.diff(groups > below[:, None], axis=1), axis=1)
+    banded = (above - below > 2.0 * spans) & (turns > 2)
+    if 3 * np.count_nonzero(banded) > banded.size:
+        at = int(np.argmax(np.where(banded, above - below, -np.inf)))
+        middle = float(np.round(x[order[at + _NEIGHBOURS // 2]], 12)) + 0.0
+        raise ContourError(
+            f"from_points: near x = {middle:.6g} there are points at y = {below[at]:.6g} and at y = {above[at]:.6g}, "
+            "as on a closed outline: give the lower boundary only, the side that faces the pivot"
         )

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Floats, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import Floats, Locus, Parameter
 from tactile_bayes.contours.oval import Oval
 
 __all__ = ["Ellipse"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ellipse(Oval):
     """Lower half of an ellipse, (x − x_c)²/a² + (y − q − b)²/b² = 1; it ends where it stands upright, at x = x_c ± a.
 
@@ -31,7 +32,7 @@ class Ellipse(Oval):
     Raises
     ------
     ContourError
-        If a half-axis is not positive, or a parameter is not finite.
+        If a half-axis is not positive, a parameter is not finite, or shapes do not broadcast.
 
     Examples
     --------
@@ -39,29 +40,25 @@ class Ellipse(Oval):
     np.float64(8.0)
     """
 
+    sizes: ClassVar = {"a": "half-axis", "b": "half-axis"}
+
     a: Parameter
     b: Parameter
     q: Parameter
     x_c: Parameter = 0.0
 
-    def __post_init__(self) -> None:
-        for name, axis in (("a", np.asarray(self.a)), ("b", np.asarray(self.b))):
-            rule = f"the half-axis {name} must be positive and finite"
-            refuse_unless((axis > 0) & np.isfinite(axis), "Ellipse", rule, **{name: axis})
-        refuse_unless(finite(self.q, self.x_c), "Ellipse", "q and x_c must be finite", q=self.q, x_c=self.x_c)
-
     @property
-    def half_width(self) -> Floats:
-        return np.asarray(self.a, dtype=float)
+    def half_axes(self) -> tuple[Parameter, Parameter]:
+        return self.a, self.b
 
     def locate(self, parameter: ArrayLike) -> Locus:
         t = np.asarray(parameter, dtype=float)  # the eccentric angle from the lowest point
-        a, b, q, x_c = (np.asarray(p, dtype=float) for p in (self.a, self.b, self.q, self.x_c))
+        a, b = self.a, self.b
         sin, cos = np.sin(t), np.cos(t)
         speed2 = (a * cos) ** 2 + (b * sin) ** 2
         x, y, slope, speed, bend = np.broadcast_arrays(
-            x_c + a * sin,
-            q + 2.0 * b * np.sin(0.5 * t) ** 2,
+            self.x_c + a * sin,
+            self.q + 2.0 * b * np.sin(0.5 * t) ** 2,
             np.arctan2(b * sin, a * cos),
             np.sqrt(speed2),
             a * b / speed2,
@@ -70,11 +67,5 @@ class Ellipse(Oval):
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = np.asarray(slope_angle, dtype=float)
-        t = np.arctan2(np.asarray(self.a) * np.sin(alpha), np.asarray(self.b) * np.cos(alpha))
+        t = np.arctan2(self.a * np.sin(alpha), self.b * np.cos(alpha))
         return np.where(np.abs(alpha) <= 0.5 * np.pi, t, np.nan)
-
-    def height(self, x: ArrayLike) -> Floats:
-        offset = np.asarray(x, dtype=float) - self.x_c
-        a, b = np.asarray(self.a, dtype=float), np.asarray(self.b, dtype=float)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(self.q + b * offset**2 / (a * (a + np.sqrt((a - offset) * (a + offset)))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,8 @@ from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.contours.base import Floats, Graph, Single
+from tactile_bayes.contours.joined import SAME_SLOPE
+from tactile_bayes.contours.rates import mismatch, probes
 from tactile_bayes.errors import ContourError
 
 __all__ = ["FunctionContour", "from_function"]
@@ -21,14 +23,20 @@ _MAX_DEGREE = 1024
 _RESOLVED = 1e-14
 """Share of the largest coefficient below which the last ones of a resolved function lie, per root of the degree."""
 
-_PROBES = 400
-"""Places, besides the ends, at which a function is tried."""
+_REFOUND = 64.0
+"""Multiple of that by which an interpolant may be off between its nodes."""
+
+_PROBES, _MANY_PROBES = 400, 1000
+"""Places, besides the ends, at which a function is tried: its derivatives, and its interpolant."""
+
+_PATCH = 32
+"""Degree of the interpolants by which a place is found where a function is not smooth."""
 
 _CONVEX = 1e-9
 """Negative second derivatives of this share of the largest are rounding."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FunctionContour(Graph, Single):
     """The graph of a function; see `from_function`."""
 
@@ -37,7 +45,7 @@ class FunctionContour(Graph, Single):
     curvature: Function
     left: float
     right: float
-    named: str = field(default="", compare=False)
+    named: str = ""
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
@@ -64,7 +72,8 @@ def from_function(
     """The contour y = g(x).
 
     Without derivatives the contour is g's Chebyshev interpolant, made fine enough to equal g up to rounding, so that
-    point, slope and curvature fit together exactly; for that g must be smooth on the whole domain.
+    point, slope and curvature fit together exactly; for that g must be smooth on the whole domain. With them it is g
+    itself, of which the curvature must be continuous. Where it jumps, join two functions: `Joined`.
 
     Parameters
     ----------
@@ -78,7 +87,7 @@ def from_function(
     Raises
     ------
     ContourError
-        If g is not strictly convex (the message says where), not finite, or not smooth; if derivatives given are none
+        If g is not strictly convex, not smooth or not finite (the message says where), or derivatives given are none
         of g.
 
     Examples
@@ -87,10 +96,16 @@ def from_function(
     >>> catenary.radius_of_curvature([0.0, 0.5]).round(12)  # 1/cos²α
     array([1.        , 1.29844641])
     """
-    lo, hi = (float(end) for end in domain)
     named = getattr(g, "__name__", repr(g))
+    try:
+        lo, hi = (float(end) for end in domain)
+    except (TypeError, ValueError):
+        raise ContourError(f"from_function: the domain is {domain!r}: give least and greatest x, (-1, 1)") from None
     if not (np.isfinite(lo) and np.isfinite(hi) and lo < hi):
         raise ContourError(f"from_function: the domain is ({lo}, {hi}): give two finite numbers, the smaller first")
+    for what, function in (("g", g), ("the slope", slope), ("the curvature", curvature)):
+        if function is not None and not callable(function):
+            raise ContourError(f"from_function: {what} is {function!r}: give a function of x")
     if (slope is None) != (curvature is None):
         raise ContourError("from_function: give both slope and curvature, or none of them")
     if slope is None or curvature is None:
@@ -104,8 +119,14 @@ def from_function(
 
 
 def _sampled(function: Function, x: Floats, what: str) -> Floats:
-    with np.errstate(all="ignore"):  # what is not finite is refused below
-        values = np.asarray(function(x), dtype=float)
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is refused below
+            values = np.asarray(function(x), dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ContourError(
+            f"from_function: {what} does not work on arrays ({error}): use functions of NumPy, np.cosh instead of "
+            "math.cosh, or wrap it, np.vectorize(g)"
+        ) from error
     if values.shape != x.shape:
         raise ContourError(
             f"from_function: for x of shape {x.shape} {what} gives {values.shape}: it must work on arrays, element by "
@@ -118,48 +139,120 @@ def _sampled(function: Function, x: Floats, what: str) -> Floats:
 
 
 def _resolved(g: Function, lo: float, hi: float, named: str) -> Chebyshev:
-    degree = 16
-    while degree <= _MAX_DEGREE:
-        interpolant = Chebyshev.interpolate(lambda x: _sampled(g, x, named), degree, domain=[lo, hi])
-        size = np.abs(interpolant.coef)
-        small = _RESOLVED * np.sqrt(degree) * size.max()
-        if np.all(size[-(degree // 8) :] <= small):
-            return interpolant.truncate(int(np.flatnonzero(size > small)[-1]) + 1)
-        degree *= 2
+    interpolant = _interpolant(g, lo, hi, named)
+    if interpolant is not None:
+        return interpolant
+    x = _probes(lo, hi, _MANY_PROBES)
+    heights = _sampled(g, x, named)
+    _refuse_dents(x, heights)
+    best = Chebyshev.interpolate(lambda x: _sampled(g, x, named), _MAX_DEGREE, domain=[lo, hi])
+    worst = x[np.argmax(np.abs(best(x) - heights))]
+    at = _rough_place(g, lo, hi, worst, named)
+    for share in (0.1, 0.01, 0.001):
+        near = _probes(max(lo, at - share * (hi - lo)), min(hi, at + share * (hi - lo)), _MANY_PROBES)
+        _refuse_dents(near, _sampled(g, near, named))
+    gap = 0.01 * (hi - lo)
+    if all(_interpolant(g, *part, named) for part in ((lo, at - gap), (at + gap, hi)) if part[0] < part[1]):
+        join = f"join two functions there, Joined(left, right, x={at:.6g})"
+        advice = join if _may_be_joined(g, lo, at, hi, named) else f"give slope and curvature, or if they jump, {join}"
+        raise ContourError(f"from_function: {named} is not smooth enough at x ≈ {at:.6g}: {advice}")
     raise ContourError(
         f"from_function: {named} is not smooth enough on ({lo:g}, {hi:g}) for a polynomial of degree {_MAX_DEGREE}: "
         "give slope and curvature, shrink the domain, or join smooth parts with Joined"
     )
 
 
-def _probes(contour: FunctionContour) -> Floats:
+def _interpolant(g: Function, lo: float, hi: float, named: str) -> Chebyshev | None:
+    """The interpolant that is g up to rounding, at its nodes and between them, if there is one."""
+    between = _probes(lo, hi, _MANY_PROBES)
+    heights = _sampled(g, between, named)
+    degree = 16
+    while degree <= _MAX_DEGREE:
+        interpolant = Chebyshev.interpolate(lambda x: _sampled(g, x, named), degree, domain=[lo, hi])
+        size = np.abs(interpolant.coef)
+        small = _RESOLVED * np.sqrt(degree) * size.max()
+        found = np.abs(interpolant(between) - heights).max() <= _REFOUND * small
+        if found and np.all(size[-(degree // 8) :] <= small):
+            return interpolant.truncate(int(np.flatnonzero(size > small)[-1]) + 1)
+        degree *= 2
+    return None
+
+
+def _may_be_joined(g: Function, lo: float, at: float, hi: float, named: str) -> bool:
+    """Whether the parts on both sides of a place are smooth up to there, and the slope does not fall."""
+    if not lo < at < hi:
+        return False
+    left, right = _interpolant(g, lo, at, named), _interpolant(g, at, hi, named)
+    return left is not None and right is not None and bool(left.deriv()(at) <= right.deriv()(at) + SAME_SLOPE)
+
+
+def _rough_place(g: Function, lo: float, hi: float, near: float, named: str) -> float:
+    """Where a function is not smooth: in the left, the middle or the right half, whichever is worst, and so on."""
+    size, width = np.abs(_sampled(g, _probes(lo, hi), named)).max(), hi - lo
+    lo, hi = max(lo, near - 0.02 * width), min(hi, near + 0.02 * width)
+    while hi - lo > 1e-6 * width:
+        quarter = 0.25 * (hi - lo)
+        halves = [(start, start + 2.0 * quarter) for start in (lo, lo + quarter, lo + 2.0 * quarter)]
+        misses = [_patch_miss(g, *half, named) for half in halves]
+        if max(misses) <= 10.0 * _RESOLVED * size:
+            break
+        lo, hi = halves[int(np.argmax(misses))]
+    return float(np.round(0.5 * (lo + hi), -int(np.ceil(np.log10(0.5 * (hi - lo)))))) + 0.0
+
+
+def _patch_miss(g: Function, lo: float, hi: float, named: str) -> float:
+    patch = Chebyshev.interpolate(lambda x: _sampled(g, x, named), _PATCH, domain=[lo, hi])
+    x = _probes(lo, hi, 2 * _PATCH)
+    return float(np.abs(patch(x) - _sampled(g, x, named)).max())
+
+
+def _probes(lo: float, hi: float, count: int = _PROBES) -> Floats:
     """Places to try, dense toward the ends, which are left out: there a contour may stand upright."""
-    inner = -np.cos(np.pi * (np.arange(_PROBES) + 0.5) / _PROBES)
-    return 0.5 * (contour.left + contour.right) + 0.5 * (contour.right - contour.left) * inner
+    return 0.5 * (lo + hi) + 0.5 * (hi - lo) * probes(count)
 
 
 def _refuse_other_derivatives(contour: FunctionContour) -> None:
-    """Each derivative, integrated between neighbouring probes, must be the change of what it is the derivative of."""
-    x = _probes(contour)
-    node, weight = np.polynomial.legendre.leggauss(8)
-    half = 0.5 * np.diff(x)
-    inside = 0.5 * (x[:-1] + x[1:])[:, None] + half[:, None] * node
+    """Each derivative must add up to what it is the derivative of, and not jump."""
+    width = contour.right - contour.left
+    x = _probes(contour.left, contour.right)
     pairs = (("slope", contour.slope, "function", contour.g), ("curvature", contour.curvature, "slope", contour.slope))
     for name, derivative, whose, of in pairs:
-        change = np.diff(_sampled(of, x, f"the {whose}"))
-        miss = np.abs(
-            _sampled(derivative, inside.ravel(), f"the {name}").reshape(inside.shape) @ weight * half - change
-        )
-        worst = int(np.argmax(miss))
-        if miss[worst] > 1e-6 * np.abs(change).max():
+
+        def rate(x: Floats, name: str = name, derivative: Function = derivative) -> Floats:
+            return _sampled(derivative, x, f"the {name}")
+
+        def function(x: Floats, whose: str = whose, of: Function = of) -> Floats:
+            return _sampled(of, x, f"the {whose}")
+
+        found = mismatch(rate, function, x)
+        if found is not None and np.isnan(found.miss):
+            at = float(np.round(found.right / width, 12) * width) + 0.0
+            before, after = rate(np.array([found.left, found.right]))
+            raise ContourError(
+                f"from_function: the {name} given jumps at x ≈ {at:.6g}, from {before:.3g} to {after:.3g}: the contour "
+                f"is not smooth there; join two functions there, Joined(left, right, x={at:.6g})"
+            )
+        if found is not None:
             raise ContourError(
                 f"from_function: the {name} given is not the derivative of the {whose}: from x = "
-                f"{x[worst]:.6g} to {x[worst + 1]:.6g} they differ by {miss[worst]:.3g}"
+                f"{found.left:.6g} to {found.right:.6g} they differ by {found.miss:.3g}"
             )
 
 
+def _refuse_dents(x: Floats, heights: Floats) -> None:
+    """Refuse heights of which some are above the chord of their neighbours."""
+    share = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
+    above = heights[1:-1] - (1.0 - share) * heights[:-2] - share * heights[2:]
+    dented = np.flatnonzero(above > 1e-12 * np.abs(heights).max())
+    if dented.size:
+        raise ContourError(
+            f"from_function: g is not strictly convex: it bends downward from x = {x[dented[0]]:.6g} to "
+            f"{x[dented[-1] + 2]:.6g}; the contour is the lower boundary of the object, so leave that stretch out"
+        )
+
+
 def _refuse_unless_convex(contour: FunctionContour) -> None:
-    x = _probes(contour)
+    x = _probes(contour.left, contour.right)
     bend = _sampled(contour.curvature, x, "the curvature")
     concave = bend < -_CONVEX * np.abs(bend).max()
     straight = (bend[1:] <= 0.0) & (bend[:-1] <= 0.0)

@@ -9,16 +9,25 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Index, Locus, Parameter, refuse_unless
+from tactile_bayes.contours.base import (
+    Contour,
+    Floats,
+    Index,
+    Locus,
+    Parameter,
+    as_parameter,
+    common_shape,
+    refuse_unless,
+)
 from tactile_bayes.errors import ContourError
 
-__all__ = ["Joined"]
+__all__ = ["SAME_SLOPE", "Joined"]
 
-_SAME_SLOPE = 1e-9
+SAME_SLOPE = 1e-9
 """Slope angles [rad] that differ by less are the same."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Joined(Contour):
     """The part of `left` up to the joint, and the part of `right` from there on.
 
@@ -56,7 +65,13 @@ class Joined(Contour):
     x: Parameter | None = None
 
     def __post_init__(self) -> None:
-        shape = np.broadcast_shapes(self.left.shape, self.right.shape, () if self.x is None else np.shape(self.x))
+        for name in ("left", "right"):
+            if not isinstance(getattr(self, name), Contour):
+                raise ContourError(f"Joined: {name} is {getattr(self, name)!r}: give a contour")
+        if self.x is not None:
+            self.__dict__["x"] = as_parameter("Joined", "x", self.x)
+        shapes = {"left": self.left.shape, "right": self.right.shape, "x": () if self.x is None else np.shape(self.x)}
+        shape = common_shape("Joined", **shapes)
         ends = []
         for half in (self.left, self.right):
             parameter = half.parameter_of_slope(0.0) if self.x is None else half.parameter_of_x(self.x)
@@ -75,12 +90,12 @@ class Joined(Contour):
         )
         edge = right.slope_angle - left.slope_angle
         refuse_unless(
-            edge >= -_SAME_SLOPE,
+            edge >= -SAME_SLOPE,
             "Joined",
             "the slope must not fall at the joint, else the object has a dent there",
             **{"left slope": np.tan(left.slope_angle), "right slope": np.tan(right.slope_angle)},
         )
-        joint = np.broadcast_arrays(before, after, np.where(edge > _SAME_SLOPE, edge, 0.0), np.empty(shape))
+        joint = np.broadcast_arrays(before, after, np.where(edge > SAME_SLOPE, edge, 0.0), np.empty(shape))
         self.__dict__.update(zip(("_before", "_after", "_edge"), joint, strict=False))
 
     @property

@@ -12,7 +12,7 @@ from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finit
 __all__ = ["Parabola"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Parabola(Contour):
     """y = a (x − x_c)² + q.
 
@@ -28,7 +28,7 @@ class Parabola(Contour):
     Raises
     ------
     ContourError
-        If a is not positive (the object would not be convex), or a parameter is not finite.
+        If a is not positive (the object would not be convex), a parameter is not finite, or shapes do not broadcast.
 
     Examples
     --------
@@ -42,9 +42,12 @@ class Parabola(Contour):
     x_c: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        a = np.asarray(self.a)
+        super().__post_init__()
         refuse_unless(
-            (a > 0) & np.isfinite(a), "Parabola", "a must be positive, else the object is not strictly convex", a=a
+            np.greater(self.a, 0.0) & np.isfinite(self.a),
+            "Parabola",
+            "a must be positive, else the object is not strictly convex",
+            a=self.a,
         )
         refuse_unless(finite(self.q, self.x_c), "Parabola", "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
@@ -56,9 +59,9 @@ class Parabola(Contour):
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = np.asarray(parameter, dtype=float)
         t = np.tan(alpha)
-        a, q, x_c = (np.asarray(p, dtype=float) for p in (self.a, self.q, self.x_c))
-        radius = (1.0 + t * t) ** 1.5 / (2.0 * a)
-        x, y, alpha, radius = np.broadcast_arrays(x_c + t / (2.0 * a), q + t * t / (4.0 * a), alpha, radius)
+        radius = (1.0 + t * t) ** 1.5 / (2.0 * self.a)
+        x, y = self.x_c + t / (2.0 * self.a), self.q + t * t / (4.0 * self.a)
+        x, y, alpha, radius = np.broadcast_arrays(x, y, alpha, radius)
         return Locus(x, y, alpha, radius, np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
@@ -66,7 +69,7 @@ class Parabola(Contour):
         return np.where(np.abs(alpha) < 0.5 * np.pi, alpha, np.nan)
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        return np.asarray(np.arctan(2.0 * np.asarray(self.a) * (np.asarray(x, dtype=float) - self.x_c)))
+        return np.asarray(np.arctan(2.0 * self.a * (np.asarray(x, dtype=float) - self.x_c)))
 
     def height(self, x: ArrayLike) -> Floats:
         return np.asarray(self.a * (np.asarray(x, dtype=float) - self.x_c) ** 2 + self.q)

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar, nnls
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours.base import Floats, Graph, Parameter, Single
-from tactile_bayes.contours.bends import STRAIGHT, Bends, refuse_unless_convex
+from tactile_bayes.contours.bends import STRAIGHT, Bends, refuse_two_bands, refuse_unless_convex
 from tactile_bayes.errors import ContourError
 
 __all__ = ["MeasuredContour", "from_points"]
@@ -104,8 +104,8 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     Raises
     ------
     ContourError
-        If the points are not convex beyond their scatter (the message names the stretch), upside down or not
-        distinguishable from a line; if they are too few, not finite, or a scatter is not positive.
+        If the points are not convex beyond their scatter (the message names the stretch), a closed outline, upside
+        down, or not distinguishable from a line; if they are too few, not finite, or a scatter is not positive.
 
     Examples
     --------
@@ -125,6 +125,7 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     tactile_bayes.errors.ContourError: from_points: the points are not convex from x = 0.176271 to 0.420339: ...
     """
     x, y, given = _checked(x, y, scatter)
+    refuse_two_bands(x, y)
     lo, hi = x.min(), x.max()
     middle, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
     u = (x - middle) / half

@@ -11,10 +11,10 @@ from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finit
 
 __all__ = ["PowerLaw"]
 
-_LEAST_EXPONENT = 1.1
+_LEAST_EXPONENT, _GREATEST_EXPONENT = 1.1, 50.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PowerLaw(Contour):
     """y = a |x − x_c|ⁿ + q.
 
@@ -27,14 +27,14 @@ class PowerLaw(Contour):
     a : array_like
         Factor, > 0 [length^(1 − n)].
     n : array_like
-        Exponent, ≥ 1.1.
+        Exponent, from 1.1 to 50.
     q, x_c : array_like
         Height and position of the vertex [length].
 
     Raises
     ------
     ContourError
-        If a is not positive, n is below 1.1, or a parameter is not finite.
+        If a is not positive, n is outside its range, a parameter is not finite, or shapes do not broadcast.
 
     Examples
     --------
@@ -50,15 +50,24 @@ class PowerLaw(Contour):
     x_c: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        a, n = np.asarray(self.a), np.asarray(self.n)
+        super().__post_init__()
         refuse_unless(
-            (a > 0) & np.isfinite(a), "PowerLaw", "a must be positive, else the object is not strictly convex", a=a
+            np.greater(self.a, 0.0) & np.isfinite(self.a),
+            "PowerLaw",
+            "a must be positive, else the object is not strictly convex",
+            a=self.a,
         )
         refuse_unless(
-            (n >= _LEAST_EXPONENT) & np.isfinite(n),
+            np.greater_equal(self.n, _LEAST_EXPONENT),
             "PowerLaw",
             f"n must be at least {_LEAST_EXPONENT}: below, the vertex is as good as an edge, which Joined can give",
-            n=n,
+            n=self.n,
+        )
+        refuse_unless(
+            np.less_equal(self.n, _GREATEST_EXPONENT),
+            "PowerLaw",
+            f"n must be at most {_GREATEST_EXPONENT:g}: above, the bottom is as good as straight",
+            n=self.n,
         )
         refuse_unless(finite(self.q, self.x_c), "PowerLaw", "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
@@ -72,12 +81,11 @@ class PowerLaw(Contour):
 
     def _powers(self) -> tuple[Floats, Floats, Floats]:
         """|x − x_c|, slope and y − q are these powers of |p|: p is the offset for n ≥ 2, else like the slope."""
-        n = np.asarray(self.n, dtype=float)
-        of_offset, of_slope = np.maximum(1.0, 1.0 / (n - 1.0)), np.maximum(1.0, n - 1.0)
+        of_offset, of_slope = np.maximum(1.0, 1.0 / (self.n - 1.0)), np.maximum(1.0, self.n - 1.0)
         return of_offset, of_slope, of_offset + of_slope
 
     def locate(self, parameter: ArrayLike) -> Locus:
-        p, a, n = (np.asarray(v, dtype=float) for v in (parameter, self.a, self.n))
+        p, a, n = np.asarray(parameter, dtype=float), self.a, self.n
         of_offset, of_slope, of_height = self._powers()
         size = np.abs(p)
         flat = size ** (of_offset - 1.0)
@@ -95,13 +103,12 @@ class PowerLaw(Contour):
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = np.asarray(slope_angle, dtype=float)
-        a, n = np.asarray(self.a, dtype=float), np.asarray(self.n, dtype=float)
         slope = np.where(np.abs(alpha) < 0.5 * np.pi, np.tan(alpha), np.nan)
-        return np.asarray(np.copysign((np.abs(slope) / (a * n)) ** (1.0 / self._powers()[1]), slope))
+        return np.asarray(np.copysign((np.abs(slope) / (self.a * self.n)) ** (1.0 / self._powers()[1]), slope))
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         offset = np.asarray(x, dtype=float) - self.x_c
         return np.asarray(np.copysign(np.abs(offset) ** (1.0 / self._powers()[0]), offset))
 
     def height(self, x: ArrayLike) -> Floats:
-        return np.asarray(self.q + self.a * np.abs(np.asarray(x, dtype=float) - self.x_c) ** np.asarray(self.n))
+        return np.asarray(self.q + self.a * np.abs(np.asarray(x, dtype=float) - self.x_c) ** self.n)

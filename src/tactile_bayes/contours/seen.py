@@ -93,6 +93,6 @@ class SeenContour:
         return np.asarray(sign * self.contour.take(lane).parameter_of_x(self.base_x[lane] + sign * x * length))
 
     def knots(self) -> Floats:
-        """Parameters, shape (knots, lanes), at which the radius of curvature jumps."""
+        """Parameters, shape (knots, lanes), at which the contour may not be smooth."""
         knots = np.array([np.broadcast_to(k, (self.lanes,)) for k in self.contour.knots], dtype=float)
         return np.where(self.mirrored, -1.0, 1.0) * knots.reshape(-1, self.lanes)

@@ -12,7 +12,17 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from tactile_bayes import chebyshev
-from tactile_bayes.contours.base import Contour, Floats, Index, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import (
+    Contour,
+    Floats,
+    Index,
+    Locus,
+    Parameter,
+    as_parameter,
+    common_shape,
+    finite,
+    refuse_unless,
+)
 from tactile_bayes.errors import ContourError
 
 __all__ = ["ShapeFree"]
@@ -62,27 +72,32 @@ class ShapeFree(Contour):
     at: float = 0.0
 
     def __post_init__(self) -> None:
-        knots, values = np.asarray(self.slope_angles, dtype=float), np.asarray(self.log_radius, dtype=float)
+        names = ("slope_angles", "log_radius", "x", "y", "at")
+        given = {name: np.asarray(as_parameter("ShapeFree", name, getattr(self, name))) for name in names}
+        knots, values, at = given["slope_angles"], given["log_radius"], given["at"]
         if knots.ndim != 1 or knots.size < 4 or not np.all(np.diff(knots) > 0.0) or np.any(np.abs(knots) > 0.5 * np.pi):
             raise ContourError("ShapeFree: slope_angles must be at least 4 increasing angles in [−π/2, π/2] radians")
         if values.shape[-1:] != knots.shape:
             raise ContourError(
                 f"ShapeFree: log_radius of shape {values.shape} has not one value for each of {knots.size} slope angles"
             )
-        if not knots[0] <= self.at <= knots[-1]:
+        if at.ndim or not knots[0] <= at <= knots[-1]:
             raise ContourError(f"ShapeFree: at = {self.at} is not among the slope angles {knots[0]:g} to {knots[-1]:g}")
+        shape = common_shape(
+            "ShapeFree", **{"log_radius[..., 0]": values.shape[:-1], "x": given["x"].shape, "y": given["y"].shape}
+        )
         refuse_unless(np.isfinite(values), "ShapeFree", "log_radius must be finite", log_radius=values)
-        refuse_unless(finite(self.x, self.y), "ShapeFree", "x and y must be finite", x=self.x, y=self.y)
-        shape = np.broadcast_shapes(values.shape[:-1], np.shape(self.x), np.shape(self.y))
+        refuse_unless(finite(given["x"], given["y"]), "ShapeFree", "x and y must be finite", x=given["x"], y=given["y"])
         self.__dict__.update(
             slope_angles=knots,
             log_radius=np.broadcast_to(values, (*shape, knots.size)),
-            x=np.broadcast_to(np.asarray(self.x, dtype=float), shape),
-            y=np.broadcast_to(np.asarray(self.y, dtype=float), shape),
+            x=np.broadcast_to(given["x"], shape),
+            y=np.broadcast_to(given["y"], shape),
+            at=float(at),
             _row=np.arange(math.prod(shape)).reshape(shape),
         )
         self.__dict__["_table"] = self._integrated()
-        x, y = self._evaluate(np.asarray(float(self.at)))[1:]
+        x, y = self._evaluate(at)[1:]
         self.__dict__["_table"][..., 1:, 0] += np.stack([self.x - x, self.y - y], axis=-1).reshape(-1, 1, 2)
 
     def _integrated(self) -> Floats:

@@ -1,0 +1,269 @@
+"""Whether the formulas of a family of contours fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.contours.base import Contour, Floats, Graph, Locus
+from tactile_bayes.contours.rates import Rate, mismatch, probes
+from tactile_bayes.errors import ContourError
+
+__all__ = ["check"]
+
+Lane = tuple[int, ...]
+
+_PROBES, _FEW = 400, 10
+"""Places at which rates are tried, and every how many of them the searches for a slope angle and an x."""
+
+_STEEPEST = 1.5
+"""Slope angles [rad] up to which a contour is tried."""
+
+_NEAREST, _ENDLESS = 1e-9, 62.0
+"""Endless parameters are first tried at the former times the hyperbolic sine of up to the latter, up to 4e17."""
+
+_STRAIGHT = 5
+"""Neighbouring places without curvature that make a contour straight; rounding may leave fewer."""
+
+_SAME = 1e-9
+"""Share of a contour's size, or angle [rad], that is rounding."""
+
+
+def check(contour: Contour) -> None:
+    """Refuse a contour whose formulas do not fit together, or which is not strictly convex: for a family of one's own.
+
+    Tried are 400 places a contour, where it is not steeper than 1.5 rad: the rates of point and slope angle against
+    their changes from place to place, the growth of the slope angle, height, and what finds the parameter of a slope
+    angle and of an x. Features much narrower than the distance of the places may be overlooked.
+
+    Parameters
+    ----------
+    contour : Contour
+        One contour, or many with arrays of parameters.
+
+    Raises
+    ------
+    ContourError
+        That says what is wrong, where on the contour, and by how much.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from tactile_bayes.contours import Graph, check
+    >>> @dataclass(frozen=True, eq=False)
+    ... class Wrong(Graph):
+    ...     a: float
+    ...
+    ...     def derivatives(self, x):
+    ...         return self.a * x**2, self.a * x, self.a + 0 * x
+    >>> check(Wrong(0.5))
+    Traceback (most recent call last):
+        ...
+    tactile_bayes.errors.ContourError: Wrong(a=0.5): g' is not the derivative of g: from x = ... they differ by ...
+    """
+    if not isinstance(contour, Contour):
+        raise ContourError(f"{contour!r} is no contour: give one, such as Parabola(0.5, 0.3)")
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is refused
+            _Checked(contour).run()
+    except ContourError:
+        raise
+    except (TypeError, ValueError, IndexError) as error:
+        raise ContourError(f"{contour}: its formulas do not work on arrays of any shape: {error}") from error
+
+
+class _Checked:
+    def __init__(self, contour: Contour) -> None:
+        self.contour, self.shape = contour, contour.shape
+
+    def run(self) -> None:
+        lo, hi = self._window()
+        places = lo + 0.5 * (hi - lo) * (1.0 + self._each(probes(_PROBES)))
+        knots = [np.clip(np.broadcast_to(knot, self.shape), lo, hi)[None] for knot in self.contour.knots]
+        stops = np.sort(np.concatenate([places, *knots]), axis=0)
+        self._refuse_falling(self._finite(stops))
+        self._refuse_rates(stops)
+        self._refuse_straight(self._finite(places))
+        self._refuse_picking(places[::_FEW])
+        self._refuse_searches(places[::_FEW])
+
+    def _each(self, values: Floats) -> Floats:
+        """The same values for each of the contours, along a first axis."""
+        return values.reshape(-1, *(1,) * len(self.shape)) + np.zeros(self.shape)
+
+    def _refusal(self, lane: Lane, what: str) -> ContourError:
+        which = f" at index {lane if lane[1:] else lane[0]}" if lane else ""
+        return ContourError(f"{self.contour}{which}: {what}")
+
+    def _window(self) -> tuple[Floats, Floats]:
+        """Parameters between which a contour is tried: short of upright, and of where an endless one is straight."""
+        lo, hi = (np.broadcast_to(end, self.shape).astype(float) for end in self.contour.domain)
+        if not np.all(lo < hi):
+            raise self._refusal((), f"its domain is {self.contour.domain}: the first must be the smaller")
+        begins, ends = np.isfinite(lo), np.isfinite(hi)
+
+        def parameter(way: Floats) -> Floats:
+            after, before, both = (_NEAREST * np.sinh(_ENDLESS * t) for t in (0.5 + 0.5 * way, 0.5 - 0.5 * way, way))
+            between = 0.5 * ((1.0 - way) * np.where(begins, lo, 0.0) + (1.0 + way) * np.where(ends, hi, 0.0))
+            endless = np.where(begins, lo + after, np.where(ends, hi - before, both))
+            return np.asarray(np.where(begins & ends, between, endless))
+
+        ways = np.linspace(-1.0, 1.0, _PROBES + 1)
+        locus = _Broadcast(self.contour.locate, parameter(self._each(ways)))
+        angle = locus.slope_angle
+        if np.any(lost := ~np.isfinite(angle).any(axis=0)):
+            raise self._refusal(_first(lost), "its slope angle is nowhere finite")
+        self._refuse_falling(locus)
+        margin = 0.05 * np.nanmax(angle, axis=0) - 0.05 * np.nanmin(angle, axis=0)
+        least = np.maximum(np.where(begins, -np.inf, np.nanmin(angle, axis=0) + margin), -_STEEPEST)
+        greatest = np.minimum(np.where(ends, np.inf, np.nanmax(angle, axis=0) - margin), _STEEPEST)
+
+        def bisected(inside: Floats, outside: Floats, within: Callable[[Floats], NDArray[np.bool_]]) -> Floats:
+            for _ in range(60):
+                middle = 0.5 * (inside + outside)
+                good = within(_Broadcast(self.contour.locate, parameter(middle)[None]).slope_angle[0])
+                inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
+            return parameter(inside)
+
+        steep_left, steep_right = ~(angle >= least), ~(angle <= greatest)
+        if np.any(lost := steep_left.all(axis=0) | steep_right.all(axis=0)):
+            raise self._refusal(_first(lost), f"it is nowhere less steep than {_STEEPEST} rad")
+        first, last = steep_left.argmin(axis=0), _PROBES - steep_right[::-1].argmin(axis=0)
+        return (
+            bisected(ways[first], ways[np.maximum(first - 1, 0)], lambda found: found >= least),
+            bisected(ways[last], ways[np.minimum(last + 1, _PROBES)], lambda found: found <= greatest),
+        )
+
+    def _finite(self, stops: Floats) -> _Broadcast:
+        locus = _Broadcast(self.contour.locate, stops)
+        for name, values in locus.items():
+            if np.any(bad := ~np.isfinite(values)):
+                at, *lane = _first(bad)
+                raise self._refusal(tuple(lane), f"{name} is {values[bad][0]} at parameter {stops[at, *lane]:.6g}")
+        return locus
+
+    def _refuse_falling(self, locus: _Broadcast) -> None:
+        """Refuse an x or a slope angle that falls along the contour; of several stretches the middle one is named."""
+        for name, values, unit in (("x", locus.x, ""), ("slope angle", locus.slope_angle, " rad")):
+            falls = np.diff(values, axis=0) < -_SAME * (1.0 if unit else np.abs(values[1:]))
+            if np.any(falls):
+                _, *lane = _first(falls)
+                at = np.flatnonzero(falls[_of(lane)])
+                runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
+                run = min(runs, key=lambda run: np.abs(run - len(falls) // 2).min())
+                first, last = (run[0], *lane), (run[-1] + 1, *lane)
+                raise self._refusal(
+                    tuple(lane),
+                    f"it is not strictly convex, or runs backward: its {name} falls from {values[first]:.4g} to "
+                    f"{values[last]:.4g}{unit}, from x = {_text(locus.x[first])} to {_text(locus.x[last])}",
+                )
+
+    def _refuse_rates(self, stops: Floats) -> None:
+        contour = self.contour
+        pairs: tuple[tuple[str, str, Rate, Rate], ...]
+        if isinstance(contour, Graph):
+
+            def derivative(order: int) -> Rate:
+                return lambda x: np.broadcast_to(contour.derivatives(x)[order], x.shape)
+
+            pairs = (("g'", "g", derivative(1), derivative(0)), ("g''", "g'", derivative(2), derivative(1)))
+        else:
+
+            def rate(of: Callable[[_Broadcast], Floats]) -> Rate:
+                return lambda p: of(_Broadcast(contour.locate, p))
+
+            pairs = (
+                (
+                    "arclength_rate · cos(slope_angle)",
+                    "x",
+                    rate(lambda at: at.arclength_rate * np.cos(at.slope_angle)),
+                    rate(lambda at: at.x),
+                ),
+                (
+                    "arclength_rate · sin(slope_angle)",
+                    "y",
+                    rate(lambda at: at.arclength_rate * np.sin(at.slope_angle)),
+                    rate(lambda at: at.y),
+                ),
+                ("slope_rate", "slope_angle", rate(lambda at: at.slope_rate), rate(lambda at: at.slope_angle)),
+            )
+        for name, whose, function, of in pairs:
+            found = mismatch(function, of, stops)
+            if found is None:
+                continue
+            ends = np.array([found.left, found.right])
+            x = [_text(v) for v in _Broadcast(contour.locate, self._each(ends)).x[_of(found.lane)]]
+            if np.isnan(found.miss):
+                raise self._refusal(found.lane, f"{name} jumps at x ≈ {x[1]}: name the parameter there in `knots`")
+            raise self._refusal(
+                found.lane,
+                f"{name} is not the derivative of {whose}: from x = {x[0]} to {x[1]} they differ by {found.miss:.3g}",
+            )
+
+    def _refuse_straight(self, locus: _Broadcast) -> None:
+        flat = (locus.slope_rate <= 0.0) & (locus.arclength_rate > 0.0)
+        if np.any(straight := sliding_window_view(flat, _STRAIGHT, axis=0).all(axis=-1)):
+            at, *lane = _first(straight)
+            x = _text(locus.x[at, *lane]), _text(locus.x[at + _STRAIGHT - 1, *lane])
+            raise self._refusal(tuple(lane), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
+
+    def _refuse_searches(self, stops: Floats) -> None:
+        contour, locus = self.contour, _Broadcast(self.contour.locate, stops)
+        size = np.abs(locus.x).max(axis=0) + np.abs(locus.y).max(axis=0)
+        x = contour.locate(contour.parameter_of_x(locus.x)).x
+        angle = contour.locate(contour.parameter_of_slope(locus.slope_angle)).slope_angle
+        steepness = 1.0 + np.abs(np.tan(locus.slope_angle))
+        for name, found, wanted, rounding in (
+            ("the height at x", contour.height(locus.x), locus.y, size * steepness),
+            ("the x that parameter_of_x finds", x, locus.x, size),
+            ("the slope angle that parameter_of_slope finds", angle, locus.slope_angle, 1.0),
+        ):
+            if np.any(bad := ~(np.abs(found - wanted) <= _SAME * rounding)):
+                at, *lane = _first(bad)
+                raise self._refusal(
+                    tuple(lane),
+                    f"{name} is {np.broadcast_to(found, stops.shape)[bad][0]:.6g} at x = "
+                    f"{_text(locus.x[at, *lane])}, not {wanted[bad][0]:.6g}",
+                )
+
+    def _refuse_picking(self, stops: Floats) -> None:
+        """Many contours are picked from by `broadcast_to` and `take`; families of one's own may spoil that."""
+        shape = self.shape or (1,)
+        index = tuple(axis.ravel() for axis in np.indices(shape))
+        picked = self.contour.broadcast_to(shape).take(index)
+        y = _Broadcast(self.contour.locate, stops).y.reshape(len(stops), -1)
+        found = np.broadcast_to(picked.locate(stops.reshape(y.shape)).y, y.shape)
+        if np.any(bad := ~(np.abs(found - y) <= _SAME * np.abs(y).max())):
+            raise self._refusal(
+                (), f"picked by broadcast_to and take it is at y = {found[bad][0]:.6g}, not {y[bad][0]:.6g}"
+            )
+
+
+class _Broadcast:
+    """A locus of which all members have the shape of the parameters."""
+
+    def __init__(self, locate: Callable[[Floats], Locus], stops: Floats) -> None:
+        locus = locate(stops)
+        self.x, self.y, self.slope_angle, self.arclength_rate, self.slope_rate = (
+            np.broadcast_to(np.asarray(values, dtype=float), stops.shape) for values in locus
+        )
+
+    def items(self) -> list[tuple[str, Floats]]:
+        return [(name, values) for name, values in vars(self).items()]
+
+
+def _first(bad: ArrayLike) -> Lane:
+    return tuple(int(i) for i in np.argwhere(bad)[0])
+
+
+def _of(lane: Sequence[int]) -> tuple[Any, ...]:
+    """Index of all values of one contour."""
+    return (slice(None), *lane)
+
+
+def _text(x: float) -> str:
+    return f"{0.0 if abs(x) < 1e-12 else float(x):.6g}"

@@ -1,0 +1,103 @@
+"""Whether one function is the derivative of another, judged by its integrals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contours.base import Floats
+
+__all__ = ["Mismatch", "Rate", "mismatch", "probes"]
+
+Rate = Callable[[Floats], Floats]
+
+_MISS = 1e-6
+"""Share of the largest change between neighbouring stops by which an integral may miss a change."""
+
+_ROUNDING = 16.0 * np.finfo(float).eps
+
+_SUSPECTS = 16
+"""How many of the worst stretches are looked into."""
+
+_HALVINGS = 8
+_SHRINKS = 0.25
+"""Where the derivative is right, the misses of a stretch shrink at least by this factor if it is halved so often: only
+those about a jump or a kink of it remain. Those of a wrong one add up to the same."""
+
+_JUMP = 1e-6
+"""Share of the largest rate by which it may change over a distance that rounding leaves."""
+
+
+class Mismatch(NamedTuple):
+    """A stretch over which a function is not the integral of another."""
+
+    left: float
+    right: float
+    miss: float
+    """By which they differ over the stretch; NaN where the derivative only jumps, at `right`."""
+    lane: tuple[int, ...]
+    """Which of many functions."""
+
+
+def probes(count: int) -> Floats:
+    """Places in (−1, 1), dense toward the ends.
+
+    They are a little to the left, so that zero, a likely place for a jump, is neither one of them nor in the middle
+    between two: there no integral would miss it.
+    """
+    return -np.cos(np.pi * (np.arange(count) + 0.38) / count)
+
+
+def mismatch(rate: Rate, of: Rate, stops: Floats) -> Mismatch | None:
+    """The worst stretch between stops over which a function changes by another amount than its rate adds up to.
+
+    A rate may have jumps at stops only: one elsewhere is named if there is no worse.
+
+    Parameters
+    ----------
+    rate, of : callable
+        From arguments of shape (k, ...) to values of that shape.
+    stops : ndarray, shape (n, ...)
+        Arguments, not falling along the first axis; of many functions along the others.
+    """
+    change, miss = _misses(rate, of, stops)
+    excess = miss - _MISS * np.abs(change).max(axis=0) - _ROUNDING * np.abs(of(stops)).max(axis=0)
+    jump = None
+    for place in np.argsort(excess, axis=None)[::-1][:_SUSPECTS]:
+        stretch, *lane = (int(i) for i in np.unravel_index(place, excess.shape))
+        at = (stretch, *lane)
+        if excess[at] <= 0.0:
+            break
+        ends = stops[stretch], stops[stretch + 1]
+        _, finer = _misses(rate, of, np.linspace(*ends, 2**_HALVINGS + 1))
+        if finer.sum(axis=0)[tuple(lane)] > _SHRINKS * miss[at]:
+            return Mismatch(float(stops[at]), float(stops[stretch + 1, *lane]), float(miss[at]), tuple(lane))
+        left, right, size = (v[tuple(lane)] for v in _steepest(rate, *ends))
+        if jump is None and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(lane)]:
+            jump = Mismatch(float(left), float(right), np.nan, tuple(lane))
+    return jump
+
+
+def _misses(rate: Rate, of: Rate, stops: Floats) -> tuple[Floats, Floats]:
+    """Changes between neighbouring stops, and by how much the integrals miss them, by eight Gauss–Legendre nodes."""
+    node, weight = np.polynomial.legendre.leggauss(8)
+    half, middle = 0.5 * np.diff(stops, axis=0), 0.5 * (stops[:-1] + stops[1:])
+    inside = middle[:, None] + half[:, None] * node.reshape(-1, *(1,) * (stops.ndim - 1))
+    rates = rate(inside.reshape(-1, *stops.shape[1:])).reshape(inside.shape)
+    change = np.diff(of(stops), axis=0)
+    return change, np.abs(np.tensordot(weight, rates, axes=(0, 1)) * half - change)
+
+
+def _steepest(rate: Rate, left: NDArray[np.floating], right: NDArray[np.floating]) -> tuple[Floats, Floats, Floats]:
+    """Neighbouring places between which a rate changes most, and by how much, halving where it does."""
+    a, b = rate(np.stack([left, right]))
+    for _ in range(60):
+        middle = 0.5 * (left + right)
+        (m,) = rate(middle[None])
+        first = np.abs(m - a) >= np.abs(b - m)
+        left, a = np.where(first, left, middle), np.where(first, a, m)
+        right, b = np.where(first, middle, right), np.where(first, m, b)
+    return np.asarray(left), np.asarray(right), np.abs(b - a)

@@ -1,0 +1,101 @@
+"""Many sweeps at once: arrays in the world's signs and units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.path import Paths
+from tactile_bayes.segments import first_of_lane
+from tactile_bayes.world import in_world
+
+__all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
+
+Floats = NDArray[np.float64]
+
+LOADS = ("holding_moment", "force_x", "force_y")
+
+SAMPLE_COLUMNS = (
+    *LOADS,
+    "contact_x",
+    "contact_y",
+    "slope_angle",
+    "contact_arclength",
+    "tip_angle",
+)
+"""What is known of every sample; loads are 0 out of contact, the rest NaN. The phase comes beside them."""
+
+EVENT_COLUMNS = ("drive_angle", "slope_angle", "contact_x", "contact_y")
+
+
+class ManyUnits(NamedTuple):
+    """Units of the rods of many sweeps, each a number for all or an array over lanes."""
+
+    length_unit: Any
+    moment_unit: Any
+    force_unit: Any
+
+    def of(self, lane: NDArray[np.intp]) -> ManyUnits:
+        return ManyUnits(*(value[lane] if isinstance(value, np.ndarray) else value for value in self))
+
+
+def sweep_samples(paths: Paths, drive_angles: Floats, units: ManyUnits) -> dict[str, NDArray[Any]]:
+    """What the base feels at drive angles, and the contacts, loads to some 1e-8 of the largest.
+
+    Parameters
+    ----------
+    paths : Paths
+        A lane for each sweep.
+    drive_angles : ndarray, shape (lanes, k)
+        In the world's sense [rad].
+    units : ManyUnits
+        Of the lanes' rods.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (lanes, k)
+        `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
+    """
+    seen = paths.seen
+    as_seen = np.where(seen.mirrored[:, None], np.pi - drive_angles, drive_angles)
+    lane, sample, states = paths.loaded_states(as_seen, polish=False)
+    found = in_world(seen, lane, states, units.of(lane))
+    out: dict[str, NDArray[Any]] = {}
+    for name in SAMPLE_COLUMNS:
+        out[name] = np.full(drive_angles.shape, 0.0 if name in LOADS else np.nan)
+        out[name][lane, sample] = found[name]
+    out["contact_phase"] = np.zeros(drive_angles.shape, dtype=np.int8)
+    out["contact_phase"][lane, sample] = states.wrench.phase
+    return out
+
+
+def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:
+    """ "first_contact" and "snap_off" of every lane: `EVENT_COLUMNS` in the world's sense, NaN where there is none."""
+    lanes = np.arange(paths.seen.lanes)
+    events = {}
+    for name, angle, parameter in (
+        ("first_contact", paths.first_angle, paths.first_parameter),
+        ("snap_off", paths.snap_angle, paths.snap_parameter),
+    ):
+        states = paths.states_at(lanes, parameter)
+        world = in_world(paths.seen, lanes, states, units.of(lanes))
+        turned = np.where(paths.seen.mirrored, np.pi - angle, angle)
+        events[name] = {**{column: world[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
+    return events
+
+
+def phases_of(paths: Paths) -> list[str]:
+    """Phases of every lane in their order, as "A-B-A" (A is tip contact, B tangential); "" where nothing touches."""
+    words = [""] * paths.seen.lanes
+    segments = paths.segments
+    first = first_of_lane(segments.lane)
+    for index, lane in enumerate(segments.lane.tolist()):
+        letter = "A" if segments.tip[index] else "B"
+        if first[index]:
+            words[lane] = letter
+        elif words[lane][-1] != letter:
+            words[lane] += f"-{letter}"
+    return words

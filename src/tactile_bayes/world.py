@@ -1,0 +1,69 @@
+"""States as the world has them: its signs for both directions, and the rod's units."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.elastica import PHASE_NAMES
+from tactile_bayes.path import States
+
+__all__ = ["RodUnits", "in_world"]
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class RodUnits(Protocol):
+    """What dimensionless numbers are multiplied with: a `Rod`, or arrays for many."""
+
+    @property
+    def length_unit(self) -> Any: ...
+    @property
+    def moment_unit(self) -> Any: ...
+    @property
+    def force_unit(self) -> Any: ...
+
+
+def in_world(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
+    """States on lanes in the world's signs and units; the contact point is the object's, not the centreline's.
+
+    Parameters
+    ----------
+    seen : SeenContour
+    lane : ndarray, shape (n,)
+    states : States
+        Of shape (n,).
+    rod : RodUnits
+        The units of the rod, or of each state's rod.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        By the names of a record's columns.
+    """
+    mirrored = seen.mirrored[lane]
+    sign = np.where(mirrored, -1.0, 1.0)
+    wrench = states.wrench
+    length, standoff = (v[lane] if isinstance(v, np.ndarray) else v for v in (seen.length, seen.standoff))
+    x = states.x - standoff / length * np.sin(states.slope_angle)
+    y = states.y + standoff / length * np.cos(states.slope_angle)
+
+    def turned(angle: Floats) -> Floats:
+        return np.where(mirrored, np.pi - angle, angle)
+
+    return {
+        "drive_angle": turned(wrench.drive_angle),
+        "holding_moment": sign * wrench.holding_moment * rod.moment_unit + 0.0,  # never −0
+        "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
+        "force_y": wrench.force_y * rod.force_unit,
+        "contact_arclength": wrench.contact_arclength * rod.length_unit,
+        "contact_phase": np.array(PHASE_NAMES)[wrench.phase],
+        "contact_x": seen.base_x[lane] + sign * x * rod.length_unit,
+        "contact_y": seen.base_y[lane] + y * rod.length_unit,
+        "tip_angle": turned(wrench.tip_angle),
+        "slope_angle": sign * states.slope_angle,
+    }

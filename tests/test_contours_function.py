@@ -1,0 +1,166 @@
+"""Contours from functions: narrow features, jumps and kinks, and whether the advice of a refusal works."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tactile_bayes import scan
+from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_function
+from tactile_bayes.errors import ContourError
+
+DOMAIN = (-2.0, 2.0)
+
+
+def bumped(size, width, at=0.3):
+    """A parabola with a bump, which is a dent where the size is positive."""
+    return lambda x: 0.3 + 0.5 * x**2 + size * np.exp(-(((x - at) / width) ** 2))
+
+
+# --- narrow features -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [0.02, 0.005, 0.001])
+@pytest.mark.parametrize("at", [0.3, -1.234, 1.9])
+def test_a_narrow_dent_is_refused_as_a_dent_with_its_place(width, at):
+    with pytest.raises(ContourError, match=r"not strictly convex: .* from x = ") as error:
+        from_function(bumped(0.05, width, at), DOMAIN)
+    words = str(error.value).replace(";", " ").split()
+    left, right = (float(words[words.index(word) + shift]) for word, shift in (("from", 3), ("to", 1)))
+    assert at - 12 * width < left < at + width
+    assert at - width < right < at + 12 * width
+
+
+def test_an_interpolant_is_the_function_between_its_nodes_too():
+    """Seventeen nodes on (−2, 2) would miss a groove of this width, which leaves the object convex."""
+    groove = bumped(-1e-3, 0.05, 0.11)
+    contour = from_function(groove, DOMAIN)
+    x = np.linspace(*DOMAIN, 5001)
+    np.testing.assert_allclose(contour.height(x), groove(x), rtol=0, atol=1e-11)
+    assert scan(contour).sweeps[0].snap_off.drive_angle != scan(Parabola(0.5, 0.3)).sweeps[0].snap_off.drive_angle
+
+
+def test_a_narrow_feature_with_its_derivatives():
+    """Narrower than the places at which derivatives are tried: they are right all the same."""
+    e = 1e-6
+    rounded = from_function(
+        lambda x: np.sqrt(x * x + e),
+        DOMAIN,
+        slope=lambda x: x / np.sqrt(x * x + e),
+        curvature=lambda x: e / np.sqrt(x * x + e) ** 3,
+    )
+    assert float(rounded.radius_of_curvature(0.0)) == pytest.approx(1e-3, rel=1e-9)
+    with pytest.raises(ContourError, match="the curvature given is not the derivative of the slope"):
+        from_function(
+            lambda x: np.sqrt(x * x + e),
+            DOMAIN,
+            slope=lambda x: x / np.sqrt(x * x + e),
+            curvature=lambda x: 1.1 * e / np.sqrt(x * x + e) ** 3,
+        )
+
+
+# --- jumps and kinks -------------------------------------------------------------------------------------------------
+
+
+def two_parabolas(at):
+    """y = x² and 0.5 x², shifted: the curvature jumps from 2 to 1."""
+    g = lambda x: 0.3 + np.where(x < at, 1.0, 0.5) * (x - at) ** 2  # noqa: E731
+    return g, lambda x: np.where(x < at, 2.0, 1.0) * (x - at), lambda x: np.where(x < at, 2.0, 1.0)
+
+
+@pytest.mark.parametrize("at", [0.0, 0.1, -0.7])
+@pytest.mark.parametrize("told", [False, True])
+def test_where_the_curvature_jumps_halves_are_asked_for_and_they_work(at, told):
+    g, slope, curvature = two_parabolas(at)
+    given = {"slope": slope, "curvature": curvature} if told else {}
+    with pytest.raises(ContourError, match=r"at x ≈ .*: .*join two functions there, Joined\(left, right, x=") as error:
+        from_function(g, DOMAIN, **given)
+    if told:
+        assert "the curvature given jumps" in str(error.value)
+        assert "from 2 to 1" in str(error.value)
+    x = float(str(error.value).rsplit("x=", 1)[1].rstrip(")"))
+    assert x == pytest.approx(at, abs=1e-12)
+    halves = [from_function(g, part) for part in ((DOMAIN[0], x), (x, DOMAIN[1]))]
+    whole, truth = Joined(*halves, x=x), Joined(Parabola(1.0, 0.3, at), Parabola(0.5, 0.3, at))
+    ours, theirs = (scan(contour, base=(at + 0.05, 0.0)) for contour in (whole, truth))
+    for direction in ("forward", "backward"):
+        a, b = (result.events[direction].snap_off for result in (ours, theirs))
+        assert a.drive_angle == pytest.approx(b.drive_angle, abs=1e-9)
+
+
+def test_an_edge_is_named():
+    with pytest.raises(ContourError, match=r"the slope given jumps at x ≈ 0\.3, from -0\.4 to 1\.6: .*Joined"):
+        from_function(
+            lambda x: np.abs(x - 0.3) + x**2,
+            DOMAIN,
+            slope=lambda x: np.where(x < 0.3, -1.0, 1.0) + 2 * x,
+            curvature=lambda x: 2.0 + 0.0 * x,
+        )
+
+
+@pytest.mark.parametrize("at", [0.0, 0.13])
+def test_a_power_with_a_broken_exponent_needs_its_derivatives_and_is_exact_with_them(at):
+    def g(x):
+        return 0.3 + np.abs(x - at) ** 2.5
+
+    with pytest.raises(ContourError, match=rf"not smooth enough at x ≈ {at:g}: give slope and curvature, or"):
+        from_function(g, DOMAIN)
+    contour = from_function(
+        g,
+        DOMAIN,
+        slope=lambda x: 2.5 * np.sign(x - at) * np.abs(x - at) ** 1.5,
+        curvature=lambda x: 3.75 * np.abs(x - at) ** 0.5,
+    )
+    ours, theirs = (scan(c, drive_step=0.1) for c in (contour, PowerLaw(1.0, 2.5, 0.3, at)))
+    for name in ("holding_moment", "force_x", "force_y"):
+        np.testing.assert_allclose(ours.record[name], theirs.record[name], rtol=0, atol=1e-11)
+    assert ours.sweeps[0].snap_off.drive_angle == pytest.approx(theirs.sweeps[0].snap_off.drive_angle, abs=1e-13)
+
+
+def test_kinks_at_several_places():
+    with pytest.raises(ContourError, match=r"not smooth enough on \(-2, 2\).*shrink the domain, or join smooth parts"):
+        from_function(lambda x: np.abs(x - 0.3) ** 2.5 + np.abs(x + 0.5) ** 2.5, DOMAIN)
+
+
+def test_wrong_derivatives_beside_a_jump_are_wrong():
+    g, slope, curvature = two_parabolas(0.0)
+    with pytest.raises(ContourError, match="the curvature given is not the derivative of the slope: from x = "):
+        from_function(g, DOMAIN, slope=slope, curvature=lambda x: curvature(x) + 0.01 * (x > 0.0))
+
+
+# --- what is no function ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: from_function(math.cosh, (-1, 1)), r"cosh does not work on arrays .*np\.vectorize\(g\)"),
+        (lambda: from_function(lambda x: x if x > 0 else -x, (-1, 1)), r"does not work on arrays .*np\.vectorize"),
+        (lambda: from_function(np.cosh, (-1, 1), slope=math.sinh, curvature=math.cosh), "the slope does not work on"),
+        (lambda: from_function(0.3, (-1, 1)), r"g is 0\.3: give a function of x"),
+        (lambda: from_function(np.cosh, (-1, 1), slope=0, curvature=1), "the slope is 0: give a function"),
+        (lambda: from_function(np.cosh, 1.0), r"the domain is 1\.0: give least and greatest x"),
+        (lambda: from_function(np.cosh, (-1, 0, 1)), r"the domain is \(-1, 0, 1\): give least and greatest x"),
+    ],
+)
+def test_refusals(build, message):
+    with pytest.raises(ContourError, match=message):
+        build()
+
+
+def test_functions_of_one_number_work_when_vectorised():
+    contour = from_function(np.vectorize(math.cosh), (-1, 1))
+    assert float(contour.height(0.3)) == pytest.approx(math.cosh(0.3), abs=1e-14)
+
+
+# --- equality, and parameters that are lists -------------------------------------------------------------------------
+
+
+def test_a_function_equals_itself_only():
+    one, other = from_function(np.cosh, (-1, 1)), from_function(np.cosh, (-1, 1))
+    assert one == one
+    assert one != other
+    assert len({one, other}) == 2
+    assert Joined(one, Circle(1.0, 1.0)) == Joined(one, Circle(1.0, 1.0))

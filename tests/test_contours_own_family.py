@@ -1,0 +1,347 @@
+"""Families of one's own: what `check` finds, parameters that are lists, and equality."""
+
+from __future__ import annotations
+
+import copy
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from helpers.contours_drawn import (
+    all_power_laws,
+    circles,
+    edges,
+    ellipses,
+    functions,
+    measured_contours,
+    parabolas,
+    shapes,
+    vertex_joints,
+)
+from tactile_bayes import scan
+from tactile_bayes.contours import (
+    Circle,
+    Contour,
+    Ellipse,
+    Graph,
+    Joined,
+    Locus,
+    Parabola,
+    PowerLaw,
+    ShapeFree,
+    Single,
+    check,
+    paper_profile,
+)
+from tactile_bayes.errors import ContourError
+
+# --- what is right ---------------------------------------------------------------------------------------------------
+
+FAMILIES = {
+    "parabola": parabolas,
+    "circle": circles,
+    "ellipse": ellipses,
+    "power-law": all_power_laws,
+    "vertex": vertex_joints(),
+    "edge": edges(),
+    "function": functions(),
+    "measured": measured_contours(),
+    "shape-free": shapes(),
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
+def test_every_family_is_right(family):
+    @settings(max_examples=15, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+    @given(family)
+    def right(contour):
+        check(contour)
+
+    right()
+
+
+A, Q = [0.03, 0.5, 300.0], [[0.3], [-20.0]]
+KNOTS = np.linspace(-1.3, 1.3, 5)
+
+
+@pytest.mark.parametrize(
+    "many",
+    [
+        Parabola(A, Q, 100.0),
+        Circle(A, Q),
+        Ellipse(A, 0.2, Q, 5.0),
+        PowerLaw(A, [[1.1], [50.0]], 0.3, 100.0),
+        Joined(Parabola(A, Q), PowerLaw(A, 4.0, Q)),
+        Joined(Parabola(0.2, Q, [1.0, 2.0]), Parabola(0.2, Q, [-1.0, -2.0]), x=0.0),
+        ShapeFree(KNOTS, np.multiply.outer(np.log(A), KNOTS), 0.1, Q),
+    ],
+    ids=lambda many: type(many).__name__,
+)
+def test_arrays_of_parameters_are_right(many):
+    check(many)
+
+
+@dataclass(frozen=True, eq=False)
+class Hyperbola(Graph):
+    """Endless, with slopes that end at ±45°, and a vertex that may be sharp and far away."""
+
+    size: float
+    x_c: float = 0.0
+
+    def derivatives(self, x):
+        u = x - self.x_c
+        y = np.sqrt(self.size**2 + u**2)
+        return y, u / y, self.size**2 / y**3
+
+
+def test_a_family_of_ones_own_that_is_right():
+    check(Hyperbola(0.3))
+    check(Hyperbola([0.3, 1e-3], [[0.0], [100.0]]))
+    alone = scan(Hyperbola(0.3)).sweeps[0].snap_off
+    assert np.isfinite(alone.drive_angle)
+    many = Hyperbola([0.3, 0.4])
+    assert many.shape == (2,)
+    np.testing.assert_allclose(many.height(0.2), np.sqrt(np.array([0.3, 0.4]) ** 2 + 0.04))
+
+
+# --- what is wrong ---------------------------------------------------------------------------------------------------
+
+
+def graph(g, slope, curvature, **members):
+    """A family of one parameter, k."""
+
+    def derivatives(self, x):
+        return g(x, self.k), slope(x, self.k), curvature(x, self.k)
+
+    family = type("Own", (Graph,), {"derivatives": derivatives, "__annotations__": {"k": float}, **members})
+    return dataclass(frozen=True, eq=False)(family)
+
+
+WRONG = {
+    "a wave": (
+        graph(lambda x, k: k + np.sin(x), lambda x, k: np.cos(x), lambda x, k: -np.sin(x)),
+        r"not strictly convex.*slope angle falls from 0\.785\d* to -0\.7\d* rad, from x = ",
+    ),
+    "a slope that is none": (
+        graph(lambda x, k: k * x**2, lambda x, k: k * x, lambda x, k: k + 0 * x),
+        r"g' is not the derivative of g: from x = .* they differ by",
+    ),
+    "a curvature that is none": (
+        graph(lambda x, k: k * x**2, lambda x, k: 2 * k * x, lambda x, k: k + 0 * x),
+        r"g'' is not the derivative of g': from x = .* they differ by",
+    ),
+    "a jump": (
+        graph(
+            lambda x, k: np.where(x < 0, k, 2 * k) * x**2,
+            lambda x, k: np.where(x < 0, k, 2 * k) * 2 * x,
+            lambda x, k: np.where(x < 0, k, 2 * k) * 2,
+        ),
+        r"g'' jumps at x ≈ 0: name the parameter there in `knots`",
+    ),
+    "a flat bottom": (
+        graph(
+            lambda x, k: k * np.maximum(np.abs(x) - 0.5, 0.0) ** 4,
+            lambda x, k: 4 * k * np.sign(x) * np.maximum(np.abs(x) - 0.5, 0.0) ** 3,
+            lambda x, k: 12 * k * np.maximum(np.abs(x) - 0.5, 0.0) ** 2,
+        ),
+        r"it is straight from x = -0\.4\d* to -0\.\d*",
+    ),
+    "no numbers": (
+        graph(lambda x, k: k * x**2 + 0 * np.sqrt(x + 1), lambda x, k: 2 * k * x, lambda x, k: 2 * k),
+        r"y is nan at parameter -",
+    ),
+    "no arrays": (
+        graph(lambda x, k: k * math.cosh(x), lambda x, k: k * math.sinh(x), lambda x, k: k * math.cosh(x)),
+        r"its formulas do not work on arrays",
+    ),
+    "a domain upside down": (
+        graph(
+            lambda x, k: k * x**2,
+            lambda x, k: 2 * k * x,
+            lambda x, k: 2 * k,
+            domain=property(lambda self: (np.asarray(1.0), np.asarray(-1.0))),
+        ),
+        r"its domain is .*the first must be the smaller",
+    ),
+    "another height": (
+        graph(
+            lambda x, k: k * x**2,
+            lambda x, k: 2 * k * x,
+            lambda x, k: 2 * k,
+            height=lambda self, x: self.k * np.asarray(x),
+        ),
+        r"the height at x is .* at x = .*, not",
+    ),
+    "another slope": (
+        graph(
+            lambda x, k: k * x**2,
+            lambda x, k: 2 * k * x,
+            lambda x, k: 2 * k,
+            parameter_of_slope=lambda self, slope_angle: np.tan(slope_angle) / self.k,
+        ),
+        r"the slope angle that parameter_of_slope finds is .* at x = .*, not",
+    ),
+    "other contours": (
+        graph(
+            lambda x, k: k * x**2,
+            lambda x, k: 2 * k * x,
+            lambda x, k: 2 * k,
+            broadcast_to=lambda self, shape: type(self)(np.full(shape, 0.4)),
+        ),
+        r"picked by broadcast_to and take it is at y = .*, not ",
+    ),
+}
+
+
+@pytest.mark.parametrize(("family", "message"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize("k", [0.3, [0.3, 0.5]], ids=["one", "two"])
+def test_what_is_wrong_is_said_with_its_place(family, message, k):
+    with pytest.raises(ContourError, match=message) as error:
+        check(family(k))
+    assert str(error.value).startswith("Own(k=")
+
+
+def test_of_many_the_wrong_one_is_named():
+    family = graph(
+        lambda x, k: k * x**2, lambda x, k: np.where(k == 0.7, 1.9, 2.0) * k * x, lambda x, k: 2.0 * k + 0 * x
+    )
+    check(family([[0.3], [0.5]]))
+    with pytest.raises(ContourError, match=r"at index \(1, 0\): g' is not the derivative of g"):
+        check(family([[0.3], [0.7]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Arc(Contour):
+    """A circle by another parameter, the arc length, with an error in one of its rates."""
+
+    r: float
+    error: float = 0.0
+
+    @property
+    def domain(self):
+        return -0.5 * np.pi * np.asarray(self.r), 0.5 * np.pi * np.asarray(self.r)
+
+    def locate(self, parameter):
+        p = np.asarray(parameter, dtype=float)
+        alpha = p / self.r
+        x, y = self.r * np.sin(alpha), self.r * (1.3 - np.cos(alpha))
+        return Locus(x, y, alpha, 1.0 + self.error + 0.0 * p, 1.0 / self.r + 0.0 * p)
+
+
+def test_rates_of_a_family_that_is_no_graph():
+    check(Arc(0.7))
+    check(Arc([0.7, 2.0]))
+    with pytest.raises(
+        ContourError, match=r"arclength_rate · cos\(slope_angle\) is not the derivative of x: from x = "
+    ):
+        check(Arc(0.7, error=1e-3))
+
+
+def test_what_is_no_contour():
+    with pytest.raises(ContourError, match="None is no contour"):
+        check(None)
+
+
+# --- parameters ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("listed", "arrays"),
+    [
+        (Parabola([0.5, 0.6], 0.3), Parabola(np.array([0.5, 0.6]), 0.3)),
+        (Circle([1, 2], 0.3), Circle(np.array([1.0, 2.0]), 0.3)),
+        (Ellipse([1, 2], 1, (0.3, 0.4)), Ellipse(np.array([1.0, 2.0]), 1.0, np.array([0.3, 0.4]))),
+        (PowerLaw([1, 2], 3, 0.3), PowerLaw(np.array([1.0, 2.0]), 3.0, 0.3)),
+        (
+            Joined(Parabola(0.2, 0.3, 1), Parabola(0.2, 0.3, -1), x=[0.0, 0.0]),
+            Joined(Parabola(0.2, 0.3, 1.0), Parabola(0.2, 0.3, -1.0), x=np.zeros(2)),
+        ),
+        (
+            ShapeFree(KNOTS.tolist(), [[0] * 5, [1] * 5], [0, 1], 0.3),
+            ShapeFree(KNOTS, np.array([[0.0] * 5, [1.0] * 5]), np.array([0.0, 1.0]), 0.3),
+        ),
+        (Hyperbola([0.3, 0.4]), Hyperbola(np.array([0.3, 0.4]))),
+    ],
+)
+def test_lists_are_arrays(listed, arrays):
+    assert listed.shape == (2,)
+    np.testing.assert_array_equal(listed.height(0.1), arrays.height(0.1))
+    assert listed == arrays
+    assert hash(listed) == hash(arrays)
+
+
+def test_numbers_stay_numbers():
+    contour = Parabola(np.float32(0.5), 1, np.array(0.25))
+    assert repr(contour) == "Parabola(a=0.5, q=1.0, x_c=0.25)"
+    assert {type(value) for value in vars(contour).values()} == {float}
+
+
+def test_a_contour_does_not_change_with_the_array_that_it_was_given():
+    a = np.array([0.5, 0.6])
+    contour = Parabola(a, 0.3)
+    a[0] = -1.0
+    np.testing.assert_array_equal(contour.a, [0.5, 0.6])
+
+
+def test_equality():
+    assert Parabola(0.5, 0.3) == Parabola(0.5, 0.3, 0.0)
+    assert Parabola(0.5, 0.3) != Parabola(0.5, 0.31)
+    assert Parabola(0.5, 0.3) != Circle(0.5, 0.3)
+    assert Parabola([0.5, 0.5], 0.3) != Parabola(0.5, 0.3)
+    assert Parabola(0.5, 0.3) != 0.5
+    assert paper_profile("IV", 0.3) == paper_profile("IV", 0.3) != paper_profile("IV", 0.4)
+    assert len({Parabola([0.5, 0.6], -0.0), Parabola((0.5, 0.6), 0.0), Parabola([0.6, 0.5], 0.0)}) == 2
+    many = Parabola([0.5, 0.6, 0.5], 0.3).broadcast_to((3,))
+    assert many.take(np.array([0, 1])) == many.take(np.array([2, 1]))
+    assert copy.deepcopy(many) == many
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Parabola([0.5, 0.6], [0.1, 0.2, 0.3]), "Parabola: a of shape (2,), q of shape (3,) do not broadcast"),
+        (lambda: Circle(1.0, [0.1, 0.2], [1, 2, 3]), "Circle: q of shape (2,), x_c of shape (3,) do not broadcast"),
+        (lambda: PowerLaw([1, 2], [3, 4, 5], 0.3), "PowerLaw: a of shape (2,), n of shape (3,) do not broadcast"),
+        (
+            lambda: Joined(Parabola([0.5, 0.6], 0.3), Parabola([0.5, 0.6, 0.7], 0.3)),
+            "Joined: left of shape (2,), right of shape (3,) do not broadcast",
+        ),
+        (
+            lambda: ShapeFree(KNOTS, np.zeros(5), [0, 1], [0.1, 0.2, 0.3]),
+            "ShapeFree: x of shape (2,), y of shape (3,) do not broadcast",
+        ),
+        (lambda: Parabola("wide", 0.3), "Parabola: a is 'wide': give a number, or an array of numbers"),
+        (lambda: Ellipse(1.0, None, 0.3), "Ellipse: b is None: give a number, or an array of numbers"),
+        (lambda: Circle([[1.0], [1.0, 2.0]], 0.3), "Circle: r is [[1.0], [1.0, 2.0]]: give a number, or an array"),
+        (lambda: Joined(Parabola(0.5, 0.3), 0.3), "Joined: right is 0.3: give a contour"),
+        (lambda: PowerLaw(1.0, 1000, 0.3), "PowerLaw: n must be at most 50: above, the bottom is as good as straight"),
+        (lambda: Hyperbola(np.abs), "Hyperbola: size is <ufunc 'absolute'>: give a number, or an array of numbers"),
+    ],
+)
+def test_parameters_that_are_none(build, message):
+    with pytest.raises(ContourError, match=re.escape(message)):
+        build()
+
+
+def test_the_largest_exponent_does_not_overflow():
+    """Warnings are errors here, and unit lengths are large."""
+    unit = 1000.0
+    contour = PowerLaw(unit**-49, 50.0, 0.3 * unit)
+    assert np.isfinite(contour.height([0.0, 900.0])).all()
+    assert np.isfinite(contour.point([-1.5, 1.5])).all()
+
+
+def test_a_contour_without_parameters():
+    class Bowl(Graph, Single):
+        def derivatives(self, x):
+            return 0.5 + x**4 + x**2, 4 * x**3 + 2 * x, 12 * x**2 + 2
+
+    bowl = Bowl()
+    check(bowl)
+    assert bowl == bowl != Bowl()
+    assert bowl in {bowl}
+    assert np.isfinite(scan(bowl).sweeps[0].snap_off.drive_angle)
