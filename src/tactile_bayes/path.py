@@ -10,27 +10,19 @@ interpolated.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, QuickWrench, Wrench, quick_wrench, wrench_from_contact
-from tactile_bayes.reach import CLEARANCE, Reach, limits, seen_frame
+from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, QuickWrench, Wrench, quick_wrench
+from tactile_bayes.reach import CLEARANCE, Reach, limits
 from tactile_bayes.roots import falling_root
-from tactile_bayes.segments import (
-    BRIEF,
-    Segments,
-    cut_path,
-    first_of_lane,
-    last_of_lane,
-    polish_changes,
-    resolved,
-    whole,
-)
+from tactile_bayes.segments import Segments, cut_path, first_of_lane, last_of_lane, polish_changes, resolved
+from tactile_bayes.snap_off import SnapOff, first_maximum, polish_fold
+from tactile_bayes.states import States, angle_rate, exact_states
 
 __all__ = ["CHANNELS", "CLEARANCE", "Paths", "Reach", "SnapOff", "States", "trace"]
 
@@ -51,30 +43,6 @@ _NO_MOMENT = 1e-12
 
 _LAST_STEP = 1e-6
 """Newton step on an interpolant, as a share of the segment, whose square is below the interpolation's error."""
-
-
-class SnapOff(IntEnum):
-    """How a path ends."""
-
-    NEVER = 0
-    FOLD = 1
-    """A smooth maximum of the drive angle."""
-    CORNER = 2
-    """The maximum lies where the phase changes or the contour's curvature jumps."""
-    THRUST = 3
-    """The line of force has come to pass through the pivot: no holding moment is left."""
-
-
-class States(NamedTuple):
-    """Exact states on the paths."""
-
-    parameter: Floats
-    """The contour's parameter, seen."""
-    x: Floats
-    y: Floats
-    """Point at which rod's centreline and the contour (seen) touch."""
-    slope_angle: Floats
-    wrench: Wrench
 
 
 @dataclass(frozen=True)
@@ -181,7 +149,7 @@ class Paths:
 
     def states_at(self, lane: Index, parameter: Floats) -> States:
         """Exact states at the contour's parameters, whether on the path or beyond its end."""
-        return _states(self.seen, lane, parameter, self.friction_angle)
+        return exact_states(self.seen, lane, parameter, self.friction_angle)
 
     def _interpolated(self, segment: Index, angle: Floats) -> Floats:
         """Way and loads at drive angles, shape (n, 4); `segment` grows."""
@@ -224,7 +192,7 @@ class Paths:
             reached = np.isfinite(state.wrench.drive_angle)  # but for rounding, which may undo the very first contact
             turn = np.where(reached, self._turn(segment[i], state.wrench.drive_angle), 0.0)
             with np.errstate(divide="ignore", invalid="ignore"):
-                rate = _angle_rate(self.seen, some.lane, state) * parameter_rate / (end[i] - begin[i])
+                rate = angle_rate(self.seen, some.lane, state) * parameter_rate / (end[i] - begin[i])
                 newton = (steady[i] + 2.0 * (1.0 - steady[i]) * (1.0 - turn)) / rate
                 # Much nearer to the end than the goal is, the rate may be zero or rounding: the interpolant's serves.
                 sound = (1.0 - turn > 0.5 * (1.0 - target[i])) & (newton > 0.0)
@@ -270,7 +238,7 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
 
     segments, series = resolved(segments, sample, order, tolerance)
     angle = series[..., 0]
-    keep, stop, kind = _first_maximum(segments, angle)
+    keep, stop, kind = first_maximum(segments, angle)
     runs_out = bounds.runs_out[segments.lane[keep]] & (kind == SnapOff.THRUST)
     bounds.reach[segments.lane[keep][runs_out]] = Reach.RUNS_OUT
     there = bounds.reach[segments.lane[keep]] == Reach.TOUCHES
@@ -278,14 +246,14 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     segments, angle, loads = segments.take(keep), angle[:, keep], series[:, keep, 1:]
     folds = kind == SnapOff.FOLD
     if exact_events:
-        stop = np.where(folds, _polish_fold(seen, segments, angle, stop, friction_angle), stop)
+        stop = np.where(folds, polish_fold(seen, segments, angle, stop, friction_angle), stop)
 
     # Over the drive angle: where on the way it takes the values that the nodes want.
     first, last = first_of_lane(segments.lane), last_of_lane(segments.lane)
     end_parameter, _ = segments.along(stop)
     end_angle = chebyshev.evaluate(angle, stop)
     if exact_events:
-        at_end = _states(seen, segments.lane, end_parameter, friction_angle).wrench
+        at_end = exact_states(seen, segments.lane, end_parameter, friction_angle).wrench
         end_angle = np.where(np.isfinite(at_end.drive_angle), at_end.drive_angle, end_angle)
         # At a flat vertex the maximum and the end of all moment are one, and rounding must not choose between them.
         kind = np.where(folds & (np.abs(at_end.holding_moment) <= _NO_MOMENT), np.int8(SnapOff.THRUST), kind)
@@ -326,19 +294,6 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     )
 
 
-def _states(
-    seen: SeenContour,
-    lane: Index,
-    parameter: Floats,
-    friction_angle: float,
-    *,
-    phase: NDArray[Any] | None = None,
-) -> States:
-    locus = seen.locate(lane, parameter)
-    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle, phase=phase)
-    return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
-
-
 def _sample(seen: SeenContour, segments: Segments, ways: Floats, friction_angle: float, exactly: bool) -> Floats:
     """Drive angle, holding moment and forces, shape (segments, 4, k), at ways, shape (segments, k)."""
     parameter, _ = segments.take(np.s_[:, None]).along(ways)
@@ -346,76 +301,11 @@ def _sample(seen: SeenContour, segments: Segments, ways: Floats, friction_angle:
     wrench: Wrench | QuickWrench
     if exactly or friction_angle:
         phase = np.where(tip, TIP, TANGENTIAL)
-        wrench = _states(seen, lane, parameter, friction_angle, phase=phase).wrench
+        wrench = exact_states(seen, lane, parameter, friction_angle, phase=phase).wrench
     else:
         locus = seen.locate(lane, parameter)
         wrench = quick_wrench(locus.x, locus.y, locus.slope_angle, tip)
     return np.stack([wrench.drive_angle, *(getattr(wrench, name) for name in CHANNELS)], axis=1)
-
-
-def _angle_rate(seen: SeenContour, lane: Index, state: States) -> Floats:
-    """Derivative of the drive angle by the contour's parameter."""
-    locus = seen.locate(lane, state.parameter)
-    along, facing = seen_frame(locus)
-    distance2 = locus.x**2 + locus.y**2
-    bearing_rate = -facing * locus.arclength_rate / distance2
-    with np.errstate(invalid="ignore"):
-        by_distance = state.wrench.by_distance * 2.0 * along * locus.arclength_rate
-        return bearing_rate + state.wrench.by_slope * (locus.slope_rate - bearing_rate) + by_distance
-
-
-def _first_maximum(segments: Segments, angle: Floats) -> tuple[Index, Floats, NDArray[np.int8]]:
-    """Segments up to the first maximum of the drive angle, how far each is followed, and how the last one ends."""
-    slope = chebyshev.derivative(angle)
-    grid = np.linspace(0.0, 1.0, 2 * angle.shape[0] + 1)
-    falls = chebyshev.tabulate(slope, grid) <= 0.0
-    falls[first_of_lane(segments.lane), 0] = False  # it always rises from first contact
-    begin, end = whole(segments)
-    falls[(begin - segments.end < BRIEF * (begin - end)) & ~last_of_lane(segments.lane)] = False  # lost in rounding
-    any_fall, cell = falls.any(axis=1), falls.argmax(axis=1)
-    fold = any_fall & (cell > 0)
-    before: Index = np.cumsum(any_fall) - any_fall
-    first = np.maximum.accumulate(np.where(first_of_lane(segments.lane), np.arange(before.size), 0))
-    keep = np.flatnonzero((before == before[first]) & (fold | ~any_fall))
-
-    bend = chebyshev.derivative(slope)
-    kept_fold = fold[keep]
-    at = keep[kept_fold]
-
-    def rate(i: Index, z: Floats) -> tuple[Floats, Floats]:
-        return chebyshev.evaluate(slope[:, at[i]], z), chebyshev.evaluate(bend[:, at[i]], z)
-
-    stop = np.ones(keep.size)
-    stop[kept_fold] = falling_root(rate, grid[cell[at] - 1], grid[cell[at]])
-    kind = np.full(keep.size, SnapOff.NEVER, dtype=np.int8)
-    ends = last_of_lane(segments.lane[keep])
-    kind[ends] = np.where(last_of_lane(segments.lane)[keep], SnapOff.THRUST, SnapOff.CORNER)[ends]
-    kind[kept_fold] = SnapOff.FOLD
-    return keep, stop, kind
-
-
-def _polish_fold(seen: SeenContour, segments: Segments, angle: Floats, stop: Floats, friction_angle: float) -> Floats:
-    """Ways at which the exact derivative of the drive angle vanishes: secants, the first by the interpolant."""
-
-    def rate(way: Floats) -> Floats:
-        parameter, parameter_rate = segments.along(way)
-        return (
-            _angle_rate(seen, segments.lane, _states(seen, segments.lane, parameter, friction_angle)) * parameter_rate
-        )
-
-    bend = chebyshev.evaluate(chebyshev.derivative(chebyshev.derivative(angle)), stop)
-    at_stop, last_step = rate(stop), np.full(stop.shape, 2e-2)
-    for _ in range(7):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = at_stop / bend
-            chosen = np.abs(step) < 0.5 * last_step
-            new = np.where(chosen, np.clip(stop - step, 0.0, 1.0), stop)
-            at_new = rate(new)
-            bend = np.where(chosen, (at_new - at_stop) / (new - stop), bend)
-        stop, at_stop, last_step = new, at_new, np.where(chosen, np.abs(step), last_step)
-        if not np.any(chosen):
-            break
-    return stop
 
 
 def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
