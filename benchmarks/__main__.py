@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,20 @@ SLOPES = 0.54, 0.12
 
 ANGLES = np.radians(np.arange(180.0))
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+SPECIFICATION: dict[str, Any] = {
+    "records": 2_000,
+    "seed": 1,
+    "contours": [
+        {
+            "family": "parabola",
+            "a": {"uniform": [0.3, 0.7]},
+            "q": {"uniform": [0.5, 0.7]},
+            "x_c": {"normal": [0.0, 0.05]},
+        }
+    ],
+    "scan": {"samples": 180},
+    "load_cell": {"force_noise": 0.05, "moment_noise": 0.02},
+}
 MANY = 100_000
 TIGHT = 1e-12
 """Tolerance at which accuracy is judged; what is timed has 1e-9."""
@@ -36,8 +51,9 @@ def main() -> None:
     with threadpool_limits(1):
         one, error_of_one = step_one()
         two, error_of_two = step_two()
-        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two])
-        print(f"\n{error_of_one}\n{error_of_two}")
+        of_records, rate = data_set()
+        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two, of_records])
+        print(f"\n{error_of_one}\n{error_of_two}\n{rate}")
         print("\nTime a piece, for ever more of them:")
         print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
         print_growth("sample, reconstruct", (1_000, 10_000, 100_000, 1_000_000), reconstruct)
@@ -106,6 +122,34 @@ def sweeps(by_hand: float) -> list[Row]:
         ),
     ]
     return [Row(f"{what}: solve_ivp and root / ours", n * by_hand, best_time(job) / of) for what, n, job, of in rows]
+
+
+def data_set() -> tuple[Row, str]:
+    """A record of a data set; by hand, every fourth state of the forward sweeps of its first four."""
+    records = SPECIFICATION["records"]
+    with TemporaryDirectory() as folder:
+        few = tb.datasets.generate({**SPECIFICATION, "records": 4}, mkdtemp(dir=folder), workers=1)
+        made = tb.datasets.open(few.parent).load()
+        ours = best_time(lambda: tb.datasets.generate(SPECIFICATION, mkdtemp(dir=folder), workers=1), 3) / records
+    touched = int(np.count_nonzero(made.truth_contact_phase != 0)) / 4
+    by_hand = touched * float(np.mean([time_by_hand(made.isel(record=k, sweep=0)) for k in range(4)]))
+    what = (
+        f"record of {made.sizes['sweep']} × {made.sizes['sample']} samples in a data set on disk, {touched:.0f} states"
+    )
+    return Row(f"{what}: solve_ivp and root / generate", by_hand, ours), (
+        f"Data set: {records:,} double sweeps along as many contours, truth and readings, {1.0 / ours:,.0f} records/s"
+    )
+
+
+def time_by_hand(sweep: xr.Dataset) -> float:
+    """Of a state, along every fourth sample in contact."""
+    some = sweep.isel(sample=np.flatnonzero(sweep.truth_contact_phase.values != 0)[::4])
+    contour = Parabola(*(float(some[f"truth_contour_{name}"]) for name in ("a", "q", "x_c")))
+    force = np.hypot(some.truth_force_x, some.truth_force_y)
+    columns = [some.drive_angle, some.truth_holding_moment, force, some.truth_contact_arclength]
+    first = tuple(float(column[0]) for column in columns)
+    slopes = some.truth_slope_angle.values
+    return best_time(lambda: sweep_by_shooting(contour, slopes, first), 1) / slopes.size
 
 
 def states(slopes: np.ndarray) -> np.ndarray:

@@ -80,6 +80,7 @@ def test_help_lists_the_commands():
     assert [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "] == [
         "infer",
         "demo",
+        "dataset",
     ]
 
 

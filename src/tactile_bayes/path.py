@@ -145,7 +145,13 @@ class Paths:
         # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
         rest = interpolated - self._interpolated(segment, states.wrench.drive_angle)
         loads = {name: getattr(states.wrench, name) + gap for name, gap in zip(CHANNELS, rest[:, 1:].T, strict=True)}
-        return lane, sample, states._replace(wrench=states.wrench._replace(**loads))
+        wrench = states.wrench._replace(**loads)
+        reached = wrench.phase != NONE  # but for rounding, which may undo the very first contact
+        states = States(
+            wrench=Wrench(*(column[reached] for column in wrench)),
+            **{name: column[reached] for name, column in states._asdict().items() if name != "wrench"},
+        )
+        return lane[reached], sample[reached], states
 
     def states_at(self, lane: Index, parameter: Floats) -> States:
         """Exact states at the contour's parameters, whether on the path or beyond its end."""

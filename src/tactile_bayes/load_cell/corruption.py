@@ -44,7 +44,9 @@ def corrupted_loads(sheet: DataSheet, loads: Floats, rng: np.random.Generator, n
         noise /= np.sqrt(rng.chisquare(sheet.degrees_of_freedom, loads.shape) / sheet.degrees_of_freedom)
     scale = np.asarray(noise_scale, dtype=float)
     readings += sheet.deviation(loads) * (scale[..., None, :] if scale.ndim else scale) * noise
-    return rounded(np.clip(readings, -sheet.limit, sheet.limit), sheet.resolution)
+    if math.isfinite(min(sheet.force_range, sheet.moment_range)):
+        readings = np.clip(readings, -sheet.limit, sheet.limit)
+    return rounded(readings, sheet.resolution)
 
 
 def corrupted_angles(sheet: DataSheet, angles: Floats, rng: np.random.Generator) -> Floats:

@@ -1,4 +1,4 @@
-"""The command line: parse, call, print."""
+"""The commands `infer` and `demo`: from a record to a contour."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from typer.core import TyperGroup
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,67 +15,13 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.ensembles import Progress
     from tactile_bayes.run import Run
 
-__all__ = ["app", "main"]
-
-
-class _Commands(TyperGroup):
-    """Refusals are one line on stderr and exit code 2, an interrupt is exit code 130."""
-
-    def invoke(self, ctx: Any) -> Any:
-        from tactile_bayes.errors import TactileBayesError
-
-        try:
-            return super().invoke(ctx)
-        except BrokenPipeError:  # whoever was reading has read enough
-            raise
-        except TactileBayesError as error:
-            words, code = str(error), 2
-        except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            words, code = where + (error.strerror or str(error)), 2
-        except KeyboardInterrupt:
-            words, code = "interrupted, results are incomplete", 130
-        typer.echo(f"tactile-bayes: {words}", err=True)
-        raise typer.Exit(code)
-
-
-app = typer.Typer(
-    cls=_Commands,
-    help="Contours from what a flexible rod's base feels: contact points, posteriors, bands.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+__all__ = ["demo", "infer"]
 
 Out = Annotated[Path, typer.Option(help="Folder for results; made if it is not there.", file_okay=False)]
 Seed = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")]
 
 
-def main() -> None:
-    """Entry point."""
-    app()
-
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        from tactile_bayes import __version__
-
-        typer.echo(__version__)
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: Annotated[
-        bool,
-        typer.Option("--version", help="Print the version and stop.", callback=_print_version, is_eager=True),
-    ] = False,
-) -> None:
-    pass
-
-
-@app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")
 def infer(
     record: Annotated[Path, typer.Argument(help="Record, .csv or .nc.")],
     out: Out,
@@ -168,7 +113,6 @@ def infer(
     _print_run(run, {})
 
 
-@app.command(epilog="Example: tactile-bayes demo --out results/demo")
 def demo(
     out: Out = Path("results/demo"),
     seed: Seed = 1,
@@ -273,7 +217,3 @@ def _digits(width: float) -> int:
     import math
 
     return max(0, min(12, 1 - math.floor(math.log10(width)))) if width > 0.0 else 6
-
-
-if __name__ == "__main__":
-    main()

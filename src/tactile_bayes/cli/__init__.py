@@ -1,0 +1,5 @@
+"""The command line: parse, call, print."""
+
+from tactile_bayes.cli.app import app, main
+
+__all__ = ["app", "main"]

@@ -1,0 +1,195 @@
+"""The commands `dataset ...`: synthetic data sets made, checked, and taken apart into records."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import FrameType
+
+    from tactile_bayes.datasets import Production
+    from tactile_bayes.datasets.manifest import Manifest
+
+__all__ = ["dataset"]
+
+dataset = typer.Typer(
+    help="Synthetic data sets, made from a specification.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Folder = Annotated[Path, typer.Argument(help="Folder of the data set.")]
+
+
+@dataset.command(epilog="Example: tactile-bayes dataset example > set.toml")
+def example() -> None:
+    """Print a commented specification to start from.
+
+    It explains every section, law and unit.
+    """
+    from importlib.resources import files
+
+    typer.echo(files("tactile_bayes.cli").joinpath("example.toml").read_text(encoding="utf-8"), nl=False)
+
+
+@dataset.command(epilog="Example: tactile-bayes dataset generate set.toml --out set/")
+def generate(
+    specification: Annotated[
+        Path, typer.Argument(metavar="SPEC.toml", help="What to draw, sweep and measure: see dataset example.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the data set; made if it is not there.", file_okay=False)],
+    workers: Annotated[
+        int | None, typer.Option(help="Processes on this machine; by default one for each core.", min=1)
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask scheduler in place of --workers, like tcp://10.0.0.1:8786."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False,
+) -> None:
+    """Make a data set, or go on where a run stopped.
+
+    The same specification gives the same numbers, however many workers there are.
+    """
+    from tactile_bayes import datasets
+    from tactile_bayes.datasets.manifest import read_manifest
+    from tactile_bayes.errors import ParameterError
+
+    if workers is not None and scheduler is not None:
+        raise ParameterError("--workers and --scheduler exclude each other: give one of them")
+    spec = datasets.read_specification(specification)
+    last: Production | None = None
+    try:
+        with _progress(spec.records, quiet) as show, _interrupts_kept() as raise_lost:
+
+            def note(production: Production) -> None:
+                nonlocal last
+                last = production
+                show(production)
+                raise_lost()
+
+            datasets.generate(spec, out, workers=workers, scheduler=scheduler, progress=note)
+    except KeyboardInterrupt:
+        have = f"{last.records:,} of {spec.records:,} records are in {out}" if last else "no further file was finished"
+        raise KeyboardInterrupt(f"interrupted, {have}: the same command goes on") from None
+    _print_result(out, read_manifest(out), last)
+
+
+@dataset.command(epilog="Example: tactile-bayes dataset verify set/ --regenerate 3")
+def verify(
+    folder: Folder,
+    regenerate: Annotated[int, typer.Option(help="Files to be made again, and compared number by number.", min=0)] = 0,
+) -> None:
+    """Check every byte of a data set.
+
+    Files are compared with the checksums in the manifest, which also says what the data set was made from.
+    """
+    from tactile_bayes import datasets
+
+    manifest = datasets.verify(folder, regenerate=regenerate)
+    count = len(manifest.shards)
+    typer.echo(f"{folder}: {_records(manifest.records)} in {_files(count)}, every byte as it was written")
+    if regenerate:
+        typer.echo(f"{_files(min(regenerate, count))} made again: every number is the same")
+
+
+@dataset.command(epilog="Example: tactile-bayes dataset record set/ 0 --out record.csv")
+def record(
+    source: Annotated[Path, typer.Argument(help="Folder of the data set, or its specification, .toml.")],
+    index: Annotated[int, typer.Argument(help="Number of the record; the first is 0.")],
+    out: Annotated[Path, typer.Option(help="File for the record, .csv or .nc.", dir_okay=False)],
+    truth: Annotated[
+        bool, typer.Option("--truth/--no-truth", help="With the columns of the truth, or as a laboratory has it.")
+    ] = True,
+) -> None:
+    """Write one record to a file, as `infer` takes it."""
+    from tactile_bayes import datasets, write_record
+
+    found = datasets.record(source, index, truth=truth)
+    write_record(found, out)
+    typer.echo(f"record {index} of {source}, {found.sizes['sample']} samples: {out}")
+
+
+@contextmanager
+def _progress(records: int, quiet: bool) -> Iterator[Callable[[Production], object]]:
+    """A bar that fills with records; none where nobody sees it move."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
+    from rich.text import Text
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield lambda production: None
+        return
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(f"{task.speed:,.0f} records/s" if task.speed else "")
+
+    words = (TextColumn("{task.description}"), Rate(), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
+    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
+        task = bar.add_task(f"{_records(records)} to be made", total=None, left="")
+
+        def show(production: Production) -> None:
+            description = f"{production.records:,} of {records:,} records"
+            bar.update(task, total=records, completed=production.records, description=description, left="left")
+
+        yield show
+
+
+@contextmanager
+def _interrupts_kept() -> Iterator[Callable[[], object]]:
+    """Raises an interrupt that was lost: Python ignores one that comes in the callback of a weak reference."""
+    import signal
+    import threading
+
+    usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if not usual or threading.current_thread() is not threading.main_thread():
+        yield lambda: None
+        return
+    has_come = False
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal has_come
+        has_come = True
+        raise KeyboardInterrupt
+
+    def raise_lost() -> None:
+        if has_come:
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield raise_lost
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _print_result(out: Path, manifest: Manifest, last: Production | None) -> None:
+    size = sum(shard.bytes for shard in manifest.shards)
+    made = "all were there already"
+    if last is not None:
+        made = f"{last.made:,} made in {last.seconds:.3g} s, {_rate(last)} records/s"
+    typer.echo(f"{_records(manifest.records)} in {_files(len(manifest.shards))}, {size / 1e6:,.1f} MB: {made}")
+    redrawn = manifest.redrawn
+    if total := sum(redrawn.values()):
+        why = ", ".join(f"{count:,} {reason}" for reason, count in redrawn.most_common())
+        typer.echo(f"{total:,} contours were drawn again: {why}")
+    typer.echo(f"{out / 'README.md'} says what is in the files")
+
+
+def _rate(production: Production) -> str:
+    return f"{production.made / max(production.seconds, 1e-9):,.0f}"
+
+
+def _records(count: int) -> str:
+    return f"{count:,} record" + "s" * (count != 1)
+
+
+def _files(count: int) -> str:
+    return f"{count:,} file" + "s" * (count != 1)

@@ -1,0 +1,100 @@
+"""The data card: a page about a data set for those who have only its folder."""
+
+from __future__ import annotations
+
+from tactile_bayes.datasets.laws import Law
+from tactile_bayes.datasets.manifest import Manifest
+from tactile_bayes.datasets.specification import Specification
+
+__all__ = ["CARD", "card"]
+
+CARD = "README.md"
+
+
+def card(spec: Specification, manifest: Manifest) -> str:
+    """The data card, in Markdown."""
+    size = sum(shard.bytes for shard in manifest.shards)
+    drawn = sum(manifest.redrawn.values())
+    bases = len(spec.bases)
+    where = "" if bases == 1 else f" from {bases} bases"
+    lines = [
+        f"# {spec.name}",
+        "",
+        *([spec.description.strip(), ""] if spec.description.strip() else []),
+        f"Simulated sweeps of a flexible rod on a pivot along strictly convex contours: {spec.records} records of "
+        f"{len(spec.sweeps)} sweeps ({', '.join(spec.directions)}{where}) with {spec.drive.samples} samples each, in "
+        f"{len(manifest.shards)} NetCDF files, {size / 1e6:.1f} MB. "
+        + ("Lengths in m, forces in N, moments in N m." if spec.units == "SI" else
+           "Lengths in rod lengths L, forces in EI/L², moments in EI/L, angles in rad."),
+        "",
+        "```python",
+        "import tactile_bayes as tb",
+        "",
+        'data = tb.datasets.open(".")  # xarray, nothing is read before it is used',
+        'record = tb.datasets.record(".", 0)  # one record, as infer_contour and the like take it',
+        "```",
+        "",
+        "## What is drawn",
+        "",
+        "| quantity | law |",
+        "|---|---|",
+    ]  # fmt: skip
+    for index, group in enumerate(spec.groups):
+        share = "in turn" if spec.each_group else f"weight {group.weight:g}"
+        lines.append(f"| **{group.family}** | {share if len(spec.groups) > 1 else 'always'} |")
+        lines += [f"| {group.family}: {name} | {_words(law)} |" for name, law in spec.groups[index].laws.items()]
+    for key, law in spec.laws:
+        if not key.startswith("contours["):
+            lines.append(f"| {key.removeprefix('scan.')} | {_words(law)} |")
+    drive = spec.drive
+    if drive.begin is None:
+        lines.append(f"| drive angles | from first contact to snap-off, and {drive.margin:g} of that on either side |")
+    else:
+        lines.append(f"| drive angles | {drive.begin:.6g} to {drive.end:.6g} rad |")
+    lines += [
+        f"| friction | {spec.friction:g} |",
+        f"| load cell's frame | {spec.frame} |",
+        "",
+        f"Draws that no sweep could use were drawn again: {drawn}"
+        + (f" ({', '.join(f'{count} {why}' for why, count in sorted(manifest.redrawn.items()))})." if drawn else "."),
+        "So the laws above are those of contours that every sweep reaches and that the rod is clear of after snap-off.",
+        "",
+        "## What is in the files",
+        "",
+        "Dimensions are record, sweep and sample. `drive_angle`, `holding_moment`, `force_x` and `force_y` are what "
+        "encoder and load cell read; what begins with `truth_` is what they would read without error, the contact (NaN "
+        "out of contact, where loads are 0), the contour's parameters (NaN where its family has none of that name), "
+        "and first contact, snap-off and phases of each sweep. Whole numbers with `flag_meanings` stand for words. "
+        f"Numbers over samples have {32 if spec.single else 64} bits; true loads are right to 1e-6 of the largest.",
+        "",
+        "## Where it is from",
+        "",
+        f"Seed {spec.seed}; specification {spec.sha256[:16]}…, whole in `manifest.json` with a checksum of each file: "
+        "`tactile-bayes dataset verify .` compares every byte. Made with "
+        + ", ".join(f"{name} {number}" for name, number in manifest.versions.items())
+        + "; the same specification gives the same numbers with these versions, whatever the workers.",
+        "",
+        "The physics: L. Merker, C. Will, J. Steigenberger, C. Behn, Math. Probl. Eng. 2018, 1613945, "
+        "doi 10.1155/2018/1613945.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _words(law: Law) -> str:
+    numbers = [f"{number:g}" for number in law.numbers]
+    match law.kind:
+        case "constant":
+            return numbers[0]
+        case "uniform":
+            return f"uniform from {numbers[0]} to {numbers[1]}"
+        case "log_uniform":
+            return f"log-uniform from {numbers[0]} to {numbers[1]}"
+        case "normal":
+            return f"normal, mean {numbers[0]}, standard deviation {numbers[1]}"
+        case "log_normal":
+            return f"log-normal, median {numbers[0]}, standard deviation of the logarithm {numbers[1]}"
+        case "choice":
+            return f"one of {', '.join(numbers)}"
+        case _:
+            return f"each of {', '.join(numbers)}"

@@ -1,0 +1,115 @@
+"""A data set on disk as one, opened without reading it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from tactile_bayes.datasets.manifest import Manifest, read_manifest
+from tactile_bayes.errors import SpecificationError
+
+__all__ = ["open_dataset", "opened_shard"]
+
+
+def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
+    """A data set as one xarray Dataset with dimensions record, sweep and sample; nothing is read before it is used.
+
+    Parameters
+    ----------
+    path : path-like
+        Its folder. It may still be in the making: then the shards that are there are opened.
+
+    Returns
+    -------
+    xr.Dataset
+        Select first, load then: `open(path).isel(record=slice(0, 100)).load()`. With Dask installed, `.chunk()` makes
+        it parallel.
+
+    Raises
+    ------
+    SpecificationError
+        If the folder holds no data set, or none of its shards is there yet.
+    """
+    folder = Path(path)
+    manifest = read_manifest(folder)
+    if not manifest.shards:
+        raise SpecificationError(f"{folder} holds no shard yet: run dataset generate again")
+    with opened_shard(folder / manifest.shards[0].file) as first:
+        numbers = np.concatenate([np.arange(s.first, s.first + s.records) for s in manifest.shards])
+        count = numbers.size
+        variables: dict[Any, Any] = {}
+        for name, variable in first.variables.items():
+            if name == "record":
+                variables[name] = ("record", numbers, variable.attrs)
+            elif variable.dims[:1] == ("record",):
+                array = _Shards(folder, manifest, str(name), (count, *variable.shape[1:]), variable.dtype)
+                variables[name] = xr.Variable(variable.dims, indexing.LazilyIndexedArray(array), variable.attrs)
+            else:
+                variables[name] = variable.copy(deep=True).load()
+        return xr.Dataset(variables, attrs=first.attrs).set_coords(list(first.coords))
+
+
+class _Shards(BackendArray):
+    """A variable of all shards, one after the other; files are open while they are read from, and no longer."""
+
+    def __init__(
+        self, folder: Path, manifest: Manifest, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]
+    ) -> None:
+        self.folder, self.name, self.shape, self.dtype = folder, name, shape, dtype
+        self.files = [shard.file for shard in manifest.shards]
+        self.starts = np.cumsum([0, *(shard.records for shard in manifest.shards)])
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
+        return np.asarray(
+            indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+        )
+
+    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        wanted, *rest = (np.arange(size)[k] for size, k in zip(self.shape, key, strict=True))
+        rows = np.atleast_1d(wanted)
+        shard = np.searchsorted(self.starts, rows, side="right") - 1
+        found = np.empty((rows.size, *(np.size(places) for places in rest)), dtype=self.dtype)
+        if found.size:
+            for run in np.split(np.arange(rows.size), np.flatnonzero(np.diff(shard)) + 1):
+                number = int(shard[run[0]])
+                found[run] = self._of_shard(number, [rows[run] - self.starts[number], *map(np.atleast_1d, rest)])
+        return found.reshape([places.size for places in (wanted, *rest) if np.ndim(places)])
+
+    def _of_shard(self, number: int, places: list[NDArray[np.intp]]) -> NDArray[Any]:
+        """What lies at the outer product of places: of their span, what is read in one piece."""
+        path = self.folder / self.files[number]
+        with _reading(path), h5py.File(path, "r") as file:
+            span = file[self.name][tuple(slice(int(p.min()), int(p.max()) + 1) for p in places)]
+        return np.asarray(span[np.ix_(*(p - p.min() for p in places))])
+
+
+def opened_shard(path: Path) -> xr.Dataset:
+    """A shard's file as a Dataset, to be closed; its numbers as they are stored.
+
+    Raises
+    ------
+    SpecificationError
+        If it cannot be read.
+    """
+    with _reading(path):
+        return xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False, cache=False)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except FileNotFoundError:
+        raise SpecificationError(f"{path} is gone: dataset generate makes it again") from None
+    except (OSError, KeyError) as error:
+        raise SpecificationError(f"{path} cannot be read ({error}): run dataset verify") from error

@@ -1,0 +1,245 @@
+"""The numbers of a data set: contours drawn until the rod reaches them, swept, and measured."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from tactile_bayes.contours.base import Contour
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS
+from tactile_bayes.datasets.measurement import measure
+from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.errors import ContourError, SpecificationError
+from tactile_bayes.path import Paths, Reach, trace
+from tactile_bayes.reach import clear_angle
+from tactile_bayes.sweeps import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
+
+__all__ = ["Records", "generate_records"]
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_ORDER = 32
+
+_MOST_DRAWS = 1000
+"""Draws of one record before the specification is given up."""
+
+_AT_ONCE = 500
+"""Draws that are tried together, while fewer records are left: what is drawn in vain costs less than to begin anew."""
+
+_GOOD = ""
+
+
+@dataclass(frozen=True)
+class Records:
+    """Records of a data set, as arrays."""
+
+    index: Index
+    family: Index
+    """Which group of the specification each contour is from, shape (n,)."""
+    drawn: dict[str, Floats]
+    """By the keys of the specification's laws, shape (n,), and "contours[…].log_radius", shape (n, knots); NaN where
+    another family's."""
+    sweep: dict[str, NDArray[Any]]
+    """Of each sweep, shape (n, sweeps): base_x, base_y, phases, and events."""
+    sample: dict[str, NDArray[Any]]
+    """Of each sample, shape (n, sweeps, samples): what was measured, and "truth_" columns."""
+    redrawn: Counter[str]
+    """Draws that came to nothing, by the reason."""
+
+
+_REASONS = {
+    Reach.TOUCHES: _GOOD,
+    Reach.TOO_FAR: "out of reach",
+    Reach.CUTS_PIVOT: "cuts the pivot",
+    Reach.ENDS: "first touched beyond its end",
+    Reach.TOO_CLOSE: "too close to the pivot",
+    Reach.RUNS_OUT: "still touched at its other end",
+}
+
+
+@threadpool_limits.wrap(limits=1)  # with more threads, products of matrices are rounded otherwise
+def generate_records(spec: Specification, begin: int, end: int) -> Records:
+    """Records from index `begin` to before `end`.
+
+    The random numbers of a record follow from the seed and its index alone; rounding may depend on which records are
+    made together, so that bit by bit only the same stretch gives the same numbers.
+
+    Raises
+    ------
+    SpecificationError
+        If of 1000 draws of a record none is a contour that every sweep can reach.
+    """
+    index = np.arange(begin, end)
+    streams = [np.random.default_rng(np.random.SeedSequence(spec.seed, spawn_key=(i, 0))) for i in index.tolist()]
+    keys = [key for key, _ in spec.laws]
+    free = {g: FAMILIES[group.family].draw_log_radius for g, group in enumerate(spec.groups)}
+    normals = KNOTS.size if any(free.values()) else 0
+    turns = _turns(spec, index)
+    drawn = {key: np.full(index.size, np.nan) for key in keys}
+    drawn |= {f"contours[{g}].{LOG_RADIUS}": np.full((index.size, normals), np.nan) for g in free if free[g]}
+    family = np.zeros(index.size, dtype=np.intp)
+    sweep: dict[str, NDArray[Any]] = {}
+    sample: dict[str, NDArray[Any]] = {}
+    redrawn: Counter[str] = Counter()
+    left, draws, ahead = np.arange(index.size), 0, 1
+    while left.size:
+        if draws == _MOST_DRAWS:
+            raise _hopeless(int(index[left[0]]), redrawn)
+        of_record = np.repeat(left, ahead)
+        pairs = [(streams[i].random(1 + len(keys)), streams[i].standard_normal(normals)) for i in of_record]
+        shares, normal = (np.array(part) for part in zip(*pairs, strict=True))
+        group = _group(spec, shares[:, 0], turns.get("contours"), of_record)
+        values = {
+            key: law.at(shares[:, 1 + k], turns[law.axis or key][of_record] if law.kind == "each" else of_record)
+            for k, (key, law) in enumerate(spec.laws)
+        }
+        for g, draw_log_radius in free.items():
+            if draw_log_radius is not None:
+                parameters = {name: values[f"contours[{g}].{name}"] for name in spec.groups[g].laws}
+                values[f"contours[{g}].{LOG_RADIUS}"] = draw_log_radius(parameters, normal)
+        why = np.empty(of_record.size, dtype=object)
+        found = []
+        for g in np.unique(group).tolist():
+            among = np.flatnonzero(group == g)
+            why[among], swept = _swept(spec, g, {k: v[among] for k, v in values.items()})
+            found.append((g, among[why[among] == _GOOD], swept))
+        is_good = (why == _GOOD).reshape(left.size, ahead)
+        before = is_good.cumsum(axis=1)
+        redrawn.update(why.reshape(left.size, ahead)[before == 0].tolist())
+        first = (is_good & (before == 1)).ravel()
+        for g, good, swept in found:
+            chosen = good[first[good]]
+            kept = of_record[chosen]
+            family[kept] = g
+            for key in drawn:
+                if not key.startswith("contours[") or key.startswith(f"contours[{g}]."):
+                    drawn[key][kept] = values[key][chosen]
+            for name, rows in swept.items():
+                place = sample if rows.ndim == 3 else sweep
+                if name not in place:
+                    place[name] = np.zeros(
+                        (index.size, *rows.shape[1:]), dtype=object if rows.dtype.kind == "U" else rows.dtype
+                    )
+                place[name][kept] = rows[first[good]]
+        left, draws = left[~is_good.any(axis=1)], draws + ahead
+        ahead = max(1, min(2 * ahead, max(_AT_ONCE, index.size) // max(left.size, 1), _MOST_DRAWS - draws))
+    measure(spec, index, drawn, sample)
+    return Records(index, family, drawn, sweep, sample, redrawn)
+
+
+def _hopeless(record: int, redrawn: Counter[str]) -> SpecificationError:
+    why_not = ", ".join(f"{count} {why}" for why, count in redrawn.most_common())
+    return SpecificationError(
+        f"record {record} was drawn {_MOST_DRAWS} times, and no contour was one that every sweep can reach (draws of "
+        f"its shard: {why_not}): are contours, bases and rod in one unit, and the contours above the pivots?"
+    )
+
+
+def _turns(spec: Specification, index: Index) -> dict[str, Index]:
+    """Which entry of each list a record has, by the key of the list."""
+    turns, rest = {}, index
+    for key, count in reversed(spec.lists):
+        turns[key], rest = rest % count, rest // count
+    return turns
+
+
+def _group(spec: Specification, share: Floats, turns: Index | None, left: Index) -> Index:
+    if turns is not None:
+        return turns[left]
+    weights = np.cumsum([group.weight for group in spec.groups])
+    return np.minimum(np.searchsorted(weights, share * weights[-1], side="right"), len(spec.groups) - 1)
+
+
+def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+    """Draws of one group: why each comes to nothing, `_GOOD` if it does not, and the sweeps of the good ones."""
+    prefix = f"contours[{g}]."
+    parameters = {key.removeprefix(prefix): v for key, v in values.items() if key.startswith(prefix)}
+    count = len(next(iter(parameters.values())))
+    why = np.full(count, "no contour", dtype=object)
+    built, contours = _built(spec.groups[g].family, parameters, count)
+    if contours is None:
+        return why, {}
+    lengths = values["rod.length"][built] if spec.rod else np.ones(built.size)
+    standoffs = 0.5 * values["rod.diameter"][built] if spec.rod else np.zeros(built.size)
+    sweeps = len(spec.sweeps)
+    base_x, base_y = (
+        np.concatenate([values[f"scan.bases[{b}][{axis}]"][built] for b, _ in spec.sweeps]) for axis in (0, 1)
+    )
+    backward = np.repeat([direction == "backward" for _, direction in spec.sweeps], built.size)
+    lane_of = np.tile(np.arange(built.size), sweeps)
+    seen = SeenContour(
+        contours.take(lane_of), base_x, base_y, np.tile(lengths, sweeps), np.tile(standoffs, sweeps), backward
+    )
+    paths = trace(seen, friction_angle=float(np.arctan(spec.friction)), order=_ORDER)
+    fate = paths.reach.reshape(sweeps, -1).max(axis=0)
+    with np.errstate(invalid="ignore"):
+        clear = (paths.snap_angle > clear_angle(seen)).reshape(sweeps, -1).all(axis=0)
+    reasons = np.array([_REASONS[Reach(reach)] for reach in range(len(_REASONS))], dtype=object)[fate]
+    why[built] = np.where((fate == Reach.TOUCHES) & ~clear, "not clear after snap-off", reasons)
+    return why, _recorded(spec, paths, why[built] == _GOOD, _units(spec, values, lane_of, built))
+
+
+def _built(family: str, parameters: Mapping[str, Floats], count: int) -> tuple[Index, Contour | None]:
+    """Contours of the draws that make one, with all parameters arrays, and which draws these are."""
+    definition = FAMILIES[family]
+    try:
+        return np.arange(count), definition.build(parameters).broadcast_to((count,))
+    except ContourError:
+        pass
+    good = []
+    for i in range(count):
+        try:
+            definition.build({name: values[i : i + 1] for name, values in parameters.items()})
+        except ContourError:
+            continue
+        good.append(i)
+    chosen = np.array(good, dtype=np.intp)
+    if not good:
+        return chosen, None
+    some = {name: values[chosen] for name, values in parameters.items()}
+    return chosen, definition.build(some).broadcast_to((chosen.size,))
+
+
+def _units(spec: Specification, values: Mapping[str, Floats], lane_of: Index, built: Index) -> ManyUnits:
+    if not spec.rod:
+        return ManyUnits(1.0, 1.0, 1.0)
+    length, rigidity = (values[f"rod.{name}"][built][lane_of] for name in ("length", "flexural_rigidity"))
+    return ManyUnits(length, rigidity / length, rigidity / length**2)
+
+
+def _recorded(spec: Specification, paths: Paths, good: NDArray[np.bool_], units: ManyUnits) -> dict[str, NDArray[Any]]:
+    """What the sweeps of the good contours record, shape (good, sweeps) or (good, sweeps, samples)."""
+    drive, lanes = spec.drive, paths.seen.lanes
+    way = np.linspace(0.0, 1.0, drive.samples)
+    if drive.begin is None or drive.end is None:
+        span = paths.snap_angle - paths.first_angle
+        begin = paths.first_angle - drive.margin * span
+        as_seen = begin[:, None] + ((1.0 + 2.0 * drive.margin) * span)[:, None] * way
+        angles = np.where(paths.seen.mirrored[:, None], np.pi - as_seen, as_seen)
+    else:
+        forward = drive.begin + (drive.end - drive.begin) * way
+        angles = np.where(paths.seen.mirrored[:, None], forward[::-1], forward)
+
+    def by_record(values: NDArray[Any]) -> NDArray[Any]:
+        return np.moveaxis(values.reshape(len(spec.sweeps), lanes // len(spec.sweeps), *values.shape[1:]), 0, 1)[good]
+
+    found = {
+        "base_x": paths.seen.base_x,
+        "base_y": paths.seen.base_y,
+        "phases": np.array(phases_of(paths), dtype=np.str_),
+    }
+    for event, columns in sweep_events(paths, units).items():
+        found |= {f"{event}_{name}": columns[name] for name in EVENT_COLUMNS}
+    found["snap_off_kind"] = paths.snap_off
+    samples = sweep_samples(paths, angles, units)
+    found["drive_angle"] = angles
+    found |= {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
+    return {name: by_record(values) for name, values in found.items()}

@@ -1,0 +1,195 @@
+"""The production of a data set: shard after shard, by as many workers as there are, and on from where it stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tactile_bayes.datasets.card import CARD, card
+from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
+from tactile_bayes.datasets.shard import Written, shard_file, write_shard
+from tactile_bayes.datasets.specification import Specification, read_specification
+from tactile_bayes.errors import SpecificationError
+from tactile_bayes.files import write_atomically
+from tactile_bayes.tasks import run_tasks
+
+__all__ = ["Production", "generate"]
+
+_NOTING = 0.05
+"""Share of the time that goes into notes of what is finished: what is not noted when all is killed is made again."""
+
+
+class Production(NamedTuple):
+    """How far a data set has come."""
+
+    records: int
+    """Records that are there."""
+    wanted: int
+    made: int
+    """Of those, made in this run."""
+    seconds: float
+    """Since this run began."""
+
+
+def generate(
+    spec: str | os.PathLike[str] | Mapping[str, Any] | Specification,
+    out: str | os.PathLike[str],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[Production], object] | None = None,
+) -> Path:
+    """Make the data set that a specification describes, or go on with it.
+
+    It may be killed at any moment and started again: files appear whole or not at all, and those that are there are
+    kept. The numbers do not depend on the workers, nor on the order of their work. In a script, call it under
+    `if __name__ == "__main__":`, as each process begins by importing the script; without, it raises TaskError.
+
+    Parameters
+    ----------
+    spec : path-like, mapping or Specification
+        A TOML file, or what it says.
+    out : path-like
+        Folder, made if it is not there: shards (NetCDF), manifest.json, and README.md, the data card.
+    workers : int, optional
+        Processes on this machine; by default one for each core.
+    scheduler : str, optional
+        Address of a Dask scheduler, in place of `workers`. Its workers need this package in the same version, and must
+        see the folder under the same path.
+    progress : callable, optional
+        Is given a `Production` after each shard.
+
+    Returns
+    -------
+    Path
+        The manifest.
+
+    Raises
+    ------
+    SpecificationError
+        If the specification is impossible, no contour is reached in 1000 draws, or the folder holds another data set,
+        or one that was begun with other versions, whose numbers may differ, or is being worked on.
+    ParameterError
+        If `workers` is no positive number, or the scheduler does not answer.
+    TaskError
+        If processes died over a shard again and again, or cannot begin.
+    OSError
+        If a file cannot be written. What is finished is kept.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> contours = [{"family": "parabola", "a": {"uniform": [0.3, 3.0]}, "q": {"uniform": [0.3, 0.7]}}]
+    >>> spec = {"records": 4, "seed": 1, "contours": contours, "load_cell": {"moment_noise": 0.02}}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     manifest = generate(spec, folder, workers=1)
+    ...     sorted(path.name for path in manifest.parent.iterdir())
+    ['README.md', 'manifest.json', 'shard-000000.nc']
+    """
+    spec = spec if isinstance(spec, Specification) else read_specification(spec)
+    folder = Path(out).resolve()
+    if folder.exists() and not folder.is_dir():
+        raise SpecificationError(f"{folder} is a file: give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    with _alone(folder):
+        manifest = _begun(spec, folder)
+        done = {shard.file for shard in manifest.shards}
+        tasks = [(spec.text, n, str(folder)) for n in range(spec.shards) if shard_file(n) not in done]
+        began, made, waiting = time.monotonic(), 0, list[Written]()
+        next_note = began
+        before = sum(shard.records for shard in manifest.shards)
+        try:
+            with closing(run_tasks(write_shard, tasks, workers=workers, scheduler=scheduler)) as results:
+                for _, written in results:
+                    waiting.append(written)
+                    made += written.records
+                    if (now := time.monotonic()) >= next_note:
+                        manifest, waiting = _noted(manifest, waiting, folder), []
+                        next_note = time.monotonic() + (time.monotonic() - now) / _NOTING
+                    if progress is not None:
+                        progress(Production(before + made, spec.records, made, time.monotonic() - began))
+        finally:
+            _sweep_up(folder)
+            manifest = _noted(manifest, waiting, folder)
+        _finish(spec, manifest, folder)
+    return folder / MANIFEST
+
+
+def _noted(manifest: Manifest, written: list[Written], folder: Path) -> Manifest:
+    manifest = manifest.having(written)
+    write_manifest(manifest, folder)
+    return manifest
+
+
+def _finish(spec: Specification, manifest: Manifest, folder: Path) -> None:
+    """Write the data card, and the manifest that vouches for it."""
+    content = card(spec, manifest).encode()
+    with write_atomically(folder / CARD) as temporary:
+        temporary.write_bytes(content)
+    write_manifest(replace(manifest, card_sha256=hashlib.sha256(content).hexdigest()), folder)
+
+
+def _sweep_up(folder: Path) -> None:
+    """Remove what files were begun and not finished."""
+    for suffix in (".nc", ".json", ".md"):
+        for leftover in folder.glob(f".*.tmp{suffix}"):
+            leftover.unlink(missing_ok=True)
+
+
+def _begun(spec: Specification, folder: Path) -> Manifest:
+    """What there is of the data set in a folder, without the files that are not whole."""
+    _sweep_up(folder)
+    if not (folder / MANIFEST).exists():
+        strangers = [*folder.glob("shard-*.nc"), *folder.glob(CARD)]
+        if strangers:
+            raise SpecificationError(
+                f"{folder} holds {strangers[0].name}, but no {MANIFEST}: choose another folder, or empty this one"
+            )
+        manifest = Manifest.of(spec)
+        write_manifest(manifest, folder)
+        return manifest
+    manifest = read_manifest(folder)
+    if manifest.specification_sha256 != spec.sha256:
+        raise SpecificationError(
+            f"{folder} holds a data set of another specification ({manifest.name!r}): choose another folder, or give "
+            "the specification that its manifest states"
+        )
+    whole = tuple(
+        s for s in manifest.shards if (folder / s.file).is_file() and (folder / s.file).stat().st_size == s.bytes
+    )
+    manifest = replace(manifest, shards=whole)
+    here = versions_here()
+    other = [f"{name} {was} (now {here.get(name)})" for name, was in manifest.versions.items() if here.get(name) != was]
+    if other and not manifest.is_complete:
+        raise SpecificationError(
+            f"{folder} was made with {', '.join(other)}, and numbers may differ in the last digit: go on with those "
+            "versions, or start again in another folder"
+        )
+    return manifest
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder, where the system can; the lock goes with the process."""
+    try:
+        import fcntl
+    except ImportError:  # Windows: two runs would write the same files twice
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SpecificationError(f"another run is at work on {folder}: wait for it, or stop it") from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(handle)

@@ -1,0 +1,218 @@
+"""A shard: some records of a data set in one NetCDF file."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.datasets.families import KNOTS, LOG_RADIUS
+from tactile_bayes.datasets.generation import Records, generate_records
+from tactile_bayes.datasets.netcdf import netcdf_of
+from tactile_bayes.datasets.specification import Specification, read_text
+from tactile_bayes.elastica import PHASE_NAMES
+from tactile_bayes.files import write_atomically
+from tactile_bayes.path import SnapOff
+from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
+
+__all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]
+
+_LONGEST = 9
+"""Phases in a sweep, at most."""
+
+PHASE_SEQUENCES = tuple(
+    "-".join("AB"[(start + k) % 2] for k in range(length)) for length in range(1, _LONGEST + 1) for start in (0, 1)
+)
+
+_PARAMETERS = {
+    "a": "coefficient a, or horizontal half-axis of an ellipse",
+    "b": "vertical half-axis",
+    "n": "exponent",
+    "q": "height of the vertex",
+    "r": "radius",
+    "x_c": "position of the vertex",
+    "radius": "typical radius of curvature",
+    "amplitude": "standard deviation of the logarithm of the radius of curvature",
+    "length_scale": "slope angle over which the radius of curvature changes",
+    LOG_RADIUS: "natural logarithm of the radius of curvature, a cubic spline over the slope angle, at its knots",
+}
+
+
+class Written(NamedTuple):
+    """A shard that lies on disk."""
+
+    file: str
+    first: int
+    records: int
+    bytes: int
+    sha256: str
+    redrawn: dict[str, int]
+
+
+def shard_file(shard: int) -> str:
+    """Name of the file of a shard."""
+    return f"shard-{shard:06d}.nc"
+
+
+def write_shard(task: tuple[str, int, str]) -> Written:
+    """Generate a shard of the specification with this text, and write it whole into a folder.
+
+    Parameters
+    ----------
+    task : (str, int, str)
+        Text of the specification, number of the shard, folder.
+
+    Raises
+    ------
+    SpecificationError
+        If no contour is reached in 1000 draws of a record.
+    OSError
+        If the file cannot be written; there is then none of its name.
+    """
+    text, shard, folder = task
+    spec = _parsed(text)
+    begin = shard * spec.shard_records
+    records = generate_records(spec, begin, min(begin + spec.shard_records, spec.records))
+    content = netcdf_of(records_as_dataset(spec, records))
+    path = Path(folder) / shard_file(shard)
+    try:
+        with write_atomically(path) as temporary:
+            temporary.write_bytes(content)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    digest = hashlib.sha256(content).hexdigest()
+    redrawn = {reason: count for reason, count in sorted(records.redrawn.items()) if count}
+    return Written(path.name, begin, records.index.size, len(content), digest, redrawn)
+
+
+@lru_cache(maxsize=1)
+def _parsed(text: str) -> Specification:
+    return read_text(text)
+
+
+def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
+    """Records with dimensions record, sweep and sample, as they lie in a shard."""
+    variables: dict[str, Any] = {}
+    families = [group.family for group in spec.groups]
+    variables["truth_family"] = ("record", records.family.astype(np.int16), _flags("family of the contour", families))
+    variables |= _parameters(spec, records)
+    for name, values in records.drawn.items():
+        if name.startswith("rod."):
+            entry = name.replace(".", "_")
+            unit = {"rod_flexural_rigidity": "N m²"}.get(entry, "m")
+            variables[entry] = ("record", values, {"units": unit, "long_name": entry.replace("_", " ")})
+        elif name.startswith("load_cell."):
+            entry = name.removeprefix("load_cell.")
+            unit = LOAD_CELL_UNITS[entry] if spec.units == "SI" else _plain(LOAD_CELL_UNITS[entry])
+            long_name = f"load cell's {entry.replace('_', ' ')}"
+            variables[f"load_cell_{entry}"] = ("record", values, {"units": unit, "long_name": long_name})
+    variables |= _of_sweeps(spec, records.sweep)
+    variables |= _of_samples(spec, records.sample)
+    coords: dict[str, Any] = {
+        "record": ("record", records.index.astype(np.int64), {"long_name": "number of the record in the data set"}),
+        "sweep": ("sweep", np.arange(len(spec.sweeps)), {"long_name": "number of the sweep in the record"}),
+    }
+    if f"truth_contour_{LOG_RADIUS}" in variables:
+        coords["knot"] = ("knot", KNOTS, {"units": "rad", "long_name": "slope angle of a knot"})
+    attrs: dict[str, str | float] = {
+        "title": spec.name,
+        "units": spec.units,
+        "load_cell_frame": spec.frame,
+        "friction": spec.friction,
+        "specification_sha256": spec.sha256,
+    }
+    return xr.Dataset(variables, coords, attrs)
+
+
+def _flags(long_name: str, meanings: list[str] | tuple[str, ...], kind: Any = np.int16) -> dict[str, Any]:
+    """Attributes of numbers that stand for words, as the CF conventions have them."""
+    words = " ".join(meaning.replace(" ", "_") for meaning in meanings)
+    return {"long_name": long_name, "flag_values": np.arange(len(meanings), dtype=kind), "flag_meanings": words}
+
+
+def _parameters(spec: Specification, records: Records) -> dict[str, tuple[tuple[str, ...], NDArray[Any], Any]]:
+    """Parameters of the contours by name, NaN where a family has no such."""
+    found: dict[str, tuple[tuple[str, ...], NDArray[Any], Any]] = {}
+    for g, group in enumerate(spec.groups):
+        names = [name for name in (*group.laws, LOG_RADIUS) if f"contours[{g}].{name}" in records.drawn]
+        for name in names:
+            values = records.drawn[f"contours[{g}].{name}"]
+            stem = name.removeprefix("left_").removeprefix("right_")
+            side = f" of the {name.split('_')[0]} flank" if stem != name else ""
+            key = f"truth_contour_{name}"
+            if key in found:
+                values = np.where(np.isnan(values), found[key][1], values)
+            attrs = {"units": _parameter_unit(spec, name, stem), "long_name": _PARAMETERS[stem] + side}
+            found[key] = (("record", "knot")[: values.ndim], values, attrs)
+    return found
+
+
+def _parameter_unit(spec: Specification, name: str, stem: str) -> str:
+    """Unit of a parameter, "see family" where families differ."""
+    if stem == "length_scale":
+        return "rad"
+    if spec.units != "SI" or stem in ("n", "amplitude", LOG_RADIUS):
+        return "1"
+    if stem != "a":
+        return "m"
+    families = {group.family for group in spec.groups if name in group.laws}
+    units = {"parabola": "1/m", "ellipse": "m"}
+    kinds = {units.get(f, "m^(1-n)" if f == "power-law" else "see family") for f in families}
+    return kinds.pop() if len(kinds) == 1 else "see family"
+
+
+def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    dims = ("record", "sweep")
+    backward = np.array([direction == "backward" for _, direction in spec.sweeps], dtype=np.int8)
+    found: dict[str, Any] = {
+        "direction": ("sweep", backward, _flags("sense of the drive", ("forward", "backward"), np.int8))
+    }
+    for name, values in sweep.items():
+        if name == "phases":
+            codes = np.array([[PHASE_SEQUENCES.index(word) for word in row] for row in values], dtype=np.int8)
+            long_name = "phases of the contact in their order: A tip, B tangential"
+            found["truth_phases"] = (dims, codes, _flags(long_name, PHASE_SEQUENCES, np.int8))
+        elif name == "snap_off_kind":
+            kinds = [kind.name.lower() for kind in SnapOff]
+            found["truth_snap_off_kind"] = (
+                dims,
+                values.astype(np.int8),
+                _flags("kind of the snap-off", kinds, np.int8),
+            )
+        elif name in COLUMNS:
+            found[name] = (dims, values, _described(spec, name))
+        else:
+            event = "first_contact" if name.startswith("first_contact") else "snap_off"
+            attrs = _described(spec, name.removeprefix(f"{event}_"))
+            attrs["long_name"] += f" at {event.replace('_', ' ').replace('snap off', 'snap-off')}"
+            found[f"truth_{name}"] = (dims, values, attrs)
+    return found
+
+
+def _of_samples(spec: Specification, sample: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    dims = ("record", "sweep", "sample")
+    first = [name for name in COLUMNS if name in sample]
+    found: dict[str, Any] = {}
+    for name in (*first, *sorted(set(sample) - set(first))):
+        values = sample[name]
+        if name == "truth_contact_phase":
+            found[name] = (dims, values, _flags("phase of the contact", PHASE_NAMES, np.int8))
+        else:
+            found[name] = (dims, values.astype(np.float32) if spec.single else values, _described(spec, name))
+    return found
+
+
+def _described(spec: Specification, name: str) -> dict[str, Any]:
+    column = column_of(name)
+    assert column is not None
+    return {"units": column.unit_in(spec.units), "long_name": column.long_name_in(spec.frame)}
+
+
+def _plain(unit: str) -> str:
+    return unit if unit == "rad" else "1"

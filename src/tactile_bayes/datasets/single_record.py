@@ -1,0 +1,139 @@
+"""One record of a data set, read or made again."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.datasets.collection import open_dataset
+from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS
+from tactile_bayes.datasets.generation import generate_records
+from tactile_bayes.datasets.manifest import read_manifest
+from tactile_bayes.datasets.shard import records_as_dataset
+from tactile_bayes.datasets.specification import Specification, read_specification, read_text
+from tactile_bayes.errors import ParameterError, SpecificationError
+from tactile_bayes.record import COLUMNS, column_of, make_record
+from tactile_bayes.rod import Rod
+
+__all__ = ["contour_of", "record"]
+
+
+def record(
+    source: str | os.PathLike[str] | Mapping[str, Any] | Specification, index: int, *, truth: bool = True
+) -> xr.Dataset:
+    """One record of a data set, as `infer_contour`, `reconstruct` and `write_record` take it.
+
+    Parameters
+    ----------
+    source : path-like, mapping or Specification
+        A folder, from which it is read; or a specification (a TOML file, or what it says), from which it is made
+        again, together with its shard: the same to the last bit.
+    index : int
+        Its number.
+    truth : bool
+        Whether the `truth_` columns are kept.
+
+    Returns
+    -------
+    xr.Dataset
+        With the contour's family and parameters, the rod and the data sheet as attributes.
+
+    Raises
+    ------
+    SpecificationError
+        If the source is no data set and no specification, or the record is not there yet.
+    ParameterError
+        If there is no record of that number.
+    OSError
+        If there is neither a folder nor a file of that name.
+
+    Examples
+    --------
+    >>> contours = [{"family": "parabola", "a": {"uniform": [0.3, 3.0]}, "q": {"uniform": [0.3, 0.7]}}]
+    >>> spec = {"records": 1000, "seed": 1, "contours": contours, "load_cell": {"moment_noise": 0.02}}
+    >>> one = record(spec, 917)
+    >>> one.sizes["sample"], one.attrs["truth_family"], one.attrs["load_cell_moment_noise"]
+    (360, 'parabola', 0.02)
+    """
+    folder = None if isinstance(source, Mapping | Specification) or not Path(source).is_dir() else Path(source)
+    if folder is not None:
+        spec = read_text(read_manifest(folder).specification)
+    else:
+        spec = source if isinstance(source, Specification) else read_specification(source)
+    if not isinstance(index, int | np.integer) or not 0 <= index < spec.records:
+        raise ParameterError(f"there is no record {index!r}: they are numbered from 0 to {spec.records - 1}")
+    begin = int(index) - int(index) % spec.shard_records
+    if folder is not None:
+        data = open_dataset(folder)
+        if index not in data.indexes["record"]:
+            raise SpecificationError(f"record {index} is not there yet: run dataset generate again")
+    else:
+        records = generate_records(spec, begin, min(begin + spec.shard_records, spec.records))
+        data = records_as_dataset(spec, records)
+    return _as_record(spec, data.sel(record=index).load(), truth)
+
+
+def contour_of(record: xr.Dataset) -> Contour:
+    """The true contour of a record of a data set, from its attributes.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        As `record` gives it; in metres if the record is SI, else in rod lengths.
+
+    Raises
+    ------
+    ParameterError
+        If its attributes name no contour.
+
+    Examples
+    --------
+    >>> contours = [{"family": "circle/parabola", "left_r": 0.5, "right_a": 0.7, "q": 0.4}]
+    >>> contour_of(record({"records": 1, "seed": 1, "contours": contours}, 0)).right
+    Parabola(a=0.7, q=0.4, x_c=0.0)
+    """
+    family = FAMILIES.get(str(record.attrs.get("truth_family")))
+    if family is None:
+        raise ParameterError("the record's attributes name no contour: take it from a data set, with truth=True")
+    found = {name: record.attrs[f"truth_contour_{name}"] for name in (*family.parameters, *family.optional)}
+    if family.draw_log_radius is not None:
+        found[LOG_RADIUS] = np.array([record.attrs[f"truth_contour_{LOG_RADIUS}_{k}"] for k in range(KNOTS.size)])
+    return family.build(found)
+
+
+def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset:
+    count = data.sizes["sample"]
+    columns: dict[str, Any] = {
+        "sweep": np.repeat(data["sweep"].values, count),
+        "direction": np.repeat([direction for _, direction in spec.sweeps], count),
+        "base_x": np.repeat(data["base_x"].values, count),
+        "base_y": np.repeat(data["base_y"].values, count),
+    }
+    attrs: dict[str, Any] = {"truth_family": spec.groups[int(data["truth_family"])].family}
+    for name, variable in data.data_vars.items():
+        name = str(name)
+        if variable.dims == ("sweep", "sample"):
+            if truth or not name.startswith("truth_"):
+                values = variable.values.ravel()
+                words = str(variable.attrs.get("flag_meanings", "")).split()
+                columns[name] = np.array(words)[values] if words else values.astype(np.float64)
+        elif variable.dims == () and name.startswith(("truth_contour_", "load_cell_")) and np.isfinite(variable.values):
+            attrs[name] = float(variable)
+        elif variable.dims == ("knot",) and np.all(np.isfinite(variable.values)):
+            attrs |= {f"{name}_{knot}": float(value) for knot, value in enumerate(variable.values)}
+    if spec.friction:
+        attrs["truth_friction"] = spec.friction
+    if not truth:
+        attrs = {name: value for name, value in attrs.items() if not name.startswith("truth_")}
+    rod = None
+    if spec.rod:
+        rod = Rod(*(float(data[f"rod_{name}"]) for name in ("length", "flexural_rigidity", "diameter")))
+    order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
+    known = {name: columns[name] for name in order if column_of(name) is not None}
+    return make_record(known, rod=rod, attrs=attrs, load_cell_frame=spec.frame)

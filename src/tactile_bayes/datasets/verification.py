@@ -1,0 +1,97 @@
+"""The verification of a data set: every byte against its manifest, and numbers made again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import numpy as np
+
+from tactile_bayes.datasets.card import CARD
+from tactile_bayes.datasets.collection import opened_shard
+from tactile_bayes.datasets.generation import generate_records
+from tactile_bayes.datasets.manifest import Manifest, read_manifest
+from tactile_bayes.datasets.shard import records_as_dataset
+from tactile_bayes.datasets.specification import Specification, read_text
+from tactile_bayes.errors import ParameterError, SpecificationError
+
+__all__ = ["verify"]
+
+_CHUNK = 2**22
+
+
+def verify(path: str | os.PathLike[str], *, regenerate: int = 0) -> Manifest:
+    """Check every byte of a data set against its manifest.
+
+    Parameters
+    ----------
+    path : path-like
+        Its folder.
+    regenerate : int
+        How many shards, evenly spread, are made again and compared number by number: with other versions of the
+        libraries they may differ in the last digit.
+
+    Returns
+    -------
+    Manifest
+
+    Raises
+    ------
+    SpecificationError
+        If a file is missing, too many, or not as it was written, the data set is not complete, or a number comes out
+        otherwise; the message names the first such file.
+    ParameterError
+        If `regenerate` is no number of shards.
+    """
+    if not isinstance(regenerate, int) or regenerate < 0:
+        raise ParameterError(f"regenerate is {regenerate!r}: give a number of shards, 0 for none")
+    folder = Path(path)
+    manifest = read_manifest(folder)
+    spec = read_text(manifest.specification)
+    if spec.sha256 != manifest.specification_sha256:
+        raise SpecificationError(f"{folder}: the manifest's specification is not the one that its checksum states")
+    for shard in manifest.shards:
+        _check(folder / shard.file, shard.sha256)
+    if manifest.card_sha256:
+        _check(folder / CARD, manifest.card_sha256)
+    listed = {shard.file for shard in manifest.shards}
+    strangers = sorted(file.name for file in folder.glob("shard-*.nc") if file.name not in listed)
+    if strangers:
+        raise SpecificationError(
+            f"{folder / strangers[0]} is not in the manifest: run dataset generate again, or delete it"
+        )
+    if not (manifest.is_complete and manifest.card_sha256):
+        have = sum(shard.records for shard in manifest.shards)
+        raise SpecificationError(f"{folder} has {have} of {manifest.records} records: run dataset generate again")
+    chosen = np.unique(np.linspace(0, len(manifest.shards) - 1, min(regenerate, len(manifest.shards))).astype(int))
+    for number in chosen.tolist() if regenerate else []:
+        _compare(spec, manifest, folder, number)
+    return manifest
+
+
+def _check(file: Path, sha256: str) -> None:
+    if not file.is_file():
+        raise SpecificationError(f"{file} is missing: dataset generate makes it again")
+    if _sha256(file) != sha256:
+        raise SpecificationError(f"{file} is not as it was written: delete it, and dataset generate makes it again")
+
+
+def _compare(spec: Specification, manifest: Manifest, folder: Path, number: int) -> None:
+    shard = manifest.shards[number]
+    again = records_as_dataset(spec, generate_records(spec, shard.first, shard.first + shard.records))
+    with opened_shard(folder / shard.file) as stored:
+        for name, variable in again.variables.items():
+            if not np.array_equal(stored[name].values, variable.values, equal_nan=variable.dtype.kind == "f"):
+                raise SpecificationError(
+                    f"{folder / shard.file}: {name} comes out otherwise when it is made again (it was made with "
+                    f"{', '.join(f'{k} {v}' for k, v in manifest.versions.items())})"
+                )
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with open(path, "rb") as file:
+        while chunk := file.read(_CHUNK):
+            digest.update(chunk)
+    return digest.hexdigest()

@@ -1,0 +1,255 @@
+"""Many independent tasks: in this process, in processes here, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import traceback
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
+from typing import Any, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from tactile_bayes.errors import ParameterError, TaskError
+
+__all__ = ["run_tasks"]
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_RETRIES = 3
+"""How often a task is tried again after a process died over it."""
+
+
+def run_tasks(
+    function: Callable[[Task], Result],
+    tasks: Sequence[Task],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> Generator[tuple[Task, Result], None, None]:
+    """Call a function on every task; results come in the order in which they are ready.
+
+    A process that dies (killed, out of memory) is replaced, and its task done again. What a task computes must not
+    depend on where or when it is done. Each runs with one thread of linear algebra. Processes end with the iterator,
+    and with this process, however it ends; Ctrl-C is this process's affair alone.
+
+    Parameters
+    ----------
+    function : callable
+        Of one task; for processes and clusters a function of a module, not a local one.
+    tasks : sequence
+        Small: they travel.
+    workers : int, optional
+        Processes on this machine; by default one for each core that this process may use. 1 stays in this process. Each
+        begins by importing the script that is run: what starts processes belongs under `if __name__ == "__main__":`.
+    scheduler : str, optional
+        Address of a Dask scheduler, such as "tcp://10.0.0.1:8786"; in place of `workers`. Its workers need this
+        package in the same version; as long as there are none, the tasks wait.
+
+    Yields
+    ------
+    task, result
+
+    Raises
+    ------
+    ParameterError
+        If `workers` is no positive number, or Dask is wanted and not installed, or its scheduler does not answer.
+    TaskError
+        If processes died over a task again and again, or cannot begin, or the scheduler is lost. What a task raises
+        itself is raised here.
+
+    Examples
+    --------
+    >>> sorted(run_tasks(abs, [-1, 2], workers=1))
+    [(-1, 1), (2, 2)]
+    """
+    if workers is not None and (not isinstance(workers, int) or isinstance(workers, bool) or workers < 1):
+        raise ParameterError(f"workers is {workers!r}: give a positive number")
+    if scheduler is not None:
+        yield from _on_cluster(function, tasks, scheduler)
+        return
+    count = min(workers or _cores(), len(tasks))
+    if count <= 1:
+        for task in tasks:
+            yield task, _alone(function, task)
+    else:
+        yield from _in_processes(function, tasks, count)
+
+
+def _alone(function: Callable[[Task], Result], task: Task) -> Result:
+    with threadpool_limits(1):
+        return function(task)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+# ---- processes on this machine
+
+
+class _Process:
+    """A process that does one task after the other."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.task: int | None = None
+        self.has_begun = False
+        self.connection, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(function, theirs), daemon=True)
+        with _interrupts_held():
+            self.process.start()
+        theirs.close()
+
+    def end(self) -> int | None:
+        """Its exit code, once it is gone."""
+        self.connection.close()
+        self.process.terminate()
+        self.process.join()
+        code = self.process.exitcode
+        self.process.close()
+        return code
+
+
+def _in_processes(
+    function: Callable[[Task], Result], tasks: Sequence[Task], count: int
+) -> Generator[tuple[Task, Result], None, None]:
+    fresh, again = iter(range(len(tasks))), list[int]()
+    deaths: Counter[int | None] = Counter()
+    team: dict[Any, _Process] = {}
+    try:
+        for _ in range(count):
+            process = _Process(function)
+            team[process.connection] = process
+        while team:
+            for connection in wait(list(team)):
+                process = team[connection]
+                done, outcome = process.task, None
+                try:
+                    outcome = process.connection.recv()
+                    process.has_begun = True
+                    process.task = again.pop() if again else next(fresh, None)
+                    if process.task is None:
+                        team.pop(connection).end()
+                    else:
+                        process.connection.send(tasks[process.task])
+                except (EOFError, OSError):
+                    team.pop(connection)
+                    _refuse_hopeless(process, process.end(), deaths, count)
+                    again += [] if process.task is None else [process.task]
+                    process = _Process(function)
+                    team[process.connection] = process
+                if outcome is not None and done is not None:
+                    succeeded, result = outcome
+                    if not succeeded:
+                        raise result
+                    yield tasks[done], result
+    finally:
+        for process in team.values():
+            process.end()
+
+
+def _refuse_hopeless(process: _Process, code: int | None, deaths: Counter[int | None], count: int) -> None:
+    if not process.has_begun and (code is None or code >= 0):
+        raise TaskError(
+            "a process for the work ended before it began: a script that starts processes must do so under "
+            "`if __name__ == '__main__':`, as each of them imports it; or give workers=1"
+        ) from None
+    deaths[process.task] += 1
+    if deaths[process.task] > _RETRIES + (count if process.task is None else 0):
+        what = "before their first task" if process.task is None else f"over task {process.task}"
+        raise TaskError(
+            f"processes died {deaths[process.task]} times {what}: is there memory enough for {count} of them? Try "
+            "fewer workers"
+        ) from None
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """A process started here never hears Ctrl-C; this one hears it afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # which else would let the signals through, as it starts with the first process
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _work(function: Callable[[Any], Any], connection: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        connection.send((True, None))
+        while True:
+            connection.send(_outcome(function, connection.recv()))
+    except (EOFError, OSError):  # nobody listens any more
+        pass
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _outcome(function: Callable[[Any], Any], task: Any) -> tuple[bool, Any]:
+    try:
+        return True, _alone(function, task)
+    except Exception as error:
+        error.add_note(f"in another process:\n{traceback.format_exc()}")
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:  # some errors cannot travel
+            return False, TaskError(f"a task failed: {type(error).__name__}: {error}")
+        return False, error
+
+
+# ---- a cluster
+
+
+def _on_cluster(
+    function: Callable[[Task], Result], tasks: Sequence[Task], address: str
+) -> Generator[tuple[Task, Result], None, None]:
+    try:
+        from distributed import CancelledError, Client, KilledWorker, as_completed
+    except ImportError:
+        raise ParameterError(
+            "a scheduler was given, but Dask is not installed: pip install 'tactile-bayes[cluster]'"
+        ) from None
+    try:
+        client = Client(address, set_as_default=False, timeout="30s")
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"no Dask scheduler answers at {address!r}: {error}") from error
+    with client:
+        fresh = iter(range(len(tasks)))
+        places: dict[Any, int] = {}
+
+        def submit(index: int) -> Any:
+            future = client.submit(_alone, function, tasks[index], pure=False)
+            places[future.key] = index
+            return future
+
+        ahead = max(8, 4 * sum(client.nthreads().values()))
+        ready = as_completed([submit(index) for index in islice(fresh, ahead)], loop=client.loop)
+        try:
+            for future in ready:
+                yield tasks[places.pop(future.key)], future.result()
+                for index in islice(fresh, 1):
+                    ready.add(submit(index))
+        except KilledWorker as error:
+            raise TaskError(f"workers of the cluster died over a task again and again: {error}") from error
+        except CancelledError as error:
+            raise TaskError(f"the Dask scheduler at {address} is lost: {error}") from error

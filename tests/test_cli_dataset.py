@@ -1,0 +1,350 @@
+"""The commands `dataset ...`, inside this process and as a stranger would start them."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import tactile_bayes as tb
+from tactile_bayes.cli import app
+from tactile_bayes.datasets.families import FAMILIES, FLANKS
+from tactile_bayes.record import LOAD_CELL_UNITS
+
+COMMAND = str(Path(sys.executable).with_name("tactile-bayes"))
+HEAVY = {"numpy", "scipy", "xarray", "rich.progress"}
+SMALL = """
+name = "small"
+records = 6
+shard_records = 2
+seed = 1
+
+[[contours]]
+family = "parabola"
+a = { uniform = [0.3, 2.0] }
+q = { uniform = [0.3, 0.7] }
+
+[scan]
+samples = 20
+
+[load_cell]
+force_noise = 0.05
+moment_noise = 0.02
+"""
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, ["dataset", *map(str, arguments)])
+
+
+def assert_refused(result, message):
+    """Exit code 2, a line on stderr with these words, and nothing else."""
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert message in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stderr.startswith("tactile-bayes: ")
+
+
+@pytest.fixture
+def specification(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """A data set that the command has made, and what it said."""
+    folder = tmp_path_factory.mktemp("small")
+    (folder / "small.toml").write_text(SMALL, encoding="utf-8")
+    result = call("generate", folder / "small.toml", "--out", folder / "set", "--workers", 1)
+    assert result.exit_code == 0, result.output
+    return folder / "set", result
+
+
+# --- Help -----------------------------------------------------------------------------------------------------------
+
+
+def test_help_lists_the_commands():
+    commands = call("--help").stdout.split("Commands:")[1]
+    assert re.findall(r"^  (\w+)", commands, flags=re.MULTILINE) == ["example", "generate", "verify", "record"]
+
+
+@pytest.mark.parametrize("command", ["example", "generate", "verify", "record"])
+def test_help_of_a_command_ends_with_an_example(command):
+    result = call(command, "--help")
+    assert result.exit_code == 0
+    assert f"Example: tactile-bayes dataset {command} " in result.stdout
+
+
+@pytest.mark.parametrize("arguments", [["generate", "--help"], ["example"]])
+def test_what_is_heavy_is_loaded_when_used(arguments):
+    code = "import atexit, sys\nfrom tactile_bayes.cli import app\n"
+    code += f"atexit.register(lambda: print(sorted({HEAVY} & set(sys.modules))))\napp(['dataset', *{arguments}])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+# --- The example ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def example():
+    result = call("example")
+    assert result.exit_code == 0
+    return result.stdout
+
+
+def options_taken(text):
+    """The text, with each block of options that are commented out taken once, and the first line of the block."""
+    lines = text.splitlines()
+    option = [bool(re.match(r"#[\w\[]", line)) for line in lines]
+    starts = [i for i, is_option in enumerate(option) if is_option]
+    for first in starts:
+        last = first + 1
+        together = lines[first].startswith(("#[", "#from_degrees", "#ornstein"))
+        while together and last < len(lines) and option[last]:
+            last += 1
+        if lines[first].startswith(("#to_degrees", "#ornstein_uhlenbeck_moment", "#ornstein_uhlenbeck_time")) or (
+            "#[rod]" in lines[:first]
+        ):
+            continue
+        yield lines[first], "\n".join([*lines[:first], *(line[1:] for line in lines[first:last]), *lines[last:]])
+
+
+def test_the_example_is_a_specification_with_every_law(example):
+    spec = tb.datasets.read_specification(tomllib.loads(example))
+    kinds = {law.kind for _, law in spec.laws}
+    assert kinds == {"constant", "uniform", "log_uniform", "normal", "log_normal", "choice", "each"}
+    assert spec.units == "dimensionless"
+
+
+def test_every_option_of_the_example_is_taken(example):
+    whole = tb.datasets.read_specification(tomllib.loads(example))
+    taken = list(options_taken(example))
+    assert len(taken) > 20
+    for line, text in taken:
+        spec = tb.datasets.read_specification(tomllib.loads(text))
+        assert spec.sha256 != whole.sha256, line
+        assert spec.units == ("SI" if line == "#[rod]" else "dimensionless")
+
+
+def test_options_are_shown_with_what_they_are_when_left_out(example):
+    whole = tb.datasets.read_specification(tomllib.loads(example))
+    fields = ("shard_records", "single", "each_group", "bases", "directions", "drive", "groups", "frame")
+    for line, text in options_taken(example):
+        if re.match(r"#(shard_records|precision|each_contour|bases|directions|margin|weight|frame)\b", line):
+            spec = tb.datasets.read_specification(tomllib.loads(text))
+            assert all(getattr(spec, name) == getattr(whole, name) for name in fields), line
+
+
+def test_the_example_names_every_key_family_and_entry(example):
+    keys = "name description records seed shard_records precision each_contour friction bases directions samples"
+    keys += " from_degrees to_degrees margin frame length flexural_rigidity diameter weight x_c"
+    for key in keys.split():
+        assert re.search(rf"^#?{key} = ", example, flags=re.MULTILINE), key
+    for family in (*FLANKS, "shape-free", "parabola/circle"):
+        for name in FAMILIES[family].parameters:
+            block = example.split(f'family = "{family}"')[1].split("[[")[0]
+            assert re.search(rf"^{name} = ", block, flags=re.MULTILINE), (family, name)
+    for entry in LOAD_CELL_UNITS:  # of those that there are for several channels, one stands for all
+        stem = re.sub(r"(holding_moment|force_[xy]).*", "", entry)
+        assert re.search(rf"^#?{stem}", example, flags=re.MULTILINE), entry
+
+
+def test_the_example_is_made_and_measured(example, tmp_path):
+    path = tmp_path / "set.toml"
+    path.write_text(example.replace("records = 1200", "records = 24"), encoding="utf-8")
+    result = call("generate", path, "--out", tmp_path / "set", "--workers", 1)
+    assert result.exit_code == 0, result.output
+    assert np.unique(tb.datasets.open(tmp_path / "set").truth_family).size > 3
+
+
+# --- Generate -------------------------------------------------------------------------------------------------------
+
+
+def test_what_was_made_is_said_in_three_lines(small):
+    folder, result = small
+    assert result.stderr == ""
+    first, *rest = result.stdout.splitlines()
+    assert re.fullmatch(r"6 records in 3 files, 0\.\d MB: 6 made in \S+ s, [\d,]+ records/s", first)
+    assert rest[-1] == f"{folder / 'README.md'} says what is in the files"
+    assert len(list(folder.glob("shard-*.nc"))) == 3
+
+
+def test_what_is_there_is_not_made_again(small, tmp_path):
+    folder, _ = small
+    result = call("generate", folder.parent / "small.toml", "--out", folder)
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[0].endswith(": all were there already")
+
+
+def test_contours_that_were_drawn_again_are_counted(specification, tmp_path):
+    specification.write_text(SMALL.replace("[0.3, 0.7]", "[0.3, 1.5]"), encoding="utf-8")
+    result = call("generate", specification, "--out", tmp_path / "set", "--workers", 1)
+    assert result.exit_code == 0, result.output
+    line = result.stdout.splitlines()[1]
+    redrawn = json.loads((tmp_path / "set" / "manifest.json").read_text())["redrawn"]
+    total = sum(redrawn.values())
+    assert re.fullmatch(rf"{total} contours were drawn again: .*\d+ out of reach.*", line)
+
+
+def test_numbers_do_not_depend_on_the_workers(small, tmp_path):
+    folder, _ = small
+    done = subprocess.run(
+        [COMMAND, "dataset", "generate", folder.parent / "small.toml", "--out", "set", "--workers", "2"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    xr.testing.assert_identical(tb.datasets.open(folder).load(), tb.datasets.open(tmp_path / "set").load())
+
+
+def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification, tmp_path, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
+    monkeypatch.setenv("COLUMNS", "120")
+    arguments = ("generate", specification, "--workers", 1, "--out")
+    result = call(*arguments, tmp_path / "1")
+    assert result.exit_code == 0, result.output
+    assert "6 of 6 records" in result.stderr
+    assert "left" in result.stderr
+    assert "left" not in result.stdout
+    assert call(*arguments, tmp_path / "2", "--quiet").stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("a = ", "b = "), "there is no key 'contours[0].b'"),
+        (("seed = 1", "seed = -1"), "seed is -1: give a whole number from 0 to"),
+        (("uniform = [0.3, 0.7]", "unifrom = [0.3, 0.7]"), "contours[0].q has the law 'unifrom', which there is not"),
+        (("[0.3, 0.7]", "[1.3, 1.7]"), "was drawn 1000 times, and no contour was one that every sweep can reach"),
+        (("[scan]", "[scan"), "small.toml: not TOML"),
+    ],
+)
+def test_an_impossible_specification_is_refused_in_a_line(specification, tmp_path, change, message):
+    text = SMALL.replace(*change)
+    assert text != SMALL
+    specification.write_text(text, encoding="utf-8")
+    assert_refused(call("generate", specification, "--out", tmp_path / "set", "--workers", 1), message)
+
+
+def test_other_refusals_of_generate(small, specification, tmp_path):
+    folder, _ = small
+    specification.write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
+    assert_refused(call("generate", specification, "--out", folder), "holds a data set of another specification")
+    nowhere = tmp_path / "nowhere.toml"
+    assert_refused(call("generate", nowhere, "--out", tmp_path), f"{nowhere}: No such file or directory")
+    both = ("--workers", 1, "--scheduler", "tcp://127.0.0.1:1")
+    assert_refused(
+        call("generate", specification, "--out", tmp_path, *both), "--workers and --scheduler exclude each other"
+    )
+    assert call("generate", specification, "--out", tmp_path, "--workers", 0).exit_code == 2
+
+
+SLOW = """
+import contextlib, time
+from pathlib import Path
+from tactile_bayes.cli import main
+from tactile_bayes.datasets import production
+
+made = production.write_shard
+def write(task):
+    if task[1] == {shard}:
+        Path("begun").touch()
+        with contextlib.suppress({suppressed}):
+            time.sleep(60.0)
+    return made(task)
+
+production.write_shard = write
+main()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
+@pytest.mark.parametrize(("shard", "suppressed"), [(2, "ValueError"), (1, "KeyboardInterrupt")])
+def test_control_c_says_how_to_go_on_and_the_same_command_does(specification, tmp_path, shard, suppressed):
+    """At once, or after the shard if the interrupt was lost."""
+    slow = SLOW.format(shard=shard, suppressed=suppressed)
+    arguments = ["dataset", "generate", "small.toml", "--out", "set", "--workers", "1"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path}
+    with subprocess.Popen([sys.executable, "-c", slow, *arguments], **pipes) as process:
+        while not (tmp_path / "begun").exists() and process.poll() is None:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert errors == "tactile-bayes: interrupted, 4 of 6 records are in set: the same command goes on\n"
+    done = subprocess.run([COMMAND, *arguments], **pipes, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert re.match(r"6 records in 3 files, .* MB: 2 made in ", done.stdout)
+    assert tb.datasets.verify(tmp_path / "set").records == 6
+
+
+# --- Verify ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_whole_data_set_is_verified(small):
+    folder, _ = small
+    result = call("verify", folder, "--regenerate", 5)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout.splitlines() == [
+        f"{folder}: 6 records in 3 files, every byte as it was written",
+        "3 files made again: every number is the same",
+    ]
+
+
+def test_a_byte_that_differs_is_found(specification, tmp_path):
+    assert call("generate", specification, "--out", tmp_path / "set", "--workers", 1).exit_code == 0
+    shard = tmp_path / "set" / "shard-000001.nc"
+    content = bytearray(shard.read_bytes())
+    content[-100] ^= 1
+    shard.write_bytes(content)
+    assert_refused(call("verify", tmp_path / "set"), "shard-000001.nc is not as it was written")
+    assert_refused(call("verify", tmp_path), f"{tmp_path} holds no data set: there is no manifest.json")
+
+
+# --- Record ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", ["csv", "nc"])
+@pytest.mark.parametrize("source", ["set", "small.toml"])
+def test_a_record_is_written_as_infer_takes_it(small, tmp_path, suffix, source):
+    folder, _ = small
+    path = tmp_path / f"record.{suffix}"
+    result = call("record", folder.with_name(source), 3, "--out", path)
+    assert result.stdout == f"record 3 of {folder.with_name(source)}, 40 samples: {path}\n"
+    xr.testing.assert_equal(tb.read_record(path), tb.datasets.record(folder, 3))
+
+
+def test_a_record_without_truth_is_what_a_laboratory_has(small, tmp_path):
+    folder, _ = small
+    path = tmp_path / "record.csv"
+    assert call("record", folder, 0, "--out", path, "--no-truth").exit_code == 0
+    assert "truth" not in path.read_text(encoding="utf-8")
+    measured = tb.read_record(path)
+    assert measured.attrs["load_cell_force_noise"] == 0.05
+    whole = tb.datasets.record(folder, 0)
+    np.testing.assert_array_equal(measured.holding_moment, whole.holding_moment)
+    assert np.max(np.abs(whole.holding_moment - whole.truth_holding_moment)) > 0.02
+
+
+def test_refusals_of_record(small, tmp_path):
+    folder, _ = small
+    out = ("--out", tmp_path / "record.csv")
+    assert_refused(call("record", folder, 6, *out), "there is no record 6: they are numbered from 0 to 5")
+    assert_refused(call("record", folder, 0, "--out", tmp_path / "record.txt"), "a record is a .csv or a .nc file")
+    assert_refused(call("record", tmp_path, 0, *out), "holds no data set")
+    assert_refused(call("record", tmp_path / "nowhere", 0, *out), "nowhere: No such file or directory")

@@ -1,0 +1,170 @@
+"""Data sets opened without reading them."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+import tactile_bayes as tb
+from helpers.data_sets import PLAIN, RICH, changed
+from tactile_bayes.datasets.collection import opened_shard
+from tactile_bayes.datasets.manifest import read_manifest, write_manifest
+from tactile_bayes.datasets.netcdf import netcdf_of
+from tactile_bayes.errors import SpecificationError
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("plain set")
+    tb.datasets.generate(PLAIN, path, workers=1)
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(folder):
+    """All of it, put together by xarray from the files."""
+    parts = [xr.load_dataset(path, engine="h5netcdf", decode_timedelta=False) for path in sorted(folder.glob("*.nc"))]
+    return xr.concat(parts, "record", data_vars="minimal", coords="minimal", compat="equals", join="exact")
+
+
+@pytest.fixture
+def files_read(monkeypatch):
+    """Names of the files from which numbers were read."""
+    names, real = [], h5py.File
+
+    def noted(path, *arguments, **options):
+        names.append(str(path).rpartition("/")[2])
+        return real(path, *arguments, **options)
+
+    monkeypatch.setattr("tactile_bayes.datasets.collection.h5py.File", noted)
+    return names
+
+
+def test_all_of_it_is_what_lies_in_the_files(folder, whole):
+    xr.testing.assert_identical(tb.datasets.open(folder).load(), whole)
+    assert whole.sizes == {"record": 24, "sweep": 2, "sample": 24}
+    assert set(whole.coords) == {"record", "sweep"}
+
+
+def test_nothing_is_read_before_it_is_used(folder, files_read):
+    data = tb.datasets.open(folder)
+    assert files_read == ["shard-000000.nc"]  # what variables there are
+    some = data.isel(record=slice(9, 12))[["force_x"]]
+    some = some.sel(sweep=1)
+    assert files_read == ["shard-000000.nc"]
+    some.load()
+    assert files_read == ["shard-000000.nc", "shard-000001.nc"]
+    some.load()
+    assert len(files_read) == 2
+
+
+INDEXERS = {
+    "int": 5,
+    "last": -1,
+    "slice": slice(3, 20),
+    "step": slice(2, None, 5),
+    "backwards": slice(None, None, -3),
+    "list": [17, 2, 2, 9],
+    "negative list": [-1, 0, -24],
+    "nothing": [],
+    "empty slice": slice(4, 4),
+    "array": np.array([23, 0, 11]),
+    "mask": np.arange(24) % 5 == 0,
+}
+
+
+@pytest.mark.parametrize("key", [pytest.param(key, id=name) for name, key in INDEXERS.items()])
+def test_records_are_chosen_as_from_memory(folder, whole, key):
+    data = tb.datasets.open(folder)
+    xr.testing.assert_identical(data.isel(record=key).load(), whole.isel(record=key))
+    xr.testing.assert_identical(data.force_x.isel(record=key).load(), whole.force_x.isel(record=key))
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        {"record": 3, "sweep": 1, "sample": 7},
+        {"record": [1, 20], "sample": [5, 3, 5]},
+        {"record": slice(None, None, 4), "sweep": slice(None, None, -1), "sample": slice(2, 9, 3)},
+        {"sample": -1},
+        {"sweep": [1]},
+        {"record": [2, 9], "sweep": 0, "sample": np.arange(24) > 20},
+    ],
+)
+def test_axes_are_chosen_together(folder, whole, chosen):
+    xr.testing.assert_identical(tb.datasets.open(folder).isel(chosen).load(), whole.isel(chosen))
+    pointwise = {"record": xr.DataArray([1, 9, 23], dims="point"), "sample": xr.DataArray([0, 5, 2], dims="point")}
+    xr.testing.assert_identical(tb.datasets.open(folder).isel(pointwise).load(), whole.isel(pointwise))
+
+
+def test_labels_and_groups(folder, whole):
+    data = tb.datasets.open(folder)
+    xr.testing.assert_identical(data.sel(record=[3, 17]).load(), whole.sel(record=[3, 17]))
+    high = data.truth_contour_q > 0.5
+    xr.testing.assert_identical(data.isel(record=high.values).load(), whole.isel(record=high.values))
+    means = data[["force_y"]].groupby(high.rename("high").load()).mean()
+    np.testing.assert_allclose(means.force_y.sel(high=True), whole.force_y[high.values].mean("record"))
+    np.testing.assert_array_equal(data.force_x.max("sample"), whole.force_x.max("sample"))
+
+
+def test_dask_reads_it_in_pieces(folder, whole, files_read):
+    pytest.importorskip("dask")
+    lazy = tb.datasets.open(folder).chunk(record=8)
+    before = len(files_read)
+    peak = abs(lazy.force_y).max(["sweep", "sample"])
+    assert len(files_read) == before
+    np.testing.assert_array_equal(peak.compute(), abs(whole.force_y).max(["sweep", "sample"]))
+
+
+def test_what_is_in_the_making_can_be_opened(folder, whole, tmp_path):
+    some = tmp_path / "half"
+    shutil.copytree(folder, some)
+    manifest = read_manifest(some)
+    write_manifest(type(manifest)(**{**vars(manifest), "shards": (manifest.shards[0], manifest.shards[2])}), some)
+    data = tb.datasets.open(some)
+    assert data.record.values.tolist() == [*range(8), *range(16, 24)]
+    xr.testing.assert_identical(data.sel(record=17).load(), whole.sel(record=17))
+    with pytest.raises(SpecificationError, match="record 9 is not there yet: run dataset generate again"):
+        tb.datasets.record(some, 9)
+    write_manifest(type(manifest)(**{**vars(manifest), "shards": ()}), some)
+    with pytest.raises(SpecificationError, match="holds no shard yet: run dataset generate again"):
+        tb.datasets.open(some)
+
+
+def test_what_is_no_data_set_is_refused(folder, tmp_path):
+    for path in (tmp_path, tmp_path / "nothing", folder / "README.md"):
+        with pytest.raises(SpecificationError, match=r"holds no data set: there is no manifest\.json"):
+            tb.datasets.open(path)
+
+
+def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
+    some = tmp_path / "some"
+    shutil.copytree(folder, some)
+    data = tb.datasets.open(some)
+    (some / "shard-000001.nc").unlink()
+    with pytest.raises(SpecificationError, match=r"shard-000001\.nc is gone: dataset generate makes it again"):
+        data.isel(record=9).load()
+    (some / "shard-000002.nc").write_bytes(b"no NetCDF")
+    with pytest.raises(SpecificationError, match=r"shard-000002\.nc cannot be read .*: run dataset verify"):
+        data.isel(record=20).load()
+    data.isel(record=3).load()
+
+
+@pytest.mark.parametrize("spec", [PLAIN, RICH, changed(PLAIN, contours=[
+    {"family": "shape-free", "radius": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": 0.5}])])  # fmt: skip
+def test_files_are_as_xarray_would_write_them(spec, tmp_path):
+    """Up to the order in which HDF5 lists them: read back, both are the same, in every name, number and attribute."""
+    tb.datasets.generate(changed(spec, records=3, shard_records=3), tmp_path, workers=1)
+    with contextlib.closing(opened_shard(tmp_path / "shard-000000.nc")) as file:
+        mine = file.load()
+    encoding = {name: {"_FillValue": None} for name in mine.variables}
+    mine.to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf", encoding=encoding)
+    with contextlib.closing(opened_shard(tmp_path / "theirs.nc")) as theirs:
+        xr.testing.assert_identical(mine, theirs.load())
+        assert {n: v.dtype for n, v in mine.variables.items()} == {n: v.dtype for n, v in theirs.variables.items()}
+    assert netcdf_of(mine) == netcdf_of(mine.copy(deep=True))

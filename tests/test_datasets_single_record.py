@@ -1,0 +1,98 @@
+"""One record of a data set, read and made again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import tactile_bayes as tb
+from helpers.data_sets import PLAIN, RICH, changed
+from tactile_bayes.datasets import contour_of, generate, read_specification, record
+from tactile_bayes.datasets.specification_text import toml_of
+from tactile_bayes.errors import ParameterError
+
+SHAPES = changed(PLAIN, contours=[
+    {"family": "shape-free", "radius": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": {"uniform": [0.4, 0.5]}}
+])  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[PLAIN, RICH, SHAPES], ids=["plain", "rich", "shape-free"])
+def made(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("set")
+    generate(request.param, folder, workers=1)
+    return request.param, folder
+
+
+def test_read_or_made_again_it_is_the_same_to_the_last_bit(made, tmp_path):
+    spec, folder = made
+    (tmp_path / "spec.toml").write_text(toml_of(spec), encoding="utf-8")
+    sources = (spec, tmp_path / "spec.toml", read_specification(spec))
+    for source, index in zip(sources, (0, np.int64(13), 19), strict=True):
+        xr.testing.assert_identical(record(source, index), record(folder, index))
+    xr.testing.assert_identical(record(spec, 6, truth=False), record(folder, 6, truth=False))
+
+
+def test_it_is_the_row_of_the_whole(made):
+    _, folder = made
+    one, row = record(folder, 5), tb.datasets.open(folder).sel(record=5).load()
+    for name in ("drive_angle", "holding_moment", "force_x", "truth_contact_x", "truth_force_y"):
+        np.testing.assert_array_equal(one[name].values, row[name].values.ravel())
+    assert one.attrs["truth_contour_q"] == float(row.truth_contour_q)
+
+
+def test_without_truth_nothing_of_it_is_left(made):
+    _, folder = made
+    blind = record(folder, 5, truth=False)
+    assert not [name for name in (*blind.variables, *blind.attrs) if str(name).startswith("truth")]
+    assert tb.LoadCell.from_record(blind) == tb.LoadCell.from_record(record(folder, 5))
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_it_goes_to_a_file_and_back(made, suffix, tmp_path):
+    _, folder = made
+    one = record(folder, 3)
+    tb.write_record(one, tmp_path / f"one{suffix}")
+    back = tb.read_record(tmp_path / f"one{suffix}")
+    xr.testing.assert_allclose(back, one)
+    assert tb.LoadCell.from_record(back) == tb.LoadCell.from_record(one)
+    angle = 0.1
+    np.testing.assert_allclose(contour_of(back).point(angle), contour_of(one).point(angle), rtol=1e-12)
+
+
+def test_step_2_finds_the_contacts():
+    """Of a record without noise, the true ones."""
+    one = record(changed(RICH, precision=None, load_cell={"frame": "turning"}, scan__friction=0.0), 4)
+    found = tb.reconstruct(one)
+    loaded = (found.status == "ok").values
+    assert np.count_nonzero(loaded) > 30
+    rod = one.attrs["rod_length"]
+    np.testing.assert_allclose(found.contact_x[loaded], one.truth_contact_x[loaded], rtol=0, atol=1e-4 * rod)
+    np.testing.assert_allclose(found.contact_y[loaded], one.truth_contact_y[loaded], rtol=0, atol=1e-4 * rod)
+
+
+def test_its_contour_is_the_one_that_was_touched():
+    """With a diameter the rod's surface touches it, in true contacts of every family."""
+    for spec in (PLAIN, SHAPES, changed(RICH, precision=None)):
+        one = record(spec, 2)
+        contour, touched = (
+            contour_of(one),
+            (one.truth_contact_phase != "none").values & np.isfinite(one.truth_contact_x),
+        )
+        x, y = contour.point(one.truth_slope_angle.values[touched])
+        length = one.attrs["rod_length"]
+        np.testing.assert_allclose(x, one.truth_contact_x.values[touched], rtol=0, atol=1e-9 * length)
+        np.testing.assert_allclose(y, one.truth_contact_y.values[touched], rtol=0, atol=1e-9 * length)
+
+
+@pytest.mark.parametrize("index", [-1, 24, 10**9, 1.0, "1", None])
+def test_a_number_that_there_is_not_is_refused(index, tmp_path):
+    generate(PLAIN, tmp_path, workers=1)
+    for source in (PLAIN, tmp_path):
+        with pytest.raises(ParameterError, match=r"there is no record .*: they are numbered from 0 to 23"):
+            record(source, index)
+
+
+def test_what_is_neither_folder_nor_file_is_not_found(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        record(tmp_path / "nothing", 0)

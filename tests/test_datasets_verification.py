@@ -1,0 +1,158 @@
+"""Every kind of damage to a data set is found, and the file named."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from helpers.data_sets import PLAIN
+from tactile_bayes.datasets import generate, verify
+from tactile_bayes.datasets.generation import generate_records
+from tactile_bayes.datasets.manifest import read_manifest, write_manifest
+from tactile_bayes.errors import ParameterError, SpecificationError
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("original")
+    generate(PLAIN, folder, workers=1)
+    return folder
+
+
+@pytest.fixture
+def folder(original, tmp_path):
+    return shutil.copytree(original, tmp_path / "copy")
+
+
+def test_what_is_whole_is_so(folder):
+    manifest = verify(folder)
+    assert manifest.is_complete
+    assert manifest.records == 24
+    assert [shard.first for shard in manifest.shards] == [0, 8, 16]
+    assert verify(str(folder), regenerate=2).shards == manifest.shards
+
+
+@pytest.mark.parametrize("name", ["shard-000000.nc", "shard-000002.nc", "manifest.json", "README.md"])
+def test_one_flipped_bit_anywhere_is_found(folder, name):
+    path, rng = folder / name, np.random.default_rng(1)
+    content = path.read_bytes()
+    for place in [0, len(content) - 1, *rng.integers(len(content), size=20)]:
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        with pytest.raises(SpecificationError, match=name.replace(".", r"\.")):
+            verify(folder)
+    path.write_bytes(content)
+    verify(folder)
+
+
+@pytest.mark.parametrize("name", ["shard-000001.nc", "README.md", "manifest.json"])
+@pytest.mark.parametrize("cut", [lambda c: c[:-1], lambda c: c + b"\0", lambda c: b""], ids=["short", "long", "empty"])
+def test_another_length_is_found(folder, name, cut):
+    (folder / name).write_bytes(cut((folder / name).read_bytes()))
+    with pytest.raises(SpecificationError, match=name.replace(".", r"\.")):
+        verify(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("shard-000001.nc", r"shard-000001\.nc is missing: dataset generate makes it again"),
+        ("README.md", r"README\.md is missing: dataset generate makes it again"),
+        ("manifest.json", r"holds no data set: there is no manifest\.json"),
+    ],
+)
+def test_a_missing_file_is_found(folder, name, message):
+    (folder / name).unlink()
+    with pytest.raises(SpecificationError, match=message):
+        verify(folder)
+
+
+def test_a_shard_too_many_is_found(folder):
+    shutil.copy(folder / "shard-000001.nc", folder / "shard-000003.nc")
+    with pytest.raises(SpecificationError, match=r"shard-000003\.nc is not in the manifest"):
+        verify(folder)
+
+
+def test_other_files_are_nobodys_business(folder):
+    (folder / "notes.txt").write_text("mine")
+    verify(folder)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda t: t | {"seed": 8},
+        lambda t: t | {"redrawn": {"out of reach": 3}},
+        lambda t: t | {"specification": t["specification"].replace("seed", "Seed")},
+        lambda t: t | {"shards": t["shards"][:2]},
+        lambda t: dict(sorted(t.items())),
+        lambda t: {k: v for k, v in t.items() if k != "sha256"},
+        lambda t: list(t),
+    ],
+)
+def test_an_edited_manifest_is_found(folder, edit):
+    path = folder / "manifest.json"
+    path.write_text(json.dumps(edit(json.loads(path.read_text())), indent=1, ensure_ascii=False) + "\n")
+    with pytest.raises(SpecificationError, match=r"manifest\.json is no"):
+        verify(folder)
+
+
+def test_a_specification_that_is_not_the_stated_one_is_found(folder):
+    manifest = read_manifest(folder)
+    write_manifest(type(manifest)(**{**vars(manifest), "specification_sha256": "0" * 64}), folder)
+    with pytest.raises(SpecificationError, match="specification is not the one that its checksum states"):
+        verify(folder)
+
+
+def test_a_manifest_of_another_format_says_so(folder):
+    from tactile_bayes.datasets import manifest as module
+
+    path = folder / "manifest.json"
+    table = json.loads(path.read_text())
+    table.pop("sha256")
+    path.write_bytes(module._content(table | {"format": 99}))
+    with pytest.raises(SpecificationError, match="has format 99, and this version reads format"):
+        verify(folder)
+
+
+def test_what_is_not_complete_says_so(folder):
+    manifest = read_manifest(folder)
+    write_manifest(type(manifest)(**{**vars(manifest), "shards": manifest.shards[:2], "card_sha256": ""}), folder)
+    (folder / "shard-000002.nc").unlink()
+    with pytest.raises(SpecificationError, match="has 16 of 24 records: run dataset generate again"):
+        verify(folder)
+
+
+def test_numbers_that_come_out_otherwise_are_found(folder, monkeypatch):
+    """As with another version of a library: the bytes are those of the manifest, the numbers are not made again."""
+
+    def otherwise(spec, begin, end):
+        records = generate_records(spec, begin, end)
+        records.sample["truth_force_x"][-1, 0, 5] += 1e-12
+        return records
+
+    monkeypatch.setattr("tactile_bayes.datasets.verification.generate_records", otherwise)
+    verify(folder)
+    with pytest.raises(SpecificationError, match=r"shard-000000\.nc: truth_force_x comes out otherwise .* numpy \d"):
+        verify(folder, regenerate=1)
+
+
+@pytest.mark.parametrize("count", [-1, 1.5, "all"])
+def test_no_number_of_shards_is_refused(folder, count):
+    with pytest.raises(ParameterError, match=r"regenerate is .*: give a number of shards, 0 for none"):
+        verify(folder, regenerate=count)
+
+
+@pytest.mark.parametrize("name", ["shard-000001.nc", "README.md"])
+def test_what_is_damaged_is_mended_as_the_refusal_says(folder, original, name):
+    (folder / name).write_bytes(b"damaged")
+    with pytest.raises(SpecificationError, match="delete it, and dataset generate makes it again"):
+        verify(folder)
+    (folder / name).unlink()
+    generate(PLAIN, folder, workers=1)
+    verify(folder)
+    assert (folder / name).read_bytes() == (original / name).read_bytes()
