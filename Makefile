@@ -14,7 +14,7 @@ demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
 
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
 	$(BIN)/python -m pytest --doctest-modules src
 	$(BIN)/python -m pytest --nbmake notebooks
 
