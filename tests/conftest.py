@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import pytest
 
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
@@ -10,6 +12,13 @@ from tactile_bayes.scanning import scan
 
 QUICK = SamplerSettings(ensembles=2, walkers=10, block_steps=10, max_steps=30)
 """Enough for files and messages, not for numbers."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def interruptible():
+    """Processes that tests start hear interrupts, also where the tests run in the background and ignore them."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

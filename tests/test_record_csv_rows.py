@@ -59,6 +59,19 @@ def outcome(path):
     return repr(columns), list(table.source.lines)
 
 
+@pytest.mark.parametrize("word", ["true", "False", '"TRUE"'])
+def test_a_piece_of_truth_values_is_no_piece_of_numbers(tmp_path, word):
+    """Of a column that holds nothing else pandas makes 1 and 0."""
+    path = tmp_path / "record.csv"
+    rows = ["0,forward,0.5,0.1,a,1"] * 6 + [f"{word},forward,0.5,0.1,true,1"]
+    path.write_text("\n".join([",".join(NAMES), *rows]) + "\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(csv_rows, "_FIRST", 100)
+        patch.setattr(csv_rows, "_CHUNK", 22)
+        message = outcome(path)
+    assert f"line 8, column 'sweep': {word.strip(chr(34))!r} is not an integer" in str(message)
+
+
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(table=tables())
 def test_the_fast_reader_and_the_careful_one_agree(tmp_path, table):

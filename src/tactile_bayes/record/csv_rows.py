@@ -221,6 +221,8 @@ def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
     chunk = chunk.replace(b"\r\n", b"\n")
     if b"\r" in chunk or not chunk.endswith(b"\n"):
         return None
+    if _begins_with_truth(chunk, kinds, layout):
+        return None
     rows = chunk.count(b"\n")
     chunk = chunk.replace(b"\n", f"{layout.delimiter}{_MARK}\n".encode())
     dtypes: dict[int, Any] = {len(layout.names): np.int64}
@@ -259,6 +261,17 @@ def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
             return None
         columns[name] = values
     return columns
+
+
+def _begins_with_truth(chunk: bytes, kinds: Mapping[str, Kind | None], layout: Layout) -> bool:
+    """Whether a number may be the word true or false in the first line: where all are, pandas makes 1 and 0 of them."""
+    line = chunk[: chunk.index(b"\n")].lower()
+    if b"true" not in line and b"false" not in line:
+        return False
+    cells = line.split(layout.delimiter.encode())
+    return b'"' in line or any(
+        b"e" in cell for cell, kind in zip(cells, kinds.values(), strict=False) if kind != "text"
+    )
 
 
 def _text_array(texts: Sequence[str], stripped: bool) -> NDArray[Any]:
