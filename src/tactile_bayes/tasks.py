@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import pickle
 import signal
 import threading
 import traceback
@@ -210,11 +209,18 @@ def _outcome(function: Callable[[Any], Any], task: Any) -> tuple[bool, Any]:
         return True, _alone(function, task)
     except Exception as error:
         error.add_note(f"in another process:\n{traceback.format_exc()}")
-        try:
-            pickle.loads(pickle.dumps(error))
-        except Exception:  # some errors cannot travel
-            return False, TaskError(f"a task failed: {type(error).__name__}: {error}")
-        return False, error
+        return False, error if _travels(error) else TaskError(f"a task failed: {type(error).__name__}: {error}")
+
+
+def _travels(error: Exception) -> bool:
+    """Whether an error can be made again from its arguments in another process."""
+    if not all(argument is None or isinstance(argument, str | int | float) for argument in error.args):
+        return False
+    try:
+        type(error)(*error.args)
+    except Exception:
+        return False
+    return True
 
 
 # ---- a cluster

@@ -21,7 +21,7 @@ def fail(number):
 
 
 class StrangeError(Exception):
-    """Cannot be unpickled: its class wants two arguments."""
+    """Cannot be made again from its arguments: its class wants two."""
 
     def __init__(self, one, two):
         super().__init__(f"{one} {two}")
