@@ -101,7 +101,7 @@ def test_manifest_states_everything(many, tmp_path):
         sum(shard["redrawn"].get("out of reach", 0) for shard in stated["shards"]) == stated["redrawn"]["out of reach"]
     )
     card = (tmp_path / "README.md").read_text()
-    assert f"were drawn again: {sum(stated['redrawn'].values())} (" in card
+    assert f"{sum(stated['redrawn'].values())} contours were drawn again (" in card
     assert "| circle: q | uniform from 0.5 to 1.2 |" in card
     verify(tmp_path)
 

@@ -14,7 +14,6 @@ CARD = "README.md"
 def card(spec: Specification, manifest: Manifest) -> str:
     """The data card, in Markdown."""
     size = sum(shard.bytes for shard in manifest.shards)
-    drawn = sum(manifest.redrawn.values())
     bases = len(spec.bases)
     where = "" if bases == 1 else f" from {bases} bases"
     lines = [
@@ -39,13 +38,15 @@ def card(spec: Specification, manifest: Manifest) -> str:
         "| quantity | law |",
         "|---|---|",
     ]  # fmt: skip
-    for index, group in enumerate(spec.groups):
+    for name, group in zip(_names(spec), spec.groups, strict=True):
         share = "in turn" if spec.each_group else f"weight {group.weight:g}"
-        lines.append(f"| **{group.family}** | {share if len(spec.groups) > 1 else 'always'} |")
-        lines += [f"| {group.family}: {name} | {_words(law)} |" for name, law in spec.groups[index].laws.items()]
-    for key, law in spec.laws:
-        if not key.startswith("contours["):
-            lines.append(f"| {key.removeprefix('scan.')} | {_words(law)} |")
+        lines.append(f"| **{name}** | {share if len(spec.groups) > 1 else 'always'} |")
+        lines += [f"| {name}: {parameter} | {_words(law)} |" for parameter, law in group.laws.items()]
+    lines += [f"| rod: {name} | {_words(law)} |" for name, law in spec.rod.items()]
+    for number, pair in enumerate(spec.bases, start=1):
+        pivot = "pivot" if bases == 1 else f"pivot {number}"
+        lines += [f"| {pivot}: {axis} | {_words(law)} |" for axis, law in zip("xy", pair, strict=True)]
+    lines += [f"| load cell: {name} | {_words(law)} |" for name, law in spec.load_cell.items()]
     drive = spec.drive
     if drive.begin is None:
         lines.append(f"| drive angles | from first contact to snap-off, and {drive.margin:g} of that on either side |")
@@ -53,11 +54,9 @@ def card(spec: Specification, manifest: Manifest) -> str:
         lines.append(f"| drive angles | {drive.begin:.6g} to {drive.end:.6g} rad |")
     lines += [
         f"| friction | {spec.friction:g} |",
-        f"| load cell's frame | {spec.frame} |",
+        f"| frame of the load cell | {spec.frame} |",
         "",
-        f"Draws that no sweep could use were drawn again: {drawn}"
-        + (f" ({', '.join(f'{count} {why}' for why, count in sorted(manifest.redrawn.items()))})." if drawn else "."),
-        "So the laws above are those of contours that every sweep reaches and that the rod is clear of after snap-off.",
+        _redrawn(manifest),
         "",
         "## What is in the files",
         "",
@@ -79,6 +78,26 @@ def card(spec: Specification, manifest: Manifest) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _names(spec: Specification) -> list[str]:
+    """What to call each group of contours: its family, with a number where a family comes more than once."""
+    families = [group.family for group in spec.groups]
+    return [
+        f"{family} {families[: index + 1].count(family)}" if families.count(family) > 1 else family
+        for index, family in enumerate(families)
+    ]
+
+
+def _redrawn(manifest: Manifest) -> str:
+    """How many draws came to nothing, and what that does to the laws."""
+    if not (total := sum(manifest.redrawn.values())):
+        return "Every contour drawn is one that every sweep reaches and that the rod is clear of after snap-off."
+    why = ", ".join(f"{count} {reason}" for reason, count in sorted(manifest.redrawn.items()))
+    return (
+        f"{total} contours were drawn again ({why}), so the laws above hold among contours that every sweep reaches "
+        "and that the rod is clear of after snap-off."
+    )
 
 
 def _words(law: Law) -> str:
