@@ -25,10 +25,12 @@ _HOMES = {
     "RandomWalk": "load_cell",
     "Rod": "rod",
     "SamplerSettings": "inference.ensembles",
+    "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
     "equilibria": "scanning",
     "gap": "uncertainty.gap",
     "in_frame": "record",
+    "infer_contacts": "inference.contacts",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
     "make_record": "record",
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
     from tactile_bayes import elastica as elastica
     from tactile_bayes import errors as errors
     from tactile_bayes import plotting as plotting
+    from tactile_bayes.inference.contacts import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
     from tactile_bayes.inference.point_load import infer_point_load as infer_point_load
@@ -72,6 +75,7 @@ if TYPE_CHECKING:
     from tactile_bayes.scanning import scan as scan
     from tactile_bayes.scanning_many import scan_many as scan_many
     from tactile_bayes.uncertainty.band import contour_band as contour_band
+    from tactile_bayes.uncertainty.contact_region import contact_region as contact_region
     from tactile_bayes.uncertainty.gap import gap as gap
     from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval
 

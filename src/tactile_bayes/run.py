@@ -18,8 +18,8 @@ from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import reconstruct, with_rod
-from tactile_bayes.record import CHANNELS, present_channels, rod_of, validate
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, present_channels, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
 from tactile_bayes.uncertainty.band import contour_band

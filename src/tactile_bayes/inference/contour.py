@@ -22,8 +22,17 @@ from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.inference.start import best_optimum, gather
 from tactile_bayes.load_cell import LoadCell, rough_noise
 from tactile_bayes.path import Reach
-from tactile_bayes.reconstruction import loaded_samples, reconstruct, with_rod
-from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, present_channels, record_hash, rod_of, validate
+from tactile_bayes.reconstruction import loaded_samples, reconstruct
+from tactile_bayes.record import (
+    CHANNELS,
+    COLUMNS,
+    frame_of,
+    present_channels,
+    record_hash,
+    rod_of,
+    validate,
+    with_rod,
+)
 from tactile_bayes.rod import Rod
 
 __all__ = ["contours_of", "default_priors", "infer_contour"]

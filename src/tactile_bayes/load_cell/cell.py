@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.correction import corrected
 from tactile_bayes.load_cell.corruption import corrupted_loads
+from tactile_bayes.load_cell.covariance import covariance
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_likelihood
 from tactile_bayes.load_cell.measurement import measured, stated_entries
@@ -300,6 +301,36 @@ class LoadCell(DataSheet):
         scale = checked_noise_scale(noise_scale, given.shape)
         batch = np.broadcast_shapes(scale.shape[:-1], given.shape[:-2])
         return corrupted_loads(self, np.broadcast_to(given, (*batch, *given.shape[-2:])), _generator(seed), scale)
+
+    def covariance(self, loads: ArrayLike) -> Floats:
+        """Covariance of the errors of readings, each sample looked at by itself: what samples share counts as noise.
+
+        White noise in proportion to the loads too, correlations, drift and what is not known of the bias, and steps
+        (as a twelfth of their square).
+
+        Parameters
+        ----------
+        loads : array_like, shape (n_samples, 3)
+            Samples from the first of a record on, since drift may grow. Only noise in proportion to the load asks how
+            large they are.
+
+        Returns
+        -------
+        ndarray, shape (n_samples, 3, 3)
+            Infinite for Student's t with 2 degrees of freedom and fewer.
+
+        Examples
+        --------
+        >>> cell = LoadCell(force_noise=0.03, moment_noise=0.02, bias_uncertainty=(0.0, 0.04, 0.0))
+        >>> np.sqrt(np.diagonal(cell.covariance(np.zeros((1, 3)))[0])).round(3)
+        array([0.02, 0.05, 0.03])
+        """
+        return covariance(self, np.asarray(loads, dtype=np.float64))
+
+    @property
+    def drive_angle_deviation(self) -> float:
+        """Standard deviation of the encoder's error [rad]: noise, and steps as a twelfth of their square."""
+        return math.hypot(self.drive_angle_noise, self.drive_angle_resolution / math.sqrt(12.0))
 
     def surprise(self, readings: ArrayLike) -> Floats:
         """How far readings are from those of no load: a χ² number with as many degrees of freedom as channels.

@@ -187,6 +187,10 @@ class DataSheet:
             return self.noise
         return np.hypot(self.noise, self.relative_noise * (self.expected(loads) - np.array(self.bias)))
 
+    def cuts_off(self, readings: Floats) -> NDArray[np.bool_]:
+        """Which readings, shape (..., 3), are at the end of the range, and stand for anything beyond."""
+        return np.asarray(np.abs(readings) >= self.limit * (1.0 - 1e-9) - 0.5 * self.resolution)
+
     # ---- units and attributes
 
     def dimensionless(self, rod: Rod) -> Self:

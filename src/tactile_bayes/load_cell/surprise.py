@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtr
 
+from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.data_sheet import DataSheet
 
 __all__ = ["surprise"]
@@ -22,7 +23,7 @@ def surprise(sheet: DataSheet, readings: Floats) -> Floats:
     """Squared distance of readings, shape (samples, 3), from no load, shape (samples,); see `LoadCell.surprise`."""
     present = np.flatnonzero(~np.isnan(readings).all(axis=0))
     noise, step = sheet.noise[present], sheet.resolution[present] / math.sqrt(12.0)
-    scale = np.hypot(np.hypot(noise, step), _wandering(sheet, len(readings))[:, present])
+    scale = np.hypot(np.hypot(noise, step), wandering_deviation(sheet, len(readings))[:, present])
     with np.errstate(over="ignore"):
         off = (readings[:, present] - np.array(sheet.bias)[present]) / scale
         if math.isfinite(sheet.degrees_of_freedom):
@@ -34,15 +35,3 @@ def surprise(sheet: DataSheet, readings: Floats) -> Floats:
         correlation[:, range(present.size), range(present.size)] = 1.0
         off = np.clip(off, -_BEYOND_ALL, _BEYOND_ALL)
         return np.asarray(np.sum(off * np.linalg.solve(correlation, off[..., None])[..., 0], axis=1))
-
-
-def _wandering(sheet: DataSheet, samples: int) -> Floats:
-    """Standard deviation of bias and drift at each sample, shape (samples, 3)."""
-    bias = np.broadcast_to(sheet.bias_uncertainty, (samples, 3))
-    if sheet.drift is None:
-        return bias
-    gone = np.arange(samples)
-    kept = sheet.drift.kept ** (2 * gone)
-    growth = gone if sheet.drift.kept == 1.0 else (1.0 - kept) / (1.0 - sheet.drift.kept**2)
-    share = np.sqrt(sheet.drift.first * kept + sheet.drift.step * growth)
-    return np.hypot(bias, share[:, None] * sheet.drift.sizes)

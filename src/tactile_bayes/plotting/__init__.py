@@ -6,10 +6,23 @@ made; its settings are left alone, and nothing is shown.
 """
 
 from tactile_bayes.plotting.axes import PALETTE
+from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
 from tactile_bayes.plotting.contour_map import band_detail, contour
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.records import observables, predictive
 from tactile_bayes.plotting.rod_map import rods
 from tactile_bayes.plotting.touch_map import touched
 
-__all__ = ["PALETTE", "band_detail", "contour", "observables", "pairs", "predictive", "rods", "touched", "trace"]
+__all__ = [
+    "PALETTE",
+    "band_detail",
+    "contact_ellipses",
+    "contact_regions",
+    "contour",
+    "observables",
+    "pairs",
+    "predictive",
+    "rods",
+    "touched",
+    "trace",
+]

@@ -16,7 +16,7 @@ from tactile_bayes.record.schema import (
     Frame,
     column_of,
 )
-from tactile_bayes.record.units import rod_of, to_dimensionless, to_si
+from tactile_bayes.record.units import rod_of, to_dimensionless, to_si, with_rod
 from tactile_bayes.record.validation import validate
 
 __all__ = [
@@ -40,5 +40,6 @@ __all__ = [
     "to_si",
     "turned",
     "validate",
+    "with_rod",
     "write_record",
 ]

@@ -7,14 +7,14 @@ import operator
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.errors import RecordError
+from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod
 from tactile_bayes.record.schema import LOAD_CELL_UNITS, column_of
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.validation import validate
 from tactile_bayes.rod import Rod
 
-__all__ = ["rod_of", "to_dimensionless", "to_si"]
+__all__ = ["rod_of", "to_dimensionless", "to_si", "with_rod"]
 
 
 def rod_of(record: xr.Dataset) -> Rod:
@@ -38,6 +38,17 @@ def rod_of(record: xr.Dataset) -> Rod:
     Rod(length=0.1, flexural_rigidity=1.2e-05, diameter=0.0)
     """
     return stated_rod(record.attrs, Source())
+
+
+def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
+    """The record as measured with another rod than the one it states."""
+    if rod is None:
+        return record
+    if record.attrs["units"] == "dimensionless" and not rod.is_dimensionless:
+        raise ParameterError(f"the record is dimensionless, so {rod} does not fit it: leave the rod out, or use to_si")
+    return record.assign_attrs(
+        rod_length=rod.length, rod_flexural_rigidity=rod.flexural_rigidity, rod_diameter=rod.diameter
+    )
 
 
 def to_dimensionless(record: xr.Dataset) -> xr.Dataset:

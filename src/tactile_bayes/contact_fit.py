@@ -1,0 +1,281 @@
+"""The most likely contact: four noisy numbers, brought onto the sheets of possible contacts.
+
+A contact has three degrees of freedom, a sample has four numbers (drive angle, holding moment, two forces): the sum of
+squares that is left, in standard deviations, has one. Each phase is fitted by Levenberg's and Marquardt's method on its
+sheet (`touching`), all samples at once; a sheet's optimum beyond the edge where the two meet does not count, and where
+neither has one before it, the most likely contact lies on the edge.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.elastica import TANGENTIAL, TIP, Contact
+from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, Touching, touching, touching_and_slopes
+
+__all__ = ["ContactFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet"]
+
+Floats = NDArray[np.float64]
+
+_FREE = {TIP: (FORCE, PSI1), TANGENTIAL: (FORCE, ARCLENGTH), None: (FORCE,)}
+"""Coordinates that are free on a sheet; None: on the edge."""
+
+_BLOCK = 4096
+
+_ROUGH, _ROUGH_STEPS = 1e-3, 10
+_SETTLED, _MOST_STEPS = 1e-12, 100
+"""Gain in the sum of squares that the next step promises, against one and the sum, at which a descent ends."""
+
+_OUTDONE = 2.0
+"""Factor on the other sheet's sum of squares, plus one, beyond which a sheet that is roughly fitted is given up."""
+
+_STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Arc lengths to start from in tangential contact, and shares of a right angle for ψ1 in tip contact."""
+
+
+class Reading(NamedTuple):
+    """Samples of forward contacts, with how far they are to be trusted; dimensionless."""
+
+    drive_angle: Floats
+    """Shape (n,)."""
+    loads: Floats
+    """Holding moment and support reaction, shape (n, 3)."""
+    angle_deviation: Floats
+    """Standard deviation of the drive angle, shape (n,)."""
+    leaning: Floats
+    """By how much the error of the loads grows with that of the drive angle, shape (n, 3)."""
+    covariance: Floats
+    """Of what else is wrong with the loads, shape (n, 3, 3)."""
+
+    def take(self, where: NDArray[np.intp] | slice) -> Reading:
+        return Reading(*(column[where] for column in self))
+
+
+class SheetFit(NamedTuple):
+    """The best contact of one phase, its bounds not heeded."""
+
+    coordinates: Floats
+    """Force, ψ1, arc length and drive angle, shape (n, 4); NaN where there is none."""
+    covariance: Floats
+    """Of the coordinates, shape (n, 4, 4); zero for those that are not free."""
+    misfit: Floats
+    """Sum of squared deviations, shape (n,)."""
+
+
+class ContactFit(NamedTuple):
+    """Most likely contacts."""
+
+    coordinates: Floats
+    covariance: Floats
+    misfit: Floats
+    phase: NDArray[np.int8]
+    at_edge: NDArray[np.bool_]
+    """Whether the contact lies where tip and tangential contact meet, and more likely ones lie off both sheets."""
+    clearance: Floats
+    """Distance from the edge, in standard deviations of the coordinate that leads to it."""
+
+
+def fit_contacts(reading: Reading, friction_angle: Floats, raw: Contact) -> ContactFit:
+    """Most likely contacts of samples.
+
+    Parameters
+    ----------
+    reading : Reading
+        n samples.
+    friction_angle : ndarray, shape (n,)
+        δ = arctan μ.
+    raw : Contact
+        What `contact_from_wrench` says, to start from where it says anything.
+    """
+    size = reading.drive_angle.size
+    blocks = []
+    for begin in range(0, max(size, 1), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        start = raw.contact_arclength[part], raw.tip_angle[part], raw.slope_angle[part]
+        blocks.append(_fit_block(reading.take(part), friction_angle[part], *start))
+    return ContactFit(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
+
+
+def _fit_block(
+    reading: Reading, delta: Floats, arclength: Floats, tip_angle: Floats, slope_angle: Floats
+) -> ContactFit:
+    target = _Target(reading, delta)
+    tip = _Descent(target, TIP, tip_angle - slope_angle - delta)
+    lying = _Descent(target, TANGENTIAL, arclength)
+    everyone = np.arange(delta.size)
+    for descent in (tip, lying):
+        descent.go(everyone, _ROUGH, _ROUGH_STEPS)
+    tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
+    for descent, own, other in ((tip, tip_misfit, lying_misfit), (lying, lying_misfit, tip_misfit)):
+        descent.go(np.flatnonzero((own <= _OUTDONE * (1.0 + other)) | np.isinf(other)), _SETTLED, _MOST_STEPS)
+    tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
+
+    ends = tip_misfit < lying_misfit
+    at_edge = np.isinf(np.minimum(tip_misfit, lying_misfit))
+    # Of a contact on the edge the variance is that of the sheet which the data miss by less.
+    ends[at_edge] = tip.misfit[at_edge] < lying.misfit[at_edge]
+    coordinates = np.where(ends[:, None], tip.z, lying.z)
+    covariance = np.where(ends[:, None, None], tip.covariance(), lying.covariance())
+    misfit = np.where(ends, tip.misfit, lying.misfit)
+    free = np.where(ends, PSI1, ARCLENGTH)[:, None]
+    spread = np.sqrt(np.take_along_axis(np.diagonal(covariance, axis1=1, axis2=2), free, axis=1)[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        clearance = np.where(ends, coordinates[:, PSI1] + delta, 1.0 - coordinates[:, ARCLENGTH]) / spread
+    where = np.flatnonzero(at_edge)
+    if where.size:
+        edge = _Descent(_Target(reading.take(where), delta[where]), None, np.ones(where.size))
+        edge.go(np.arange(where.size), _SETTLED, _MOST_STEPS)
+        coordinates[where], misfit[where], clearance[where] = edge.z, edge.misfit, 0.0
+    return ContactFit(
+        coordinates, covariance, misfit, np.where(ends, np.int8(TIP), np.int8(TANGENTIAL)), at_edge, clearance
+    )
+
+
+def fit_sheet(reading: Reading, delta: Floats, phase: int | None, start: Floats) -> SheetFit:
+    """The best contact of one phase, or on the edge (None), wherever on its sheet, beyond the edge as well.
+
+    Parameters
+    ----------
+    reading : Reading
+        n samples.
+    delta : ndarray, shape (n,)
+        δ = arctan μ.
+    phase : TIP, TANGENTIAL or None
+    start : ndarray, shape (n,)
+        ψ1 in tip contact, the arc length in tangential contact, to start from; NaN where several are to be tried.
+    """
+    descent = _Descent(_Target(reading, delta), phase, start)
+    descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
+    return SheetFit(descent.z, descent.covariance(), descent.misfit)
+
+
+class _Descent:
+    """Levenberg's and Marquardt's method on one sheet, for many samples."""
+
+    def __init__(self, target: _Target, phase: int | None, start: Floats) -> None:
+        self._target = target
+        self._phase = phase
+        self._free = _FREE[phase] if target.is_exact else (*_FREE[phase], DRIVE_ANGLE)
+        self.z = _starts(target, phase, start)
+        self._miss, self._slopes = target.at(self.z, np.arange(len(self.z)), self._free)
+        self.misfit = np.nan_to_num((self._miss * self._miss).sum(axis=1), nan=np.inf)
+        self._hardness = np.full(len(self.z), 1e-3)
+
+    def go(self, who: NDArray[np.intp], tolerance: float, most_steps: int) -> None:
+        """Descend until the gain that the next step promises is small."""
+        who = who[np.isfinite(self.misfit[who])]
+        for _ in range(most_steps):
+            if not who.size:
+                return
+            slopes, miss = self._slopes[who], self._miss[who]
+            normal, pull = np.swapaxes(slopes, 1, 2) @ slopes, (slopes * miss[:, :, None]).sum(axis=1)
+            index = np.arange(len(self._free))
+            normal[:, index, index] *= 1.0 + self._hardness[who, None]
+            step = (_inverse(normal) * pull[:, None, :]).sum(axis=2)
+            trial = self.z[who]
+            trial[:, self._free] -= step
+            new_miss, new_slopes = self._target.at(trial, who, self._free)
+            new = (new_miss * new_miss).sum(axis=1)
+            with np.errstate(invalid="ignore"):
+                better = new <= self.misfit[who]
+            settled = (step * pull).sum(axis=1) <= tolerance * (1.0 + self.misfit[who])
+            lucky = who[better]
+            self.z[lucky], self.misfit[lucky] = trial[better], new[better]
+            self._miss[lucky], self._slopes[lucky] = new_miss[better], new_slopes[better]
+            self._hardness[who] *= np.where(better, 0.1, 10.0)
+            who = who[~settled]
+
+    def misfit_before(self, delta: Floats) -> Floats:
+        """Sum of squares; infinite for contacts beyond the edge."""
+        beyond = self.z[:, PSI1] < -delta if self._phase == TIP else self.z[:, ARCLENGTH] > 1.0
+        return np.where(beyond, np.inf, self.misfit)
+
+    def covariance(self) -> Floats:
+        """Of the coordinates, shape (n, 4, 4)."""
+        covariance = np.zeros((len(self.z), 4, 4))
+        normal = np.swapaxes(self._slopes, 1, 2) @ self._slopes
+        covariance[np.ix_(range(len(self.z)), self._free, self._free)] = _inverse(normal)
+        return covariance
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Of symmetric positive matrices; infinite where there is none."""
+    scale = np.sqrt(np.diagonal(matrix, axis1=1, axis2=2))
+    with np.errstate(all="ignore"):
+        scaled = matrix / scale[:, :, None] / scale[:, None, :]
+        index = np.arange(matrix.shape[1])
+        scaled[:, index, index] = 1.0 + 1e-14
+        usable = np.isfinite(scaled).all(axis=(1, 2))
+        scaled[~usable] = np.eye(matrix.shape[1])
+        inverse = np.linalg.inv(scaled) / scale[:, :, None] / scale[:, None, :]
+    inverse[~usable] = np.inf
+    return inverse
+
+
+class _Target:
+    """Deviations of possible contacts from samples, in standard deviations."""
+
+    def __init__(self, reading: Reading, delta: Floats) -> None:
+        self.reading = reading
+        self.delta = delta
+        self.is_exact = not np.any(reading.angle_deviation)
+        self._whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
+
+    def misfit(self, z: Floats, who: NDArray[np.intp]) -> Floats:
+        """Sum of squares, shape (n,)."""
+        miss = self._miss(touching(z, self.delta[who]), z, who)
+        return np.asarray((miss * miss).sum(axis=1))
+
+    def at(self, z: Floats, who: NDArray[np.intp], free: tuple[int, ...]) -> tuple[Floats, Floats]:
+        """Deviations, shape (n, 3 or 4), and their derivatives by the free coordinates."""
+        rod, slopes = touching_and_slopes(z, self.delta[who])
+        loads = slopes.loads
+        loads[:, :, DRIVE_ANGLE] -= self.reading.leaning[who]
+        by = self._whitening[who] @ loads[:, :, free]
+        if not self.is_exact:
+            last = np.zeros((who.size, 1, len(free)))
+            last[:, 0, free.index(DRIVE_ANGLE)] = 1.0 / self.reading.angle_deviation[who]
+            by = np.concatenate([by, last], axis=1)
+        return self._miss(rod, z, who), by
+
+    def _miss(self, rod: Touching, z: Floats, who: NDArray[np.intp]) -> Floats:
+        reading = self.reading
+        turned = z[:, DRIVE_ANGLE] - reading.drive_angle[who]
+        off = rod.loads.T - reading.loads[who] - reading.leaning[who] * turned[:, None]
+        miss = (self._whitening[who] * off[:, None, :]).sum(axis=2)
+        if self.is_exact:
+            return miss
+        return np.concatenate([miss, (turned / reading.angle_deviation[who])[:, None]], axis=1)
+
+
+def _starts(target: _Target, phase: int | None, start: Floats) -> Floats:
+    """Coordinates to start from: the given ones, or the best of several."""
+    reading = target.reading
+    force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
+    z = np.stack([force, -target.delta, np.ones(force.size), reading.drive_angle], axis=1)
+    if phase is None:
+        options = [(FORCE, force * share) for share in (1.0, 0.5, 2.0)]
+    elif phase == TIP:
+        options = [(PSI1, np.full(force.size, 0.5 * np.pi * share)) for share in _STARTS]
+        options.insert(0, (PSI1, np.clip(start, -target.delta, 1.4)))
+    else:
+        options = [(ARCLENGTH, np.full(force.size, share)) for share in _STARTS]
+        options.insert(0, (ARCLENGTH, np.clip(start, 0.02, 1.0)))
+    best = np.full(force.size, np.inf)
+    found = np.full(z.shape, np.nan)
+    left = np.arange(force.size)
+    for number, (coordinate, values) in enumerate(options):
+        trial = z[left]
+        trial[:, coordinate] = values[left]
+        misfit = target.misfit(trial, left)
+        with np.errstate(invalid="ignore"):
+            better = misfit < best[left]
+        best[left[better]], found[left[better]] = misfit[better], trial[better]
+        if number == 0 and phase is not None:
+            left = np.flatnonzero(np.isinf(best))
+            if not left.size:
+                break
+    return found

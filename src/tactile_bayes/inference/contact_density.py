@@ -1,0 +1,157 @@
+"""The posterior density of single contacts, on the sheets of contacts that a rod can make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.elastica import TANGENTIAL, TIP
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoneSamples
+from tactile_bayes.reconstruction import Samples
+from tactile_bayes.record import turned
+from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, touching
+
+__all__ = ["ContactDensity", "ContactPrior", "Evaluated"]
+
+Floats = NDArray[np.float64]
+LogPrior = Callable[[Floats, Floats, Floats], Floats]
+ContactPrior = Literal["flat", "polar"] | LogPrior
+
+
+class Evaluated(NamedTuple):
+    """Contacts with the logarithm of their posterior density."""
+
+    log_density: Floats
+    """By force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)."""
+    place: Floats
+    """Contact point of the rod's centreline, slope angle, arc length; forward, shape (4, ..., n)."""
+
+
+class ContactDensity:
+    """Log-density of contacts, given one sample each.
+
+    The prior is a density over contact point and slope angle. A phase is a sheet in the space of (force, ψ1, s1, drive
+    angle), with three coordinates of its own; there the prior is multiplied by the volume that they span.
+
+    Parameters
+    ----------
+    samples : Samples
+        From a record with all channels; see `samples_of`.
+    readings : LoneSamples
+        The same samples as the load cell gave them, dimensionless.
+    base : ndarray, shape (n, 2)
+        The pivots, in the record's unit.
+    turning : bool
+        Whether the cell turns with the drive.
+    delta : float
+        Friction angle.
+    prior : "flat", "polar" or callable
+    """
+
+    def __init__(
+        self,
+        samples: Samples,
+        readings: LoneSamples,
+        base: Floats,
+        *,
+        turning: bool,
+        delta: float,
+        prior: ContactPrior,
+    ) -> None:
+        if not (callable(prior) or prior in ("flat", "polar")):
+            raise ParameterError(
+                f"prior is {prior!r}: choose 'flat' or 'polar', or give a function of contact_x, contact_y and "
+                "slope_angle that returns a log-density"
+            )
+        self.samples = samples
+        self.delta = delta
+        self.base = base
+        self._readings = readings
+        self._turning = turning
+        self._prior = prior
+
+    @property
+    def has_free_angle(self) -> bool:
+        """Whether the drive angle is uncertain."""
+        return bool(np.any(self.samples.reading.angle_deviation))
+
+    def take(self, where: NDArray[np.intp]) -> ContactDensity:
+        """The density of some of the samples."""
+        samples = self.samples
+        some = Samples(
+            samples.rod,
+            samples.reading.take(where),
+            samples.side[where],
+            samples.loaded[where],
+            samples.cut_off[where],
+            samples.has_noise,
+        )
+        readings, base = self._readings.take(where), self.base[where]
+        return ContactDensity(some, readings, base, turning=self._turning, delta=self.delta, prior=self._prior)
+
+    def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
+        """Contacts by coordinates, shape (..., n, 4), and phase, shape (..., n); −inf where none is possible.
+
+        The density is that of the coordinates which are free in the phase.
+        """
+        shape = coordinates.shape[:-1]
+        flat = coordinates.reshape(-1, 4)
+        tip = phase.reshape(-1) == TIP
+        rod = touching(flat, self.delta)
+        reading, side = self.samples.reading, self.samples.side
+        moment, force_x, force_y = rod.loads.reshape(3, *shape)
+        loads = np.stack([side * moment, side * force_x, force_y], axis=-1)
+        angle = coordinates[..., DRIVE_ANGLE]
+        if self._turning:
+            world = np.where(side < 0.0, np.pi - angle, angle)
+            loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], world)
+        alpha, arclength = rod.place[2:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            volume = np.log(np.where(tip, rod.volume_tip, rod.volume_tangential))
+            possible = (flat[:, PSI1] >= -self.delta) & (arclength <= 1.0) & (np.abs(alpha) < 0.5 * np.pi)
+            possible &= (rod.loads[0] >= 0.0) & np.isfinite(volume)
+            density = volume.reshape(shape) + self._readings.log_density(loads) + self._log_prior(rod.place, shape)
+            if self.has_free_angle:
+                off = (angle - reading.drive_angle) / reading.angle_deviation
+                density -= 0.5 * off**2 + np.log(np.sqrt(2.0 * np.pi) * reading.angle_deviation)
+        density = np.where(possible.reshape(shape) & ~np.isnan(density), density, -np.inf)
+        return Evaluated(density, rod.place.reshape(4, *shape))
+
+    def in_world(self, place: Floats) -> Floats:
+        """Places on the object's surface, in the record's unit and the axes of the world, shape (4, ..., n)."""
+        rod, side = self.samples.rod, self.samples.side
+        x, y, alpha, arclength = place
+        radius, length = 0.5 * rod.diameter, rod.length_unit
+        x, y = x * length - radius * np.sin(alpha), y * length + radius * np.cos(alpha)
+        return np.stack([self.base[:, 0] + side * x, self.base[:, 1] + y, side * alpha, arclength * length])
+
+    def _log_prior(self, place: Floats, shape: tuple[int, ...]) -> Floats | float:
+        if self._prior == "flat":
+            return 0.0
+        place = place.reshape(4, *shape)
+        if not callable(self._prior):
+            return np.asarray(-np.log(np.hypot(place[0], place[1])))
+        values = np.asarray(self._prior(*self.in_world(place)[:3]), dtype=float)
+        if values.shape != shape:
+            raise ParameterError(
+                f"the prior gave an array of shape {values.shape} for arguments of shape {shape}: it has to work "
+                "element by element"
+            )
+        return values
+
+    def unfold(self, points: Floats) -> tuple[Floats, NDArray[np.int8]]:
+        """Coordinates and phase from points (way, force[, drive angle]), shape (..., n, 2 or 3).
+
+        The way leads over both sheets: ψ1 + δ in tip contact, s1 − 1 in tangential contact, which is negative.
+        """
+        way = points[..., 0]
+        z = np.empty((*points.shape[:-1], 4))
+        z[..., FORCE] = points[..., 1]
+        z[..., PSI1] = np.maximum(way, 0.0) - self.delta
+        z[..., ARCLENGTH] = 1.0 + np.minimum(way, 0.0)
+        z[..., DRIVE_ANGLE] = points[..., 2] if self.has_free_angle else self.samples.reading.drive_angle
+        return z, np.where(way >= 0.0, np.int8(TIP), np.int8(TANGENTIAL))

@@ -1,0 +1,163 @@
+"""Posteriors of many single contacts at once, by importance sampling that certifies itself."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from arviz_stats.base.array import array_stats
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from tactile_bayes.contact_fit import fit_sheet
+from tactile_bayes.elastica import TANGENTIAL, TIP
+from tactile_bayes.inference.contact_density import ContactDensity
+from tactile_bayes.inference.contact_proposal import ContactProposal
+from tactile_bayes.reconstruction.raw import raw_contact
+from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
+
+__all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
+
+Floats = NDArray[np.float64]
+
+LARGEST_K = 0.7
+"""Pareto k̂ above which weights are not to be trusted (Vehtari et al. 2024, JMLR 25(72))."""
+
+LEAST_DRAWS = 400.0
+"""Effective draws below which there are too few."""
+
+_PILOTS = ((600, 0.25), (600, 0.15))
+"""Proposals of each pilot run, and the share that the less probable phase then has at least in the next run: the edge
+between the phases cuts off narrow layers of the posterior, which take more than one look."""
+
+_BLOCK = 64
+"""Samples worked on at a time."""
+
+
+class ContactWeights(NamedTuple):
+    """Weighted contacts for each of n samples."""
+
+    points: Floats
+    """Way, force and, if it is uncertain, drive angle, shape (draws, n, 2 or 3)."""
+    place: Floats
+    """Contact point, slope angle and arc length, forward and dimensionless, shape (4, draws, n)."""
+    log_weight: Floats
+    """Smoothed, with sum one, shape (draws, n)."""
+    pareto_k: Floats
+    """Shape (n,); infinite where nothing could be proposed."""
+    effective_draws: Floats
+    """Shape (n,)."""
+    log_evidence: Floats
+    """Logarithm of the sample's density under the prior, shape (n,)."""
+
+    @property
+    def certified(self) -> NDArray[np.bool_]:
+        """Where the weights stand for the posterior."""
+        return np.asarray((self.pareto_k <= LARGEST_K) & (self.effective_draws >= LEAST_DRAWS))
+
+
+def weigh_contacts(density: ContactDensity, draws: int, seeds: list[np.random.SeedSequence]) -> ContactWeights:
+    """Proposals and their weights; those of a sample follow from its seed alone.
+
+    Parameters
+    ----------
+    density : ContactDensity
+        Of n samples.
+    draws : int
+        Proposals for each of them.
+    seeds : list of SeedSequence
+        One for each block of samples; see `block_count`.
+    """
+    count = density.samples.side.size
+    blocks = [np.arange(begin, min(begin + _BLOCK, count)) for begin in range(0, count, _BLOCK)]
+    parts = [_weigh(density.take(b), draws, np.random.default_rng(s)) for b, s in zip(blocks, seeds, strict=False)]
+    axes = {"points": 1, "place": 2, "log_weight": 1}
+    columns = zip(ContactWeights._fields, zip(*parts, strict=True), strict=True)
+    return ContactWeights(*(np.concatenate(column, axis=axes.get(name, 0)) for name, column in columns))
+
+
+def _weigh(density: ContactDensity, draws: int, rng: np.random.Generator) -> ContactWeights:
+    approximation = _approximation(density)
+    longest = 0.5 * np.pi + density.delta
+    for count, least in _PILOTS:
+        points, _, log_weight = _evaluated(density, ContactProposal(*approximation, longest), count, rng)
+        approximation = _refined(points, log_weight, *approximation, least)
+    proposal = ContactProposal(*approximation, longest)
+    points, place, log_weight = _evaluated(density, proposal, draws, rng)
+    with np.errstate(invalid="ignore"):
+        log_evidence = logsumexp(log_weight, axis=0) - np.log(draws)
+    lost = ~np.isfinite(log_evidence)
+    log_weight[:, lost] = 0.0
+    smoothed, k = array_stats.psislw(-log_weight, axis=0)  # it takes the logarithm of what to divide by
+    smoothed = np.moveaxis(smoothed, -1, 0)
+    smoothed = smoothed - logsumexp(smoothed, axis=0)
+    effective = np.exp(-logsumexp(2.0 * smoothed, axis=0))
+    return ContactWeights(
+        points, place, smoothed, np.where(lost, np.inf, k), np.where(lost, 0.0, effective), log_evidence
+    )
+
+
+def _evaluated(
+    density: ContactDensity, proposal: ContactProposal, draws: int, rng: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    proposed = proposal.draw(draws, rng)
+    found = density.at(*density.unfold(proposed.points))
+    return proposed.points, found.place, found.log_density - proposed.log_density
+
+
+def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
+    """Normal approximations on both sheets: means of points (2, n, k), covariances, and the share of tip contact."""
+    reading, delta = density.samples.reading, np.full(density.samples.side.size, density.delta)
+    raw = raw_contact(reading, delta)
+    tip = fit_sheet(reading, delta, TIP, raw.tip_angle - raw.slope_angle - delta)
+    lying = fit_sheet(reading, delta, TANGENTIAL, raw.contact_arclength)
+    free = [DRIVE_ANGLE] if density.has_free_angle else []
+    means, covariances, usable = [], [], []
+    for sheet, way, shift in ((tip, PSI1, density.delta), (lying, ARCLENGTH, -1.0)):
+        order = [way, FORCE, *free]
+        mean = sheet.coordinates[:, order]
+        mean[:, 0] += shift
+        covariance = sheet.covariance[:, order][:, :, order]
+        good = np.isfinite(mean).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(sheet.misfit)
+        mean[~good], covariance[~good] = 0.1, np.eye(len(order))
+        index = np.arange(len(order))
+        covariance[:, index, index] *= 1.0 + 1e-9
+        means.append(mean)
+        covariances.append(covariance)
+        usable.append(good)
+    share = np.where(usable[0], np.where(usable[1], 0.5, 1.0), 0.0)
+    return np.stack(means), np.stack(covariances), share
+
+
+def _refined(
+    points: Floats, log_weight: Floats, mean: Floats, covariance: Floats, share: Floats, least: float
+) -> tuple[Floats, Floats, Floats]:
+    """The approximation as a pilot run corrects it."""
+    mean, covariance, share = mean.copy(), covariance.copy(), share.copy()
+    with np.errstate(invalid="ignore"):
+        weight = np.exp(log_weight - np.max(log_weight, axis=0))
+    weight[~np.isfinite(weight)] = 0.0
+    total = weight.sum(axis=0)
+    for phase, mine in ((0, points[..., 0] >= 0.0), (1, points[..., 0] < 0.0)):
+        own = np.where(mine, weight, 0.0)
+        mass = own.sum(axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            effective = mass**2 / (own**2).sum(axis=0)
+            own = own / mass
+            new = np.einsum("dn,dnk->nk", own, points)
+            off = points - new
+            spread = np.einsum("dn,dni,dnj->nij", own, off, off)
+        trusted = effective >= 10.0 * points.shape[-1]
+        spread[~trusted] = np.eye(points.shape[-1])
+        scale = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scaled = spread / scale[:, :, None] / scale[:, None, :]
+        trusted &= np.isfinite(scaled).all(axis=(1, 2))
+        scaled[~trusted] = np.eye(points.shape[-1])
+        trusted &= np.linalg.eigvalsh(scaled)[:, 0] > 1e-9
+        mean[phase][trusted], covariance[phase][trusted] = new[trusted], spread[trusted]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tip = np.where(points[..., 0] >= 0.0, weight, 0.0).sum(axis=0) / total
+    both = (share > 0.0) & (share < 1.0) & np.isfinite(tip)
+    share[both] = np.clip(tip[both], least, 1.0 - least)
+    return mean, covariance, share

@@ -1,0 +1,120 @@
+"""What contacts are proposed to importance sampling: for each sample and phase, normal densities cut at the edge."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
+
+__all__ = ["ContactProposal", "Proposed"]
+
+Floats = NDArray[np.float64]
+
+_WIDTHS = np.array([1.15, 3.0])
+"""Widths of the normal densities of a phase, in standard deviations of the posterior's approximation."""
+
+_SHARES = np.array([0.75, 0.25])
+
+_FARTHEST = 30.0
+"""Standard deviations beyond the edge at which a mean is kept, so that probabilities remain numbers."""
+
+
+class Proposed(NamedTuple):
+    """Points (way, force[, drive angle]) with the logarithm of the density that they were drawn from."""
+
+    points: Floats
+    """Shape (draws, n, 2 or 3)."""
+    log_density: Floats
+    """Shape (draws, n)."""
+
+
+class ContactProposal:
+    """A mixture for each of n samples.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (2, n, k)
+        Of way, force and, if k is 3, drive angle, in tip (first) and tangential contact.
+    covariance : ndarray, shape (2, n, k, k)
+    share : ndarray, shape (n,)
+        Of tip contact; 0 or 1 where the other phase has no approximation.
+    longest : float
+        Greatest way in tip contact; in tangential contact it is above −1.
+    """
+
+    def __init__(self, mean: Floats, covariance: Floats, share: Floats, longest: float) -> None:
+        self._share = share
+        self._root = np.linalg.cholesky(covariance)
+        spread = self._root[..., 0, 0]
+        self._low = np.array([0.0, -1.0])[:, None] + 0.0 * share
+        self._high = np.array([longest, 0.0])[:, None] + 0.0 * share
+        self._mean = mean.copy()
+        self._mean[..., 0] = np.clip(mean[..., 0], self._low - _FARTHEST * spread, self._high + _FARTHEST * spread)
+
+    def draw(self, count: int, rng: np.random.Generator) -> Proposed:
+        """`count` independent points for every sample; both phases have their share of them."""
+        size, k = self._share.size, self._mean.shape[-1]
+        # Stratified: the shares come out to one draw.
+        order = (np.arange(count)[:, None] + rng.random((count, size))) / count
+        phase = (order >= self._share).astype(np.intp)
+        wide = (rng.random((count, size)) >= _SHARES[0]).astype(np.intp)
+        who = np.broadcast_to(np.arange(size), phase.shape)
+        mean, root, width = self._mean[phase, who], self._root[phase, who], _WIDTHS[wide]
+        points = np.empty((count, size, k))
+        low, high = self._low[phase, who], self._high[phase, who]
+        scale = width * root[..., 0, 0]
+        normal = _between((low - mean[..., 0]) / scale, (high - mean[..., 0]) / scale, rng.random((count, size)))
+        points[..., 0] = np.clip(mean[..., 0] + scale * normal, low, high)
+        along = (points[..., 0] - mean[..., 0]) / root[..., 0, 0]
+        scale = width * root[..., 1, 1]
+        middle = mean[..., 1] + root[..., 1, 0] * along
+        normal = _between(-middle / scale, np.full(scale.shape, np.inf), rng.random((count, size)))
+        points[..., 1] = middle + scale * normal
+        if k == 3:
+            across = (points[..., 1] - middle) / root[..., 1, 1]
+            middle = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
+            points[..., 2] = middle + width * root[..., 2, 2] * rng.standard_normal((count, size))
+        return Proposed(points, self._log_density(points, phase, who))
+
+    def _log_density(self, points: Floats, phase: NDArray[np.intp], who: NDArray[np.intp]) -> Floats:
+        mean, root = self._mean[phase, who], self._root[phase, who]
+        k = points.shape[-1]
+        along = (points[..., 0] - mean[..., 0]) / root[..., 0, 0]
+        middle = mean[..., 1] + root[..., 1, 0] * along
+        across = (points[..., 1] - middle) / root[..., 1, 1]
+        squares = along**2 + across**2
+        if k == 3:
+            last = mean[..., 2] + root[..., 2, 0] * along + root[..., 2, 1] * across
+            squares += ((points[..., 2] - last) / root[..., 2, 2]) ** 2
+        volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) + 0.5 * k * np.log(2.0 * np.pi)
+        low, high = self._low[phase, who] - mean[..., 0], self._high[phase, who] - mean[..., 0]
+        parts = []
+        for width, share in zip(_WIDTHS, _SHARES, strict=True):
+            inside = _log_mass(low / (width * root[..., 0, 0]), high / (width * root[..., 0, 0]))
+            inside += log_ndtr(middle / (width * root[..., 1, 1]))
+            parts.append(np.log(share) - 0.5 * squares / width**2 - k * np.log(width) - inside)
+        with np.errstate(divide="ignore"):
+            of_phase = np.log(np.where(phase == 0, self._share, 1.0 - self._share))
+        return np.asarray(logsumexp(np.stack(parts), axis=0) - volume + of_phase)
+
+
+def _between(low: Floats, high: Floats, uniform: Floats) -> Floats:
+    """Standard normal numbers between two bounds; in the tail that keeps its digits."""
+    flip = low > 0.0
+    a, b = np.where(flip, -high, low), np.where(flip, -low, high)
+    below, above = ndtr(a), ndtr(b)
+    with np.errstate(divide="ignore"):
+        normal = ndtri(below + uniform * (above - below))
+    normal = np.clip(normal, a, b)
+    return np.where(flip, -normal, normal)
+
+
+def _log_mass(low: Floats, high: Floats) -> Floats:
+    """Logarithm of the normal probability between two bounds."""
+    flip = low > 0.0
+    a, b = np.where(flip, -high, low), np.where(flip, -low, high)
+    top = log_ndtr(b)
+    with np.errstate(divide="ignore"):
+        return np.asarray(top + np.log1p(-np.exp(np.minimum(log_ndtr(a) - top, -1e-300))))

@@ -1,0 +1,379 @@
+"""The posterior of every single contact, given its sample alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contact_density import ContactDensity, ContactPrior
+from tactile_bayes.inference.contact_importance import LARGEST_K, LEAST_DRAWS, ContactWeights, weigh_contacts
+from tactile_bayes.inference.ensembles import SamplerSettings, Seed, sample, scatter_walkers, spawn
+from tactile_bayes.load_cell import LoadCell, LoneSamples
+from tactile_bayes.reconstruction import samples_of
+from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
+from tactile_bayes.rod import Rod
+
+__all__ = ["ENGINES", "infer_contacts"]
+
+Floats = NDArray[np.float64]
+
+ENGINES = ("none", "importance sampling", "emcee")
+"""Who drew a sample's contacts, by code."""
+
+_CHAINS = 4
+_PROPOSALS = 4
+"""Proposals for each draw that is kept."""
+
+_EMCEE = SamplerSettings(walkers=24, min_ess=400.0, max_steps=4000)
+_PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
+_CONSTANT = ("sweep", "direction", "base_x", "base_y")
+
+
+class _Drawn(NamedTuple):
+    """Draws of one sample, and how they fared."""
+
+    points: Floats
+    """Way, force[, drive angle], shape (chains, draws, 2 or 3)."""
+    r_hat: float
+    ess: float
+    converged: bool
+
+
+def infer_contacts(
+    measured: xr.Dataset,
+    *,
+    load_cell: LoadCell | None = None,
+    prior: ContactPrior = "flat",
+    seed: Seed,
+    rod: Rod | None = None,
+    friction: float = 0.0,
+    draws: int = 1000,
+    method: Literal["auto", "importance", "emcee"] = "auto",
+    settings: SamplerSettings | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.DataTree:
+    """Posterior of contact point and slope angle for every loaded sample, from that sample alone.
+
+    A contact has three degrees of freedom, contact point and slope angle; whether the tip touches or the rod lies along
+    the object follows from them. Both phases are branches of one posterior, whose masses come out of it. Where errors
+    are small it is the normal distribution that `reconstruct` with method="constrained" gives; near first contact,
+    the change between the phases and snap-off it is not.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A record with all three load channels.
+    load_cell : LoadCell, optional
+        The sensor, in the record's units; by default the data sheet that the record carries. Its likelihood is used in
+        full: outliers, steps and cut-off readings too. What samples share, unknown bias and drift, counts as noise of
+        each.
+    prior : {"flat", "polar"} or callable
+        Density over contact point and slope angle, within the rod's reach and |slope_angle| < π/2; see Notes.
+    seed : int or numpy.random.SeedSequence
+        The same seed, the same draws.
+    rod : Rod, optional
+        In place of the rod that an SI record states.
+    friction : float
+        Coulomb's coefficient μ, taken as known.
+    draws : int
+        For each sample; a multiple of 4, since there are four independent chains.
+    method : {"auto", "importance", "emcee"}
+        How to draw. Importance sampling draws from normal approximations on both branches, weighs, and draws again from
+        the weighted; its own diagnostic, Pareto's k̂, certifies it, and where it does not, emcee takes over ("auto").
+    settings : SamplerSettings, optional
+        For emcee; by default 4 ensembles of 24 walkers until an effective sample size of 400.
+    progress : callable, optional
+        Is given the number of samples that are done, and of all that are loaded.
+
+    Returns
+    -------
+    xr.DataTree
+        In ArviZ's layout. Group `posterior`, dimensions (chain, draw, sample), NaN where a sample is not loaded:
+        contact_x, contact_y (on the object's surface), slope_angle, contact_arclength, drive_angle where the encoder is
+        not exact, all in the record's units, and tangential (1 in tangential contact, 0 in tip contact). Draws of
+        different samples are independent. Group `sample_stats`, by sample: tangential_probability, log_evidence (of the
+        dimensionless sample under the flat prior; NaN with emcee), pareto_k, effective_draws (of the weights), r_hat
+        and ess (of emcee), engine and converged. Groups `observed_data` and `constant_data`: the record.
+
+    Raises
+    ------
+    RecordError
+        If `measured` is no record, or misses a load channel.
+    ParameterError
+        If an option is impossible, or the load cell has no noise on a channel.
+    InferenceError
+        If no sample carries a load that noise does not explain.
+
+    Notes
+    -----
+    "flat" is flat in contact_x, contact_y and slope_angle: before the sample is seen, no place within reach and no
+    slope is preferred. One sample determines all three, and where the load is at least ten standard deviations of its
+    noise, the posterior moves by less than a tenth of a standard deviation between this prior and "polar", which is
+    flat in distance from the pivot, direction and slope. It is not harmless near first contact: contacts with loads
+    near zero lie within a thin shell at the end of the rod's reach, a flat prior gives that shell little room, and the
+    posterior of a weak contact leans to larger loads, that is inwards. Give your own density there if you know more.
+
+    The densities are those of coordinates on the two branches (force and direction of the tip; force and arc length)
+    times the volume in (contact_x, contact_y, slope_angle) that they span. With an exact drive angle the posterior is
+    one on a surface, to which the flat prior is carried as the limit of small encoder errors.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> contacts = infer_contacts(measured, seed=1)
+    >>> contacts["posterior"].sizes["draw"], int(contacts["sample_stats"].converged.sum())
+    (250, 46)
+    """
+    measured = with_rod(validate(measured), rod)
+    _refuse_options(draws, method)
+    cell = load_cell or LoadCell.from_record(measured)
+    if cell is None:
+        raise ParameterError(
+            "the record carries no data sheet of its load cell: give load_cell=LoadCell(force_noise=..., "
+            "moment_noise=...), or LoadCell.from_zero_load(record), which finds the noise in the unloaded samples"
+        )
+    density, loaded = _density(measured, cell, float(np.arctan(friction)), prior)
+    if not loaded.size:
+        raise InferenceError(
+            "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
+            "in the record's units?"
+        )
+    shared, own = spawn(seed, 2)
+    engine = np.full(loaded.size, 1)
+    points = np.empty((_CHAINS, draws // _CHAINS, loaded.size, 3 if density.has_free_angle else 2))
+    r_hat, ess, converged = (np.full(loaded.size, value) for value in (np.nan, np.nan, False))
+    weights: ContactWeights | None = None
+    with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
+        if method != "emcee":
+            weights = weigh_contacts(density, _PROPOSALS * draws, spawn(shared, loaded.size))
+            points[:] = _resampled(weights, draws, np.random.default_rng(spawn(shared, loaded.size + 1)[-1]))
+            converged = weights.certified
+        if method != "importance":
+            left = np.flatnonzero(~converged)
+            seeds = spawn(own, loaded.size)
+            for done, i in enumerate(left.tolist()):
+                if progress is not None:
+                    progress(loaded.size - left.size + done, loaded.size)
+                drawn = _walked(density, i, weights, draws, seeds[i], settings or _EMCEE)
+                points[:, :, i], r_hat[i], ess[i], converged[i] = drawn
+            engine[left] = 2
+        if progress is not None:
+            progress(loaded.size, loaded.size)
+        groups = _groups(measured, density, loaded, points)
+    groups["sample_stats"] = _stats(measured, loaded, weights, engine, points, r_hat, ess, converged)
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = _attributes(measured, cell, seed, prior, friction, draws, method, settings, engine, converged)
+    return tree
+
+
+def _refuse_options(draws: int, method: str) -> None:
+    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < _CHAINS or draws % _CHAINS:
+        raise ParameterError(f"draws is {draws!r}: give a multiple of {_CHAINS}, one share for each chain")
+    if method not in ("auto", "importance", "emcee"):
+        raise ParameterError(f"method is {method!r}: choose 'auto', 'importance' or 'emcee'")
+
+
+def _density(
+    measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactPrior
+) -> tuple[ContactDensity, NDArray[np.intp]]:
+    """The density of the loaded samples, and which they are."""
+    samples = samples_of(measured, cell)
+    rod = samples.rod
+    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    readings = LoneSamples(
+        cell.dimensionless(rod), np.stack([measured[name].values for name in CHANNELS], axis=-1) / units
+    )
+    base = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
+    turning = frame_of(measured) == "turning"
+    loaded = np.flatnonzero(samples.loaded)
+    return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
+
+
+def _resampled(weights: ContactWeights, draws: int, rng: np.random.Generator) -> Floats:
+    """Points drawn by their weights, shape (chains, draws, n, 2 or 3); a chain has proposals of its own."""
+    count, each = weights.points.shape[0] // _CHAINS, draws // _CHAINS
+    points = np.empty((_CHAINS, each, *weights.points.shape[1:]))
+    for chain in range(_CHAINS):
+        part = slice(chain * count, (chain + 1) * count)
+        for i in range(points.shape[2]):
+            weight = np.exp(weights.log_weight[part, i] - weights.log_weight[part, i].max())
+            level = np.cumsum(weight)
+            picks = np.searchsorted(level / level[-1], (np.arange(each) + rng.random()) / each)
+            points[chain, :, i] = weights.points[part, i][rng.permutation(np.minimum(picks, count - 1))]
+    return points
+
+
+def _walked(
+    density: ContactDensity,
+    i: int,
+    weights: ContactWeights | None,
+    draws: int,
+    seed: np.random.SeedSequence,
+    settings: SamplerSettings,
+) -> _Drawn:
+    """Draws of one sample by emcee, over both branches at once."""
+    alone = density.take(np.array([i]))
+    if weights is None:
+        weights = weigh_contacts(alone, 1000, spawn(seed, 3)[2:])
+        proposed, log_weight = weights.points[:, 0], weights.log_weight[:, 0]
+    else:
+        proposed, log_weight = weights.points[:, i], weights.log_weight[:, i]
+    weight = np.exp(log_weight - log_weight.max())
+    names = ("way", "force", "drive angle")[: proposed.shape[-1]]
+    spread = np.sqrt(np.maximum(np.cov(proposed.T, aweights=weight).diagonal(), 1e-20))
+
+    def log_probability(points: Floats) -> Floats:
+        return alone.at(*alone.unfold(points[:, None, :])).log_density[:, 0]
+
+    def draw(rng: np.random.Generator, count: int) -> Floats:
+        near = proposed[rng.choice(weight.size, count, p=weight / weight.sum())]
+        return np.asarray(near + spread * rng.standard_normal(near.shape))
+
+    start = scatter_walkers(
+        log_probability, draw, parameters=len(names), seed=spawn(seed, 2)[0], settings=settings, max_rounds=1000
+    )
+    found = sample(log_probability, start, names=names, seed=spawn(seed, 2)[1], settings=settings)
+    each = draws // _CHAINS
+    chains = np.resize(np.arange(found.samples.shape[0]), _CHAINS)
+    kept = np.linspace(0, found.samples.shape[1] - 1, each).astype(int)
+    points = found.samples[chains][:, kept]
+    return _Drawn(points, float(np.max(found.r_hat)), float(np.min(found.ess_bulk)), found.converged)
+
+
+def _groups(
+    measured: xr.Dataset, density: ContactDensity, loaded: NDArray[np.intp], points: Floats
+) -> dict[str, xr.Dataset]:
+    size = measured.sizes["sample"]
+    coordinates, _ = density.unfold(points)
+    found = density.at(*density.unfold(points))
+    place = density.in_world(found.place)
+    units = measured.attrs["units"]
+    dims = ("chain", "draw", "sample")
+
+    def everywhere(values: Floats) -> Floats:
+        spread = np.full((*values.shape[:2], size), np.nan)
+        spread[:, :, loaded] = values
+        return spread
+
+    variables: dict[str, Any] = {
+        name: (
+            dims,
+            everywhere(values),
+            {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name},
+        )
+        for name, values in zip(_PLACE, place, strict=True)
+    }
+    if density.has_free_angle:
+        side = density.samples.side
+        angle = np.where(side < 0.0, np.pi - coordinates[..., 3], coordinates[..., 3])
+        variables["drive_angle"] = dims, everywhere(angle), {"units": "rad", "long_name": "drive angle"}
+    tangential = everywhere((points[..., 0] < 0.0).astype(float))
+    variables["tangential"] = dims, tangential, {"units": "1", "long_name": "whether the contact is tangential"}
+    coords = {"chain": np.arange(points.shape[0]), "draw": np.arange(points.shape[1]), "sample": np.arange(size)}
+    observed = [name for name in ("drive_angle", *CHANNELS) if name in measured]
+    return {
+        "posterior": xr.Dataset(variables, coords=coords),
+        "observed_data": measured[observed].assign_coords(sample=np.arange(size)),
+        "constant_data": measured[list(_CONSTANT)].assign_coords(sample=np.arange(size)),
+    }
+
+
+def _stats(
+    measured: xr.Dataset,
+    loaded: NDArray[np.intp],
+    weights: ContactWeights | None,
+    engine: NDArray[np.intp],
+    points: Floats,
+    r_hat: Floats,
+    ess: Floats,
+    converged: NDArray[np.bool_],
+) -> xr.Dataset:
+    size = measured.sizes["sample"]
+
+    def everywhere(values: Floats) -> Floats:
+        spread = np.full(size, np.nan)
+        spread[loaded] = values
+        return spread
+
+    tangential = (points[..., 0] < 0.0).mean(axis=(0, 1))
+    nothing = np.full(loaded.size, np.nan)
+    k, effective, evidence = nothing, nothing, nothing
+    if weights is not None:
+        k, effective = weights.pareto_k, weights.effective_draws
+        by_weight = np.where(weights.points[..., 0] < 0.0, np.exp(weights.log_weight), 0.0).sum(axis=0)
+        tangential = np.where(engine == 1, by_weight, tangential)
+        evidence = np.where(engine == 1, weights.log_evidence, np.nan)
+    codes = np.zeros(size, dtype=np.int8)
+    codes[loaded] = engine
+    done = np.zeros(size, dtype=np.int8)
+    done[loaded] = converged
+    return xr.Dataset(
+        {
+            "tangential_probability": ("sample", everywhere(tangential)),
+            "log_evidence": ("sample", everywhere(evidence)),
+            "pareto_k": ("sample", everywhere(k)),
+            "effective_draws": ("sample", everywhere(effective)),
+            "r_hat": ("sample", everywhere(r_hat)),
+            "ess": ("sample", everywhere(ess)),
+            "engine": ("sample", codes, {"flag_values": [0, 1, 2], "flag_meanings": "none importance_sampling emcee"}),
+            "converged": ("sample", done),
+        },
+        coords={"sample": np.arange(size)},
+    )
+
+
+def _attributes(
+    measured: xr.Dataset,
+    cell: LoadCell,
+    seed: Seed,
+    prior: ContactPrior,
+    friction: float,
+    draws: int,
+    method: str,
+    settings: SamplerSettings | None,
+    engine: NDArray[np.intp],
+    converged: NDArray[np.bool_],
+) -> dict[str, Any]:
+    by_emcee, failed = int(np.count_nonzero(engine == 2)), int(np.count_nonzero(~converged))
+    message = f"{engine.size} contacts, {engine.size - by_emcee} by importance sampling, {by_emcee} by emcee"
+    if failed:
+        why = (
+            f"Pareto's k̂ above {LARGEST_K:g} or fewer than {LEAST_DRAWS:g} effective draws"
+            if method == "importance"
+            else "emcee ran out of steps"
+        )
+        message += f"; not converged: {failed} ({why}), see sample_stats"
+    approximations = list(cell.approximations)
+    if cell.drift is not None or any(cell.bias_uncertainty):
+        approximations.append("unknown bias and drift, which samples share, count as noise of each sample")
+    if cell.drive_angle_resolution:
+        approximations.append("the steps of the drive angle are taken for noise of a twelfth of their square")
+    return {
+        "inference_library": "tactile-bayes",
+        "inference_library_version": version("tactile-bayes"),
+        "sampler": f"importance sampling, emcee {version('emcee')}",
+        "seed": str(seed.entropy if isinstance(seed, np.random.SeedSequence) else seed),
+        "settings": json.dumps(asdict(settings or _EMCEE)),
+        "data_sha256": record_hash(measured),
+        "prior": prior if isinstance(prior, str) else getattr(prior, "__name__", repr(prior)),
+        "friction": friction,
+        "draws": draws,
+        "method": method,
+        "dependence": "samples are independent of one another",
+        "converged": int(failed == 0),
+        "message": message,
+        "units": measured.attrs["units"],
+        "approximations": "; ".join(approximations),
+    }

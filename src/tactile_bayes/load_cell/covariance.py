@@ -1,0 +1,39 @@
+"""The covariance of a sensor's errors, each sample looked at by itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.load_cell.data_sheet import DataSheet
+
+__all__ = ["covariance", "wandering_deviation"]
+
+Floats = NDArray[np.float64]
+
+
+def covariance(sheet: DataSheet, loads: Floats) -> Floats:
+    """Of the readings of loads, shape (samples, 3), shape (samples, 3, 3); see `LoadCell.covariance`."""
+    nu = sheet.degrees_of_freedom
+    widening = 1.0 if math.isinf(nu) else nu / (nu - 2.0) if nu > 2.0 else math.inf
+    deviation = np.broadcast_to(sheet.deviation(loads), loads.shape)
+    with np.errstate(invalid="ignore"):
+        shared = widening * deviation[:, :, None] * sheet.correlation_matrix * deviation[:, None, :]
+    result = np.where(np.isnan(shared), 0.0, shared)
+    index = np.arange(3)
+    result[:, index, index] += sheet.resolution**2 / 12.0 + wandering_deviation(sheet, len(loads)) ** 2
+    return result
+
+
+def wandering_deviation(sheet: DataSheet, samples: int) -> Floats:
+    """Standard deviation of bias and drift at each sample, shape (samples, 3)."""
+    bias = np.broadcast_to(sheet.bias_uncertainty, (samples, 3))
+    if sheet.drift is None:
+        return bias
+    gone = np.arange(samples)
+    kept = sheet.drift.kept ** (2 * gone)
+    growth = gone if sheet.drift.kept == 1.0 else (1.0 - kept) / (1.0 - sheet.drift.kept**2)
+    share = np.sqrt(sheet.drift.first * kept + sheet.drift.step * growth)
+    return np.hypot(bias, share[:, None] * sheet.drift.sizes)

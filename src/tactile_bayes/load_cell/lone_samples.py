@@ -1,0 +1,93 @@
+"""How likely each sample of a record is by itself, what it shares with the others being noise of its own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell.covariance import wandering_deviation
+from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.load_cell.likelihood import log_likelihood
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["LoneSamples"]
+
+Floats = NDArray[np.float64]
+
+_LOG_2PI = math.log(2.0 * math.pi)
+
+
+class LoneSamples:
+    """Readings, each to be looked at by itself.
+
+    Where noise is white this is exact. An unknown bias and drift are shared by samples; a sample by itself sees in them
+    no more than noise, of the standard deviation that they have at its place in the record.
+
+    Parameters
+    ----------
+    sheet : DataSheet
+    readings : ndarray, shape (n, 3)
+        In the sheet's units and frame, from the first sample of a record on, no channel missing.
+
+    Raises
+    ------
+    ParameterError
+        If a channel has no noise; if drift or an unknown bias come together with outliers, or with a reading at the end
+        of the range.
+    """
+
+    def __init__(self, sheet: DataSheet, readings: Floats) -> None:
+        self._sheet = sheet
+        self._readings = readings
+        self._wandering = wandering_deviation(sheet, len(readings))
+        for index, noise in enumerate(sheet.noise):
+            if noise == 0.0:
+                name = "moment_noise" if index == 0 else "force_noise"
+                raise ParameterError(
+                    f"{CHANNELS[index]} is measured, but the load cell has no noise on it: give LoadCell({name}=...) a "
+                    "positive standard deviation"
+                )
+        if np.any(self._wandering):
+            if math.isfinite(sheet.degrees_of_freedom):
+                raise ParameterError(
+                    "drift or an unknown bias with outliers (degrees_of_freedom) has no closed form: leave one of them "
+                    "out"
+                )
+            cut_off = np.argwhere(sheet.cuts_off(readings))
+            if cut_off.size:
+                sample, channel = cut_off[0]
+                raise ParameterError(
+                    f"sample {sample} of {CHANNELS[channel]} is at the end of the load cell's range, and with drift or "
+                    "an unknown bias the likelihood of such a sample has no closed form: remove it, or leave drift and "
+                    "bias_uncertainty out"
+                )
+
+    def take(self, where: NDArray[np.intp]) -> LoneSamples:
+        """Some of the samples."""
+        some = object.__new__(LoneSamples)
+        some._sheet, some._readings, some._wandering = self._sheet, self._readings[where], self._wandering[where]
+        return some
+
+    def log_density(self, loads: Floats) -> Floats:
+        """Of the readings, shape (..., n), for loads of shape (..., n, 3); NaN where a load is."""
+        sheet = self._sheet
+        if not np.any(self._wandering):
+            return log_likelihood(sheet, self._readings, loads, pointwise=True)
+        residual = self._readings - sheet.expected(loads)
+        deviation = np.broadcast_to(
+            sheet.deviation(loads), loads.shape if sheet.relative_noise else residual.shape[-2:]
+        )
+        own = sheet.resolution**2 / 12.0 + self._wandering**2
+        if not any(sheet.correlation):
+            variance = deviation**2 + own
+            return np.asarray(-0.5 * (residual**2 / variance + np.log(variance) + _LOG_2PI).sum(axis=-1))
+        matrix = deviation[..., :, None] * sheet.correlation_matrix * deviation[..., None, :]
+        matrix = matrix + own[..., None] * np.eye(3)
+        known = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
+        root = np.linalg.cholesky(np.where(known, matrix, np.eye(3)))
+        white = (np.linalg.inv(root) @ residual[..., None])[..., 0]
+        volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
+        return np.asarray(-0.5 * (white**2).sum(axis=-1) - volume - 1.5 * _LOG_2PI)

@@ -1,0 +1,175 @@
+"""Contacts with their uncertainty: ellipses of first order, and regions of a posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from scipy.special import chdtri
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, legend_entry, single_axes
+from tactile_bayes.plotting.maps import finish_map, outline
+from tactile_bayes.uncertainty.contact_region import contact_region
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tactile_bayes.contours.base import Contour
+
+__all__ = ["contact_ellipses", "contact_regions"]
+
+_DRAWN = 12
+
+
+def contact_ellipses(
+    contacts: xr.Dataset,
+    *,
+    probability: float = 0.9,
+    samples: Sequence[int] | None = None,
+    truth: Contour | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Contact points of `reconstruct` with ellipses that contain them with a probability, to first order.
+
+    Parameters
+    ----------
+    contacts : xr.Dataset
+        From `reconstruct`, with standard deviations.
+    probability : float
+        Of each ellipse.
+    samples : sequence of int, optional
+        Which samples; by default a dozen of those whose status is "ok", evenly spread.
+    truth : Contour, optional
+        The true contour.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If no sample has an ellipse, or the probability is not in (0, 1).
+    """
+    from matplotlib.patches import Ellipse
+
+    _refuse_probability(probability)
+    spread_x, spread_y = contacts["contact_x_sd"].values, contacts["contact_y_sd"].values
+    has = np.isfinite(spread_x) & np.isfinite(spread_y)
+    chosen = _spread(np.flatnonzero(has & (contacts["status"].values == "ok")), samples)
+    chosen = chosen[has[chosen]]
+    if not chosen.size:
+        raise ParameterError(
+            "no contact here has a standard deviation: reconstruct with a load cell that states its noise, and choose "
+            "samples that are in contact"
+        )
+    ax = single_axes() if ax is None else ax
+    radius = float(np.sqrt(chdtri(2.0, 1.0 - probability)))
+    x, y, rho = (contacts[name].values for name in ("contact_x", "contact_y", "contact_xy_correlation"))
+    for i in chosen.tolist():
+        shared = rho[i] * spread_x[i] * spread_y[i]
+        variances, axes = np.linalg.eigh([[spread_x[i] ** 2, shared], [shared, spread_y[i] ** 2]])
+        across, along = 2.0 * radius * np.sqrt(np.maximum(variances, 0.0))
+        angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))
+        colour = PALETTE[str(contacts["contact_phase"].values[i])]
+        ax.add_patch(Ellipse((x[i], y[i]), along, across, angle=angle, fill=False, edgecolor=colour, linewidth=1.0))
+        ax.plot(x[i], y[i], marker="+", color=colour, markersize=5.0, zorder=3)
+    _finish(ax, contacts, chosen, x, y, truth, contacts["contact_phase"].values, f"{100 * probability:.6g} % ellipse")
+    return ax
+
+
+def contact_regions(
+    posterior: xr.DataTree,
+    *,
+    probability: float = 0.9,
+    samples: Sequence[int] | None = None,
+    truth: Contour | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Regions that contain contact points with a probability, as the draws of `infer_contacts` have them.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contacts`.
+    probability : float
+        Of each region.
+    samples : sequence of int, optional
+        Which samples; by default a dozen of those with a contact, evenly spread.
+    truth : Contour, optional
+        The true contour.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If no sample has a contact, or the probability is not in (0, 1).
+    """
+    _refuse_probability(probability)
+    draws = posterior_draws(posterior)
+    x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))
+    tangential = draws["tangential"].mean(("chain", "draw")).values
+    has = np.isfinite(x) & np.isfinite(y)
+    chosen = _spread(np.flatnonzero(has), samples)
+    chosen = chosen[has[chosen]]
+    if not chosen.size:
+        raise ParameterError("no sample here has a contact: choose others")
+    ax = single_axes() if ax is None else ax
+    phase = np.where(tangential > 0.5, "tangential", "tip")
+    for i in chosen.tolist():
+        region = contact_region(draws, int(draws["sample"].values[i]), probability)
+        grid_x, grid_y, density = region.grid()
+        ax.contour(grid_x, grid_y, density, levels=[region.level], colors=[PALETTE[phase[i]]], linewidths=1.0)
+        ax.plot(x[i], y[i], marker="+", color=PALETTE[phase[i]], markersize=5.0, zorder=3)
+    _finish(ax, draws, chosen, x, y, truth, phase, f"{100 * probability:.6g} % region")
+    return ax
+
+
+def _refuse_probability(probability: float) -> None:
+    if not 0.0 < probability < 1.0:
+        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.9")
+
+
+def _spread(candidates: np.ndarray[Any, np.dtype[np.intp]], samples: Sequence[int] | None) -> Any:
+    """The samples asked for, or a dozen of the candidates."""
+    if samples is not None:
+        return np.atleast_1d(np.asarray(samples, dtype=np.intp))
+    if candidates.size <= _DRAWN:
+        return candidates
+    return candidates[np.linspace(0, candidates.size - 1, _DRAWN).astype(int)]
+
+
+def _finish(
+    ax: Axes,
+    labelled: xr.Dataset,
+    chosen: Any,
+    x: Floats,
+    y: Floats,
+    truth: Contour | None,
+    phase: Any,
+    label: str,
+) -> None:
+    for name, words in PHASES.items():
+        if np.any(phase[chosen] == name):
+            legend_entry(ax, f"{label}, {words}", color=PALETTE[name], linewidth=1.0)
+    ax.autoscale_view()
+    if truth is not None:
+        low, high = ax.get_xlim()
+        bottom, top = ax.get_ylim()
+        ax.plot(
+            *outline(truth, low, high), color=PALETTE["change"], linewidth=1.0, linestyle="--", label="true contour"
+        )
+        ax.set_xlim(low, high)
+        ax.set_ylim(bottom, top)
+    finish_map(ax, labelled["contact_x"].attrs)

@@ -1,0 +1,7 @@
+"""Step 2: contact points from a measured record, sample by sample, raw or constrained to what a rod can do."""
+
+from tactile_bayes.reconstruction.estimate import STATUSES
+from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, contact_sides, loaded_samples, samples_of
+from tactile_bayes.reconstruction.step2 import reconstruct
+
+__all__ = ["FALSE_ALARM", "STATUSES", "Samples", "contact_sides", "loaded_samples", "reconstruct", "samples_of"]

@@ -1,0 +1,90 @@
+"""Constrained Step 2: the most likely of the contacts that a rod can make."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contact_fit import ContactFit, fit_contacts
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.reconstruction.estimate import (
+    AT_EDGE,
+    CUT_OFF,
+    NO_CONTACT,
+    NO_ZERO,
+    NONLINEAR,
+    OK,
+    Estimate,
+    bends_too_much,
+)
+from tactile_bayes.reconstruction.raw import raw_contact
+from tactile_bayes.reconstruction.samples import Samples
+from tactile_bayes.touching import touching, touching_and_slopes
+
+__all__ = ["constrained_estimate", "refuse_without_noise"]
+
+Floats = NDArray[np.float64]
+
+
+def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
+    """Most likely contacts, with their covariance on the sheet of possible ones.
+
+    Raises
+    ------
+    ParameterError
+        If a channel has no noise, or noise without a variance.
+    """
+    refuse_without_noise(samples)
+    count = delta.size
+    place, covariance = np.full((count, 4), np.nan), np.full((count, 4, 4), np.nan)
+    misfit, distance = np.full(count, np.nan), np.full(count, np.nan)
+    phase = np.zeros(count, dtype=np.int8)
+    status = np.where(samples.loaded, np.where(samples.cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
+    with np.errstate(over="ignore"):
+        usable = np.isfinite(samples.reading.loads**2).all(axis=1)
+    where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)
+    if where.size:
+        reading = samples.reading.take(where)
+        fit = fit_contacts(reading, delta[where], raw_contact(reading, delta[where]))
+        rod, slopes = touching_and_slopes(fit.coordinates, delta[where])
+        found = np.isfinite(fit.misfit) & np.isfinite(rod.place).all(axis=0)
+        by = slopes.place
+        covariance[where] = np.where(found[:, None, None], by @ fit.covariance @ np.swapaxes(by, 1, 2), np.nan)
+        place[where] = np.where(found[:, None], rod.place.T, np.nan)
+        phase[where] = np.where(found, fit.phase, 0)
+        misfit[where], distance[where] = np.where(found, (fit.misfit, fit.clearance), np.nan)
+        bent = bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
+        status[where] = np.where(found, np.where(fit.at_edge, AT_EDGE, np.where(bent, NONLINEAR, OK)), NO_ZERO)
+    return Estimate(place, covariance, phase, status, misfit, distance)
+
+
+def refuse_without_noise(samples: Samples) -> None:
+    """Refuse a load cell that does not say how far each channel is to be trusted."""
+    covariance = samples.reading.covariance
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    if not np.all(np.isfinite(covariance)):
+        raise ParameterError(
+            "Student's t with 2 degrees of freedom and fewer has no standard deviation to weigh the channels by: use "
+            "method='raw', or more degrees of freedom"
+        )
+    if not np.all(variance > 0.0):
+        raise ParameterError(
+            "which contact is most likely depends on the noise of every channel, and the load cell has none on at "
+            "least one: give LoadCell(force_noise=..., moment_noise=...), or one of LoadCell.from_zero_load(record)"
+        )
+
+
+def _aside(fit: ContactFit, delta: Floats) -> list[tuple[Floats, Floats]]:
+    """Contacts one standard deviation aside, along the axes of the covariance."""
+    scale = np.sqrt(np.diagonal(fit.covariance, axis1=1, axis2=2))
+    scale = np.where((scale > 0.0) & np.isfinite(scale), scale, 1.0)
+    with np.errstate(invalid="ignore"):
+        scaled = np.nan_to_num(fit.covariance / scale[:, :, None] / scale[:, None, :], posinf=1e6)
+    variances, axes = np.linalg.eigh(scaled)
+    pairs = []
+    for k in range(4):
+        step = scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
+        if np.any(variances[:, k] > 1e-9):
+            more, less = (touching(fit.coordinates + sign * step, delta).place.T for sign in (1.0, -1.0))
+            pairs.append((more, less))
+    return pairs

@@ -1,0 +1,92 @@
+"""The estimate: a contact for every sample, its covariance to first order, and whether that order holds."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "AT_EDGE",
+    "BEYOND_TIP",
+    "CUT_OFF",
+    "NONLINEAR",
+    "NO_CONTACT",
+    "NO_ZERO",
+    "OK",
+    "STATUSES",
+    "Estimate",
+    "bends_too_much",
+    "spread_across",
+]
+
+Floats = NDArray[np.float64]
+
+NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE = range(7)
+
+STATUSES = (
+    "no contact",
+    "cut off",
+    "no zero of curvature",
+    "ok",
+    "nonlinear",
+    "beyond the tip",
+    "at the edge",
+)
+"""What can become of a sample, by code."""
+
+_MOST_BEND = 0.5
+"""Shift by curvature, in standard deviations, above which a covariance of first order is not to be trusted."""
+
+
+class Estimate(NamedTuple):
+    """Contacts, dimensionless, forward; NaN where there is none."""
+
+    place: Floats
+    """Contact point, slope angle and arc length, shape (n, 4)."""
+    covariance: Floats
+    """Of the place, shape (n, 4, 4)."""
+    phase: NDArray[np.int8]
+    status: NDArray[np.int8]
+    """Code in `STATUSES`."""
+    misfit: Floats | None = None
+    """Sum of squared deviations that is left, shape (n,)."""
+    edge_distance: Floats | None = None
+    """Distance from the change between tip and tangential contact, in standard deviations, shape (n,)."""
+
+
+def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floats]:
+    """Standard deviations along the contour and normal to it of points with covariance (n, ≥ 2, ≥ 2)."""
+    cos, sin = np.cos(slope_angle), np.sin(slope_angle)
+    xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
+    with np.errstate(invalid="ignore"):
+        along = np.sqrt(np.maximum(cos * cos * xx + sin * sin * yy + 2.0 * sin * cos * xy, 0.0))
+        normal = np.sqrt(np.maximum(sin * sin * xx + cos * cos * yy - 2.0 * sin * cos * xy, 0.0))
+    return along, normal
+
+
+def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> NDArray[np.bool_]:
+    """Whether contacts one standard deviation aside do not lie as a covariance of first order has it.
+
+    Parameters
+    ----------
+    place : ndarray, shape (n, 4)
+    covariance : ndarray, shape (n, 4, 4)
+    aside : list of pairs of ndarray, shape (n, ≥ 2)
+        Where the contact would be, had the data been one standard deviation more, or less, of each independent error.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        True as well where such a contact does not exist.
+    """
+    along, normal = spread_across(covariance, place[:, 2])
+    cos, sin = np.cos(place[:, 2]), np.sin(place[:, 2])
+    bent = np.zeros(len(place), dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for more, less in aside:
+            x, y = (0.5 * (more[:, axis] + less[:, axis]) - place[:, axis] for axis in (0, 1))
+            bent |= ~(np.abs(x * cos + y * sin) <= _MOST_BEND * along + 1e-9)
+            bent |= ~(np.abs(y * cos - x * sin) <= _MOST_BEND * normal + 1e-9)
+    return bent

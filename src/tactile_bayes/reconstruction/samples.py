@@ -1,0 +1,140 @@
+"""The samples of a record: which of them carry a load, on which side of the object, and what they say of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from tactile_bayes.contact_fit import Reading
+from tactile_bayes.errors import RecordError
+from tactile_bayes.load_cell import LoadCell, rough_noise
+from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
+from tactile_bayes.rod import Rod
+
+__all__ = ["FALSE_ALARM", "Samples", "contact_sides", "loaded_samples", "samples_of"]
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FALSE_ALARM = 1e-3
+"""Share of unloaded samples that noise makes look loaded."""
+
+_MIRROR = np.array([-1.0, -1.0, 1.0])
+"""Signs of the loads of a backward contact seen as a forward one."""
+
+
+class Samples(NamedTuple):
+    """The samples of a record as arrays, dimensionless, backward contacts mirrored to forward ones."""
+
+    rod: Rod
+    reading: Reading
+    """Known errors taken out, and the forces along the axes of the world."""
+    side: Floats
+    """+1, or −1 where a sample is mirrored, shape (n,)."""
+    loaded: Flags
+    cut_off: Flags
+    """Whether a channel is at the end of its range."""
+    has_noise: bool
+    """Whether anything is known of the errors."""
+
+
+def samples_of(measured: xr.Dataset, cell: LoadCell) -> Samples:
+    """The samples of a valid record with all load channels.
+
+    Raises
+    ------
+    RecordError
+        If a load channel is missing.
+    """
+    absent = [name for name in CHANNELS if name not in present_channels(measured)]
+    if absent:
+        raise RecordError(
+            f"Step 2 needs all of {', '.join(CHANNELS)}, and {', '.join(absent)} was not measured: infer_contour works "
+            "without"
+        )
+    rod = rod_of(measured)
+    loaded = loaded_samples(measured, cell)
+    readings = np.stack([measured[name].values for name in CHANNELS], axis=-1)
+    cut_off: Flags = np.any(cell.cuts_off(readings), axis=-1)
+    corrected = cell.corrected(measured)
+    side = contact_sides(corrected)
+    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    angle = corrected.drive_angle.values
+    with np.errstate(over="ignore", invalid="ignore"):  # a load beyond all numbers has no zero of curvature
+        loads = np.stack([corrected[name].values for name in CHANNELS], axis=-1) / units
+        loads[~loaded] = 0.0
+        cell = cell.dimensionless(rod)
+        inverse = np.linalg.inv(cell.gain_matrix)
+        covariance = inverse @ cell.covariance(loads) @ inverse.T
+        leaning = np.zeros(loads.shape)
+        if frame_of(measured) == "turning":
+            loads[:, 1], loads[:, 2] = turned(loads[:, 1], loads[:, 2], -angle)
+            turn = np.zeros((angle.size, 3, 3))
+            turn[:, 0, 0] = 1.0
+            turn[:, 1, 1] = turn[:, 2, 2] = np.cos(angle)
+            turn[:, 2, 1] = np.sin(angle)
+            turn[:, 1, 2] = -turn[:, 2, 1]
+            covariance = turn @ covariance @ np.swapaxes(turn, 1, 2)
+            leaning[:, 1], leaning[:, 2] = -loads[:, 2], loads[:, 1]
+    signs = np.where(side[:, None] < 0.0, _MIRROR, 1.0)
+    reading = Reading(
+        np.where(side < 0.0, np.pi - angle, angle),
+        signs * loads,
+        np.full(angle.size, cell.drive_angle_deviation),
+        side[:, None] * signs * leaning,
+        signs[:, :, None] * covariance * signs[:, None, :],
+    )
+    has_noise = bool(np.any(cell.unrest) or cell.relative_noise or cell.drive_angle_deviation)
+    return Samples(rod, reading, side, loaded, cut_off, has_noise)
+
+
+def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> Flags:
+    """Which samples carry more load than noise explains.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A record.
+    load_cell : LoadCell, optional
+        In the record's units; by default its data sheet, if any. See `reconstruct` for the rule.
+
+    Returns
+    -------
+    ndarray of bool, shape (samples,)
+    """
+    load_cell = load_cell or LoadCell.from_record(measured) or LoadCell()
+    present = present_channels(measured)
+    readings = np.full((measured.sizes["sample"], len(CHANNELS)), np.nan)
+    loaded = np.zeros(len(readings), dtype=bool)
+    for index, name in enumerate(CHANNELS):
+        if name not in present:
+            continue
+        if load_cell.unrest[index]:
+            readings[:, index] = measured[name].values
+        else:
+            loaded |= measured[name].values != load_cell.bias[index]
+    noisy = int(np.count_nonzero(~np.isnan(readings).all(axis=0)))
+    return loaded | (load_cell.surprise(readings) > chdtri(noisy, FALSE_ALARM)) if noisy else loaded
+
+
+def contact_sides(record: xr.Dataset) -> Floats:
+    """+1 where the object is met as in a forward sweep, −1 as in a backward one, shape (samples,).
+
+    It is the sign of a sweep's total holding moment, so that a drive may also turn back in contact; the direction of
+    the drive decides where the moment is missing, or sums to no more than six standard errors of its noise.
+    """
+    sweep, moment = record.sweep.values, record.holding_moment.values
+    side = np.empty(sweep.size)
+    order = np.argsort(sweep, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1):
+        of_sweep = moment[rows]
+        total = of_sweep.sum()
+        if abs(total) > 6.0 * rough_noise(of_sweep) * np.sqrt(rows.size):
+            side[rows] = np.sign(total)
+        else:
+            side[rows] = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
+    return side

@@ -1,0 +1,112 @@
+"""The region in which a contact lies with a given probability, whatever its shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.result import posterior_draws
+
+__all__ = ["ContactRegion", "contact_region"]
+
+Floats = NDArray[np.float64]
+
+_BLOCK = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class ContactRegion:
+    """Where the density of contact points is highest: the smallest region of its probability.
+
+    The density is that of the draws, smoothed by a normal kernel of their own proportions. The draws in the region are
+    the share of all that its probability says, each judged by the others.
+    """
+
+    probability: float
+    draws: Floats
+    """Contact points, shape (n, 2), in the record's unit of length."""
+    level: float
+    """Density on the boundary, in the region's own measure."""
+    _white: Floats
+    _to_white: Floats
+    _centre: Floats
+    _bandwidth: float
+
+    def density(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Density at places, in the region's own measure: to be compared with `level`."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        at = (np.stack([x.ravel(), y.ravel()], axis=-1) - self._centre) @ self._to_white.T
+        return _kernel_sums(at, self._white, self._bandwidth).reshape(x.shape) / len(self._white)
+
+    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+        """Whether places are in the region; NaN is not."""
+        return np.asarray(self.density(x, y) >= self.level)
+
+    def grid(self, points: int = 80) -> tuple[Floats, Floats, Floats]:
+        """x, y and density on a grid that holds the region, shapes (points,), (points,) and (points, points)."""
+        margin = 3.0 * self._bandwidth * self.draws.std(axis=0)
+        low, high = self.draws.min(axis=0) - margin, self.draws.max(axis=0) + margin
+        x, y = (np.linspace(low[i], high[i], points) for i in (0, 1))
+        return x, y, self.density(*np.meshgrid(x, y))
+
+
+def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability: float = 0.9) -> ContactRegion:
+    """The region in the plane in which a contact point lies with a given probability.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contacts`.
+    sample : int
+        Which contact, by the coordinate "sample".
+    probability : float
+        In (0, 1).
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not in (0, 1), or there is no such sample.
+    InferenceError
+        If the sample has no contact.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> x, y = ((("chain", "draw", "sample"), rng.normal(size=(4, 500, 1))) for _ in range(2))
+    >>> region = contact_region(xr.Dataset({"contact_x": x, "contact_y": y}, coords={"sample": [7]}), sample=7)
+    >>> region.contains([0.0, 1.8, 2.6], 0.0)  # the circle has a radius of 2.15
+    array([ True,  True, False])
+    """
+    if not 0.0 < probability < 1.0:
+        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.9")
+    draws = posterior_draws(posterior)
+    if sample not in draws["sample"].values:
+        low, high = draws["sample"].values.min(), draws["sample"].values.max()
+        raise ParameterError(f"there is no sample {sample!r}: the posterior has {low} to {high}")
+    of_sample = draws.sel(sample=sample)
+    points = np.stack([of_sample["contact_x"].values.ravel(), of_sample["contact_y"].values.ravel()], axis=-1)
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) < 10:
+        raise InferenceError(f"sample {sample} has no contact: its posterior has no draws")
+    centre = points.mean(axis=0)
+    variances, axes = np.linalg.eigh(np.cov(points.T))
+    to_white = (axes / np.sqrt(np.maximum(variances, 1e-30))).T
+    white = (points - centre) @ to_white.T
+    bandwidth = len(points) ** (-1.0 / 6.0)  # Scott's rule in two dimensions
+    others = (_kernel_sums(white, white, bandwidth) - 1.0) / (len(points) - 1)
+    level = float(np.quantile(others, 1.0 - probability))
+    return ContactRegion(probability, points, level, white, to_white, centre, bandwidth)
+
+
+def _kernel_sums(at: Floats, centres: Floats, bandwidth: float) -> Floats:
+    """Sum of the kernels around centres (n, 2) at places (m, 2); a kernel is one at its centre."""
+    sums = np.empty(len(at))
+    step = max(1, _BLOCK // len(centres))
+    for begin in range(0, len(at), step):
+        part = at[begin : begin + step, None, :] - centres
+        sums[begin : begin + step] = np.exp(-0.5 * (part * part).sum(axis=-1) / bandwidth**2).sum(axis=1)
+    return sums
