@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -39,7 +39,8 @@ class Run:
     ----------
     posterior : xr.DataTree
     contacts : xr.Dataset or None
-        Contact points of Step 2; None where a load channel is missing.
+        Most likely contact points (raw Step 2 for Student's t with 2 degrees of freedom and fewer); None where a load
+        channel is missing.
     band : xr.Dataset
     files : mapping of str to Path
         By what they hold.
@@ -104,7 +105,9 @@ def analyse(
 
     contacts = None
     if set(present_channels(measured)) == set(CHANNELS):
-        contacts = reconstruct(measured, load_cell=load_cell, friction=friction)
+        cell = _known_cell(measured, load_cell, result)
+        heavy = cell.degrees_of_freedom <= 2.0  # no standard deviations to weigh the channels by
+        contacts = reconstruct(measured, method="raw" if heavy else "constrained", load_cell=cell, friction=friction)
         files["contacts"] = folder / "contacts.csv"
         _write_table(contacts.to_dataframe(), files["contacts"])
     band = contour_band(result, _reach(result), probability)
@@ -114,6 +117,15 @@ def analyse(
     _write_table(summary(result, probability).to_dataframe(), files["summary"])
     files |= _draw(measured, result, contacts, band, folder, truth=truth, friction=friction)
     return Run(result, contacts, band, files)
+
+
+def _known_cell(measured: xr.Dataset, load_cell: LoadCell | None, result: xr.DataTree) -> LoadCell:
+    """The load cell, with the median of the noise that was inferred where none was known."""
+    draws = posterior_draws(result)
+    inferred: dict[str, Any] = {
+        name: float(draws[name].median()) for name in ("moment_noise", "force_noise") if name in draws
+    }
+    return replace(load_cell or LoadCell.from_record(measured) or LoadCell(), **inferred)
 
 
 def summary(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:

@@ -61,6 +61,11 @@ class _Noise(NamedTuple):
     """The channels that each parameter scales."""
     priors: dict[str, Prior]
 
+    @property
+    def inferred(self) -> tuple[str, ...]:
+        """Entries of the cell that are not known beforehand, or stated elsewhere."""
+        return ("frame", *self.names)
+
 
 def infer_contour(
     measured: xr.Dataset,
@@ -89,7 +94,8 @@ def infer_contour(
         What shape the contour is known to have.
     load_cell : LoadCell, optional
         The sensor, in the record's units; by default the data sheet that the record carries. Its noise is taken as
-        known up to the factor `noise_scale`, which is inferred. Without any, `moment_noise` and `force_noise` are.
+        known up to the factor `noise_scale`, which is inferred. Without any, or if it states none for all channels,
+        `moment_noise` and `force_noise` are.
     priors : mapping of str to frozen scipy.stats distribution, optional
         In place of some of the default ones (see Notes), in the record's units.
     seed : int or numpy.random.SeedSequence
@@ -117,7 +123,7 @@ def infer_contour(
         If `measured` is no record.
     ParameterError
         If the family is unknown, a prior does not belong to a parameter, the seed is no whole number from 0 up, or the
-        load cell has no noise on a channel.
+        load cell has noise on some channels, and none on another.
     InferenceError
         If no sample carries any load, or no contour of the family is found that the rod can reach.
 
@@ -182,7 +188,7 @@ def infer_contour(
         load_cell_frame=frame_of(measured),
         **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
         approximations="; ".join(noise.cell.approximations),
-        **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name != "frame"},
+        **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name not in noise.inferred},
     )
     return tree
 
