@@ -8,7 +8,7 @@ DEMO_OUT ?= results/demo
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench images lint clean
+.PHONY: demo test test-slow bench coverage images lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -23,6 +23,9 @@ test-slow: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks
+
+coverage: $(READY)
+	$(BIN)/python -m benchmarks.contacts
 
 images: $(READY)
 	$(BIN)/python docs/images.py

@@ -12,7 +12,12 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
-from benchmarks.shooting import contact_by_integration, sweep_by_collocation, sweep_by_shooting
+from benchmarks.shooting import (
+    contact_by_integration,
+    misfit_by_least_squares,
+    sweep_by_collocation,
+    sweep_by_shooting,
+)
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.seen import SeenContour
@@ -51,9 +56,10 @@ def main() -> None:
     with threadpool_limits(1):
         one, error_of_one = step_one()
         two, error_of_two = step_two()
+        likeliest, error_of_likeliest = constrained()
         of_records, rate = data_set()
-        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two, of_records])
-        print(f"\n{error_of_one}\n{error_of_two}\n{rate}")
+        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two, likeliest, posteriors(), of_records])
+        print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}")
         print("\nTime a piece, for ever more of them:")
         print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
         print_growth("sample, reconstruct", (1_000, 10_000, 100_000, 1_000_000), reconstruct)
@@ -100,6 +106,38 @@ def step_two() -> tuple[list[Row], str]:
         f"Step 2: {clean.sizes['sample']:,} samples in 2 sweeps, {float((phases == 'tip').mean()):.0%} in tip contact, "
         f"the others tangential; integration at tolerance {TIGHT:g} and reconstruct differ by at most {apart:.1e}"
     )
+
+
+def constrained() -> tuple[Row, str]:
+    """A sample; by hand, of some that are in tangential contact, whose sheet alone is fitted."""
+    measured = CELL.measure(record(MANY), seed=1)
+    contacts = tb.reconstruct(measured, method="constrained")
+    lying = (contacts.contact_phase.values == "tangential") & (contacts.status.values == "ok")
+    some = np.flatnonzero(lying & (measured.direction.values == "forward"))[:: MANY // 120]
+    noise = np.array([CELL.moment_noise, CELL.force_noise, CELL.force_noise])
+    loads = np.stack([measured[name].values for name in ("holding_moment", "force_x", "force_y")], axis=1)
+    angles = measured.drive_angle.values
+
+    def by_hand() -> list[float]:
+        return [misfit_by_least_squares(angles[i], loads[i], noise) for i in some]
+
+    otherwise = best_time(by_hand, 3) / some.size
+    ours = best_time(lambda: tb.reconstruct(measured, method="constrained"), 3) / measured.sizes["sample"]
+    apart = np.abs(np.array(by_hand()) - contacts.misfit.values[some]).max()
+    return Row("Step 2 constrained, a sample with noise: least_squares, one phase / reconstruct", otherwise, ours), (
+        f"Step 2 constrained: {1.0 / ours:,.0f} samples/s; {some.size} sums of squares by least_squares and ours "
+        f"differ by at most {apart:.1e}"
+    )
+
+
+def posteriors() -> Row:
+    """A contact, of a double sweep at 1°; by emcee, of every fortieth sample."""
+    measured = CELL.measure(tb.scan(CONTOUR).record, seed=1)
+    some = measured.isel(sample=slice(None, None, 40))
+    counts = [int((tb.reconstruct(part).status != "no contact").sum()) for part in (some, measured)]
+    by_emcee = best_time(lambda: tb.infer_contacts(some, seed=1, method="emcee"), 1) / counts[0]
+    ours = best_time(lambda: tb.infer_contacts(measured, seed=1), 1) / counts[1]
+    return Row(f"posterior of one of {counts[1]} contacts: emcee for each / infer_contacts", by_emcee, ours)
 
 
 def sweeps(by_hand: float) -> list[Row]:

@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
-from scipy.optimize import root
+from scipy.optimize import least_squares, root
 
-__all__ = ["contact_by_integration", "sweep_by_collocation", "sweep_by_shooting"]
+__all__ = ["contact_by_integration", "misfit_by_least_squares", "sweep_by_collocation", "sweep_by_shooting"]
 
 State = tuple[float, float, float, float]
 """Drive angle, holding moment, force, arc length of the contact."""
@@ -105,3 +105,18 @@ def contact_by_integration(
     start = [0.0, 0.0, drive_angle, -moment]
     found = solve_ivp(_rod, (0.0, 1.5), start, args=(force, beta), events=curvature, rtol=rtol, atol=1e-3 * rtol)
     return found.y_events[0][0][0], found.y_events[0][0][1]
+
+
+def misfit_by_least_squares(drive_angle: float, loads: np.ndarray, noise: np.ndarray) -> float:
+    """Sum of squares of the most likely tangential contact, forward and without friction: one with m0² = 2 f sin ψ0."""
+
+    def deviations(p):
+        force, psi = p
+        if not (force > 0.0 and 0.0 < psi < np.pi):
+            return np.full(3, 1e3)
+        beta = drive_angle - psi
+        model = np.sqrt(2.0 * force * np.sin(psi)), -force * np.sin(beta), force * np.cos(beta)
+        return (model - loads) / noise
+
+    start = np.hypot(loads[1], loads[2]), max(drive_angle - np.arctan2(-loads[1], loads[2]), 0.01)
+    return 2.0 * least_squares(deviations, start).cost

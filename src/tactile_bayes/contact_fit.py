@@ -29,8 +29,8 @@ _ROUGH, _ROUGH_STEPS = 1e-3, 10
 _SETTLED, _MOST_STEPS = 1e-12, 100
 """Gain in the sum of squares that the next step promises, against one and the sum, at which a descent ends."""
 
-_OUTDONE = 2.0
-"""Factor on the other sheet's sum of squares, plus one, beyond which a sheet that is roughly fitted is given up."""
+_OUTDONE = 2.0, 10.0
+"""Factor on the other sheet's sum of squares, and addend, beyond which a sheet that is roughly fitted is given up."""
 
 _STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Arc lengths to start from in tangential contact, and shares of a right angle for ψ1 in tip contact."""
@@ -76,6 +76,8 @@ class ContactFit(NamedTuple):
     """Whether the contact lies where tip and tangential contact meet, and more likely ones lie off both sheets."""
     clearance: Floats
     """Distance from the edge, in standard deviations of the coordinate that leads to it."""
+    rival: Floats
+    """By how much the sum of squares of the best contact of the other phase is larger; infinite where it has none."""
 
 
 def fit_contacts(reading: Reading, friction_angle: Floats, raw: Contact) -> ContactFit:
@@ -110,7 +112,7 @@ def _fit_block(
         descent.go(everyone, _ROUGH, _ROUGH_STEPS)
     tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
     for descent, own, other in ((tip, tip_misfit, lying_misfit), (lying, lying_misfit, tip_misfit)):
-        descent.go(np.flatnonzero((own <= _OUTDONE * (1.0 + other)) | np.isinf(other)), _SETTLED, _MOST_STEPS)
+        descent.go(np.flatnonzero((own <= _OUTDONE[0] * other + _OUTDONE[1]) | np.isinf(other)), _SETTLED, _MOST_STEPS)
     tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
 
     ends = tip_misfit < lying_misfit
@@ -129,9 +131,10 @@ def _fit_block(
         edge = _Descent(_Target(reading.take(where), delta[where]), None, np.ones(where.size))
         edge.go(np.arange(where.size), _SETTLED, _MOST_STEPS)
         coordinates[where], misfit[where], clearance[where] = edge.z, edge.misfit, 0.0
-    return ContactFit(
-        coordinates, covariance, misfit, np.where(ends, np.int8(TIP), np.int8(TANGENTIAL)), at_edge, clearance
-    )
+    phase = np.where(ends, np.int8(TIP), np.int8(TANGENTIAL))
+    with np.errstate(invalid="ignore"):
+        rival = np.where(at_edge, np.inf, np.maximum(tip_misfit, lying_misfit) - misfit)
+    return ContactFit(coordinates, covariance, misfit, phase, at_edge, clearance, rival)
 
 
 def fit_sheet(reading: Reading, delta: Floats, phase: int | None, start: Floats) -> SheetFit:

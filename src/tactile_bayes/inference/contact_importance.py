@@ -30,8 +30,9 @@ _PILOTS = ((600, 0.25), (600, 0.15))
 """Proposals of each pilot run, and the share that the less probable phase then has at least in the next run: the edge
 between the phases cuts off narrow layers of the posterior, which take more than one look."""
 
-_BLOCK = 64
-"""Samples worked on at a time."""
+_GOOD = 0.4
+"""Effective share of a phase's proposals above which its approximation is left alone: moments of what an edge cuts off
+would not improve it."""
 
 
 class ContactWeights(NamedTuple):
@@ -56,8 +57,8 @@ class ContactWeights(NamedTuple):
         return np.asarray((self.pareto_k <= LARGEST_K) & (self.effective_draws >= LEAST_DRAWS))
 
 
-def weigh_contacts(density: ContactDensity, draws: int, seeds: list[np.random.SeedSequence]) -> ContactWeights:
-    """Proposals and their weights; those of a sample follow from its seed alone.
+def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequence) -> ContactWeights:
+    """Proposals and their weights; 7 numbers a proposal, so that many samples are better weighed by and by.
 
     Parameters
     ----------
@@ -65,18 +66,9 @@ def weigh_contacts(density: ContactDensity, draws: int, seeds: list[np.random.Se
         Of n samples.
     draws : int
         Proposals for each of them.
-    seeds : list of SeedSequence
-        One for each block of samples; see `block_count`.
+    seed : SeedSequence
     """
-    count = density.samples.side.size
-    blocks = [np.arange(begin, min(begin + _BLOCK, count)) for begin in range(0, count, _BLOCK)]
-    parts = [_weigh(density.take(b), draws, np.random.default_rng(s)) for b, s in zip(blocks, seeds, strict=False)]
-    axes = {"points": 1, "place": 2, "log_weight": 1}
-    columns = zip(ContactWeights._fields, zip(*parts, strict=True), strict=True)
-    return ContactWeights(*(np.concatenate(column, axis=axes.get(name, 0)) for name, column in columns))
-
-
-def _weigh(density: ContactDensity, draws: int, rng: np.random.Generator) -> ContactWeights:
+    rng = np.random.default_rng(seed)
     approximation = _approximation(density)
     longest = 0.5 * np.pi + density.delta
     for count, least in _PILOTS:
@@ -147,7 +139,7 @@ def _refined(
             new = np.einsum("dn,dnk->nk", own, points)
             off = points - new
             spread = np.einsum("dn,dni,dnj->nij", own, off, off)
-        trusted = effective >= 10.0 * points.shape[-1]
+        trusted = (effective >= 10.0 * points.shape[-1]) & (effective < _GOOD * mine.sum(axis=0))
         spread[~trusted] = np.eye(points.shape[-1])
         scale = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
         with np.errstate(divide="ignore", invalid="ignore"):

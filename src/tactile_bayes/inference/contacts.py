@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from importlib.metadata import version
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,37 +15,28 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_density import ContactDensity, ContactPrior
-from tactile_bayes.inference.contact_importance import LARGEST_K, LEAST_DRAWS, ContactWeights, weigh_contacts
-from tactile_bayes.inference.ensembles import SamplerSettings, Seed, sample, scatter_walkers, spawn
+from tactile_bayes.inference.contact_draws import (
+    CHAINS,
+    EMCEE,
+    EMCEE_SETTINGS,
+    IMPORTANCE,
+    ContactDraws,
+    Method,
+    draw_contacts,
+)
+from tactile_bayes.inference.contact_importance import LARGEST_K, LEAST_DRAWS
+from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.reconstruction import samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.rod import Rod
 
-__all__ = ["ENGINES", "infer_contacts"]
+__all__ = ["infer_contacts"]
 
 Floats = NDArray[np.float64]
 
-ENGINES = ("none", "importance sampling", "emcee")
-"""Who drew a sample's contacts, by code."""
-
-_CHAINS = 4
-_PROPOSALS = 4
-"""Proposals for each draw that is kept."""
-
-_EMCEE = SamplerSettings(walkers=24, min_ess=400.0, max_steps=4000)
 _PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
-
-
-class _Drawn(NamedTuple):
-    """Draws of one sample, and how they fared."""
-
-    points: Floats
-    """Way, force[, drive angle], shape (chains, draws, 2 or 3)."""
-    r_hat: float
-    ess: float
-    converged: bool
 
 
 def infer_contacts(
@@ -57,7 +48,7 @@ def infer_contacts(
     rod: Rod | None = None,
     friction: float = 0.0,
     draws: int = 1000,
-    method: Literal["auto", "importance", "emcee"] = "auto",
+    method: Method = "auto",
     settings: SamplerSettings | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.DataTree:
@@ -150,37 +141,18 @@ def infer_contacts(
             "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
             "in the record's units?"
         )
-    shared, own = spawn(seed, 2)
-    engine = np.full(loaded.size, 1)
-    points = np.empty((_CHAINS, draws // _CHAINS, loaded.size, 3 if density.has_free_angle else 2))
-    r_hat, ess, converged = (np.full(loaded.size, value) for value in (np.nan, np.nan, False))
-    weights: ContactWeights | None = None
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        if method != "emcee":
-            weights = weigh_contacts(density, _PROPOSALS * draws, spawn(shared, loaded.size))
-            points[:] = _resampled(weights, draws, np.random.default_rng(spawn(shared, loaded.size + 1)[-1]))
-            converged = weights.certified
-        if method != "importance":
-            left = np.flatnonzero(~converged)
-            seeds = spawn(own, loaded.size)
-            for done, i in enumerate(left.tolist()):
-                if progress is not None:
-                    progress(loaded.size - left.size + done, loaded.size)
-                drawn = _walked(density, i, weights, draws, seeds[i], settings or _EMCEE)
-                points[:, :, i], r_hat[i], ess[i], converged[i] = drawn
-            engine[left] = 2
-        if progress is not None:
-            progress(loaded.size, loaded.size)
-        groups = _groups(measured, density, loaded, points)
-    groups["sample_stats"] = _stats(measured, loaded, weights, engine, points, r_hat, ess, converged)
+        found = draw_contacts(density, draws, method, spawn(seed, 1)[0], settings, progress)
+        groups = _groups(measured, density, loaded, found.points)
+    groups["sample_stats"] = _stats(measured.sizes["sample"], loaded, found)
     tree = xr.DataTree.from_dict(groups)
-    tree.attrs = _attributes(measured, cell, seed, prior, friction, draws, method, settings, engine, converged)
+    tree.attrs = _attributes(measured, cell, seed, prior, friction, draws, method, settings, found)
     return tree
 
 
 def _refuse_options(draws: int, method: str) -> None:
-    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < _CHAINS or draws % _CHAINS:
-        raise ParameterError(f"draws is {draws!r}: give a multiple of {_CHAINS}, one share for each chain")
+    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < CHAINS or draws % CHAINS:
+        raise ParameterError(f"draws is {draws!r}: give a multiple of {CHAINS}, one share for each chain")
     if method not in ("auto", "importance", "emcee"):
         raise ParameterError(f"method is {method!r}: choose 'auto', 'importance' or 'emcee'")
 
@@ -199,57 +171,6 @@ def _density(
     turning = frame_of(measured) == "turning"
     loaded = np.flatnonzero(samples.loaded)
     return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
-
-
-def _resampled(weights: ContactWeights, draws: int, rng: np.random.Generator) -> Floats:
-    """Points drawn by their weights, shape (chains, draws, n, 2 or 3); a chain has proposals of its own."""
-    count, each = weights.points.shape[0] // _CHAINS, draws // _CHAINS
-    points = np.empty((_CHAINS, each, *weights.points.shape[1:]))
-    for chain in range(_CHAINS):
-        part = slice(chain * count, (chain + 1) * count)
-        for i in range(points.shape[2]):
-            weight = np.exp(weights.log_weight[part, i] - weights.log_weight[part, i].max())
-            level = np.cumsum(weight)
-            picks = np.searchsorted(level / level[-1], (np.arange(each) + rng.random()) / each)
-            points[chain, :, i] = weights.points[part, i][rng.permutation(np.minimum(picks, count - 1))]
-    return points
-
-
-def _walked(
-    density: ContactDensity,
-    i: int,
-    weights: ContactWeights | None,
-    draws: int,
-    seed: np.random.SeedSequence,
-    settings: SamplerSettings,
-) -> _Drawn:
-    """Draws of one sample by emcee, over both branches at once."""
-    alone = density.take(np.array([i]))
-    if weights is None:
-        weights = weigh_contacts(alone, 1000, spawn(seed, 3)[2:])
-        proposed, log_weight = weights.points[:, 0], weights.log_weight[:, 0]
-    else:
-        proposed, log_weight = weights.points[:, i], weights.log_weight[:, i]
-    weight = np.exp(log_weight - log_weight.max())
-    names = ("way", "force", "drive angle")[: proposed.shape[-1]]
-    spread = np.sqrt(np.maximum(np.cov(proposed.T, aweights=weight).diagonal(), 1e-20))
-
-    def log_probability(points: Floats) -> Floats:
-        return alone.at(*alone.unfold(points[:, None, :])).log_density[:, 0]
-
-    def draw(rng: np.random.Generator, count: int) -> Floats:
-        near = proposed[rng.choice(weight.size, count, p=weight / weight.sum())]
-        return np.asarray(near + spread * rng.standard_normal(near.shape))
-
-    start = scatter_walkers(
-        log_probability, draw, parameters=len(names), seed=spawn(seed, 2)[0], settings=settings, max_rounds=1000
-    )
-    found = sample(log_probability, start, names=names, seed=spawn(seed, 2)[1], settings=settings)
-    each = draws // _CHAINS
-    chains = np.resize(np.arange(found.samples.shape[0]), _CHAINS)
-    kept = np.linspace(0, found.samples.shape[1] - 1, each).astype(int)
-    points = found.samples[chains][:, kept]
-    return _Drawn(points, float(np.max(found.r_hat)), float(np.min(found.ess_bulk)), found.converged)
 
 
 def _groups(
@@ -290,44 +211,24 @@ def _groups(
     }
 
 
-def _stats(
-    measured: xr.Dataset,
-    loaded: NDArray[np.intp],
-    weights: ContactWeights | None,
-    engine: NDArray[np.intp],
-    points: Floats,
-    r_hat: Floats,
-    ess: Floats,
-    converged: NDArray[np.bool_],
-) -> xr.Dataset:
-    size = measured.sizes["sample"]
-
+def _stats(size: int, loaded: NDArray[np.intp], found: ContactDraws) -> xr.Dataset:
     def everywhere(values: Floats) -> Floats:
         spread = np.full(size, np.nan)
         spread[loaded] = values
         return spread
 
-    tangential = (points[..., 0] < 0.0).mean(axis=(0, 1))
-    nothing = np.full(loaded.size, np.nan)
-    k, effective, evidence = nothing, nothing, nothing
-    if weights is not None:
-        k, effective = weights.pareto_k, weights.effective_draws
-        by_weight = np.where(weights.points[..., 0] < 0.0, np.exp(weights.log_weight), 0.0).sum(axis=0)
-        tangential = np.where(engine == 1, by_weight, tangential)
-        evidence = np.where(engine == 1, weights.log_evidence, np.nan)
-    codes = np.zeros(size, dtype=np.int8)
-    codes[loaded] = engine
-    done = np.zeros(size, dtype=np.int8)
-    done[loaded] = converged
+    codes, done = np.zeros(size, dtype=np.int8), np.zeros(size, dtype=np.int8)
+    codes[loaded], done[loaded] = found.engine, found.converged
+    meanings = {"flag_values": [0, IMPORTANCE, EMCEE], "flag_meanings": "none importance_sampling emcee"}
     return xr.Dataset(
         {
-            "tangential_probability": ("sample", everywhere(tangential)),
-            "log_evidence": ("sample", everywhere(evidence)),
-            "pareto_k": ("sample", everywhere(k)),
-            "effective_draws": ("sample", everywhere(effective)),
-            "r_hat": ("sample", everywhere(r_hat)),
-            "ess": ("sample", everywhere(ess)),
-            "engine": ("sample", codes, {"flag_values": [0, 1, 2], "flag_meanings": "none importance_sampling emcee"}),
+            "tangential_probability": ("sample", everywhere(found.tangential)),
+            "log_evidence": ("sample", everywhere(found.log_evidence)),
+            "pareto_k": ("sample", everywhere(found.pareto_k)),
+            "effective_draws": ("sample", everywhere(found.effective_draws)),
+            "r_hat": ("sample", everywhere(found.r_hat)),
+            "ess": ("sample", everywhere(found.ess)),
+            "engine": ("sample", codes, meanings),
             "converged": ("sample", done),
         },
         coords={"sample": np.arange(size)},
@@ -343,11 +244,11 @@ def _attributes(
     draws: int,
     method: str,
     settings: SamplerSettings | None,
-    engine: NDArray[np.intp],
-    converged: NDArray[np.bool_],
+    found: ContactDraws,
 ) -> dict[str, Any]:
-    by_emcee, failed = int(np.count_nonzero(engine == 2)), int(np.count_nonzero(~converged))
-    message = f"{engine.size} contacts, {engine.size - by_emcee} by importance sampling, {by_emcee} by emcee"
+    count, by_emcee = found.engine.size, int(np.count_nonzero(found.engine == EMCEE))
+    failed = int(np.count_nonzero(~found.converged))
+    message = f"{count} contacts, {count - by_emcee} by importance sampling, {by_emcee} by emcee"
     if failed:
         why = (
             f"Pareto's k̂ above {LARGEST_K:g} or fewer than {LEAST_DRAWS:g} effective draws"
@@ -365,7 +266,7 @@ def _attributes(
         "inference_library_version": version("tactile-bayes"),
         "sampler": f"importance sampling, emcee {version('emcee')}",
         "seed": str(seed.entropy if isinstance(seed, np.random.SeedSequence) else seed),
-        "settings": json.dumps(asdict(settings or _EMCEE)),
+        "settings": json.dumps(asdict(settings or EMCEE_SETTINGS)),
         "data_sha256": record_hash(measured),
         "prior": prior if isinstance(prior, str) else getattr(prior, "__name__", repr(prior)),
         "friction": friction,

@@ -10,12 +10,14 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,
     CUT_OFF,
+    EITHER_PHASE,
     NO_CONTACT,
     NO_ZERO,
     NONLINEAR,
     OK,
     Estimate,
     bends_too_much,
+    is_weak,
 )
 from tactile_bayes.reconstruction.raw import raw_contact
 from tactile_bayes.reconstruction.samples import Samples
@@ -24,6 +26,9 @@ from tactile_bayes.touching import touching, touching_and_slopes
 __all__ = ["constrained_estimate", "refuse_without_noise"]
 
 Floats = NDArray[np.float64]
+
+_RIVAL = 6.0
+"""Lead in the sum of squares, below which the other phase is too likely to be left out: by a factor of 20."""
 
 
 def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
@@ -53,8 +58,10 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
         place[where] = np.where(found[:, None], rod.place.T, np.nan)
         phase[where] = np.where(found, fit.phase, 0)
         misfit[where], distance[where] = np.where(found, (fit.misfit, fit.clearance), np.nan)
-        bent = bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
-        status[where] = np.where(found, np.where(fit.at_edge, AT_EDGE, np.where(bent, NONLINEAR, OK)), NO_ZERO)
+        bent = is_weak(reading.loads, reading.covariance)
+        bent |= bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
+        kinds = (~found, fit.at_edge, fit.rival < _RIVAL, bent)
+        status[where] = np.select(kinds, (NO_ZERO, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
     return Estimate(place, covariance, phase, status, misfit, distance)
 
 

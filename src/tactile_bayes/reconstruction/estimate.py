@@ -11,6 +11,7 @@ __all__ = [
     "AT_EDGE",
     "BEYOND_TIP",
     "CUT_OFF",
+    "EITHER_PHASE",
     "NONLINEAR",
     "NO_CONTACT",
     "NO_ZERO",
@@ -18,12 +19,13 @@ __all__ = [
     "STATUSES",
     "Estimate",
     "bends_too_much",
+    "is_weak",
     "spread_across",
 ]
 
 Floats = NDArray[np.float64]
 
-NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE = range(7)
+NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE = range(8)
 
 STATUSES = (
     "no contact",
@@ -33,11 +35,17 @@ STATUSES = (
     "nonlinear",
     "beyond the tip",
     "at the edge",
+    "either phase",
 )
 """What can become of a sample, by code."""
 
 _MOST_BEND = 0.5
 """Shift by curvature, in standard deviations, above which a covariance of first order is not to be trusted."""
+
+_WEAK = 10.0
+"""Standard deviations of the noise below which a force is weak: its direction is then hardly known."""
+
+_ROUNDING = 1e-9
 
 
 class Estimate(NamedTuple):
@@ -66,6 +74,15 @@ def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floa
     return along, normal
 
 
+def is_weak(loads: Floats, covariance: Floats) -> NDArray[np.bool_]:
+    """Whether forces, of loads (n, 3) with covariance (n, 3, 3), are not much larger than their noise."""
+    force = loads[:, 1:]
+    with np.errstate(invalid="ignore", over="ignore"):
+        squared = (force * force).sum(axis=1)
+        noise = np.einsum("ni,nij,nj->n", force, covariance[:, 1:, 1:], force) / np.where(squared > 0.0, squared, 1.0)
+        return np.asarray(squared < _WEAK**2 * noise)
+
+
 def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> NDArray[np.bool_]:
     """Whether contacts one standard deviation aside do not lie as a covariance of first order has it.
 
@@ -81,12 +98,12 @@ def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, 
     ndarray of bool, shape (n,)
         True as well where such a contact does not exist.
     """
-    along, normal = spread_across(covariance, place[:, 2])
-    cos, sin = np.cos(place[:, 2]), np.sin(place[:, 2])
+    xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
     bent = np.zeros(len(place), dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
+        area = xx * yy - xy * xy
         for more, less in aside:
             x, y = (0.5 * (more[:, axis] + less[:, axis]) - place[:, axis] for axis in (0, 1))
-            bent |= ~(np.abs(x * cos + y * sin) <= _MOST_BEND * along + 1e-9)
-            bent |= ~(np.abs(y * cos - x * sin) <= _MOST_BEND * normal + 1e-9)
+            shift = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / area
+            bent |= ~((shift <= _MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
     return bent

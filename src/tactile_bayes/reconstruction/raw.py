@@ -16,6 +16,7 @@ from tactile_bayes.reconstruction.estimate import (
     OK,
     Estimate,
     bends_too_much,
+    is_weak,
 )
 from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.touching import place_by_wrench, touching_and_slopes
@@ -57,7 +58,7 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
             for column in deviations
             if np.any(column)
         ]
-        bent = bends_too_much(place[where], covariance[where], aside)
+        bent = is_weak(part.loads, part.covariance) | bends_too_much(place[where], covariance[where], aside)
         status[where[bent & (status[where] == OK)]] = NONLINEAR
     phase = np.where(found, np.where(tip, TIP, TANGENTIAL), NONE).astype(np.int8)
     return Estimate(place, covariance, phase, status)

@@ -31,6 +31,7 @@ class ContactRegion:
     """Contact points, shape (n, 2), in the record's unit of length."""
     level: float
     """Density on the boundary, in the region's own measure."""
+    _of_draws: Floats
     _white: Floats
     _to_white: Floats
     _centre: Floats
@@ -45,6 +46,15 @@ class ContactRegion:
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether places are in the region; NaN is not."""
         return np.asarray(self.density(x, y) >= self.level)
+
+    def least_probability(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Probability of the smallest of all such regions that holds places; NaN of NaN.
+
+        Where posteriors are right, those of the true contacts are uniform between 0 and 1.
+        """
+        density = self.density(x, y)
+        denser = self._of_draws.size - np.searchsorted(self._of_draws, density, side="left")
+        return np.where(np.isnan(density), np.nan, denser / self._of_draws.size)
 
     def grid(self, points: int = 80) -> tuple[Floats, Floats, Floats]:
         """x, y and density on a grid that holds the region, shapes (points,), (points,) and (points, points)."""
@@ -97,9 +107,9 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     to_white = (axes / np.sqrt(np.maximum(variances, 1e-30))).T
     white = (points - centre) @ to_white.T
     bandwidth = len(points) ** (-1.0 / 6.0)  # Scott's rule in two dimensions
-    others = (_kernel_sums(white, white, bandwidth) - 1.0) / (len(points) - 1)
+    others = np.sort((_kernel_sums(white, white, bandwidth) - 1.0) / (len(points) - 1))
     level = float(np.quantile(others, 1.0 - probability))
-    return ContactRegion(probability, points, level, white, to_white, centre, bandwidth)
+    return ContactRegion(probability, points, level, others, white, to_white, centre, bandwidth)
 
 
 def _kernel_sums(at: Floats, centres: Floats, bandwidth: float) -> Floats:

@@ -1,0 +1,155 @@
+"""Draws of many single contacts: by importance sampling where it certifies itself, by emcee elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.inference.contact_density import ContactDensity
+from tactile_bayes.inference.contact_importance import ContactWeights, weigh_contacts
+from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_walkers, spawn
+
+__all__ = ["CHAINS", "EMCEE", "EMCEE_SETTINGS", "IMPORTANCE", "ContactDraws", "Method", "draw_contacts"]
+
+Floats = NDArray[np.float64]
+Method = Literal["auto", "importance", "emcee"]
+
+CHAINS = 4
+
+IMPORTANCE, EMCEE = 1, 2
+"""Codes of who drew."""
+
+EMCEE_SETTINGS = SamplerSettings(walkers=24, min_ess=400.0, max_steps=4000)
+
+_PROPOSALS = 4
+"""Proposals for each draw that is kept."""
+
+_START = 1000
+"""Proposals among which emcee's walkers start, at least."""
+
+_BLOCK = 64
+"""Samples worked on at a time."""
+
+
+class ContactDraws(NamedTuple):
+    """Draws for each of n samples, and how they fared."""
+
+    points: Floats
+    """Way, force and, if it is uncertain, drive angle, shape (chains, draws, n, 2 or 3)."""
+    engine: NDArray[np.int8]
+    """`IMPORTANCE` or `EMCEE`, shape (n,); so are the others."""
+    converged: NDArray[np.bool_]
+    tangential: Floats
+    """Probability of tangential contact."""
+    log_evidence: Floats
+    """NaN with emcee; see `ContactWeights`."""
+    pareto_k: Floats
+    effective_draws: Floats
+    r_hat: Floats
+    """Of emcee, like the next; else NaN."""
+    ess: Floats
+
+
+def draw_contacts(
+    density: ContactDensity,
+    draws: int,
+    method: Method,
+    seed: np.random.SeedSequence,
+    settings: SamplerSettings | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> ContactDraws:
+    """Draws for all samples of a density, `draws` of each in all chains; see `infer_contacts`."""
+    count = density.samples.side.size
+    of_blocks, of_samples = spawn(seed, 2)
+    seeds, own = spawn(of_blocks, -(-count // _BLOCK)), spawn(of_samples, count)
+    parts = []
+    for begin, block_seed in zip(range(0, count, _BLOCK), seeds, strict=True):
+        who = np.arange(begin, min(begin + _BLOCK, count))
+        parts.append(_draw_block(density.take(who), draws, method, block_seed, own[begin:], settings))
+        if progress is not None:
+            progress(int(who[-1]) + 1, count)
+    columns = dict(zip(ContactDraws._fields, zip(*parts, strict=True), strict=True))
+    return ContactDraws(*(np.concatenate(c, axis=2 if name == "points" else 0) for name, c in columns.items()))
+
+
+def _draw_block(
+    density: ContactDensity,
+    draws: int,
+    method: Method,
+    seed: np.random.SeedSequence,
+    own: list[np.random.SeedSequence],
+    settings: SamplerSettings | None,
+) -> ContactDraws:
+    for_weights, for_picks = spawn(seed, 2)
+    count = density.samples.side.size
+    weights = weigh_contacts(density, _START if method == "emcee" else max(_PROPOSALS * draws, _START), for_weights)
+    points = _resampled(weights, draws, np.random.default_rng(for_picks))
+    tangential = np.where(weights.points[..., 0] < 0.0, np.exp(weights.log_weight), 0.0).sum(axis=0)
+    found = ContactDraws(
+        points,
+        np.full(count, IMPORTANCE, dtype=np.int8),
+        weights.certified,
+        tangential,
+        weights.log_evidence,
+        weights.pareto_k,
+        weights.effective_draws,
+        np.full(count, np.nan),
+        np.full(count, np.nan),
+    )
+    if method == "importance":
+        return found
+    for i in np.flatnonzero((method == "emcee") | ~found.converged).tolist():
+        found.engine[i], found.log_evidence[i] = EMCEE, np.nan
+        points[:, :, i], found.r_hat[i], found.ess[i], found.converged[i] = _walk(
+            density.take(np.array([i])), weights, i, draws, own[i], settings or EMCEE_SETTINGS
+        )
+        tangential[i] = np.mean(points[:, :, i, 0] < 0.0)
+    return found
+
+
+def _resampled(weights: ContactWeights, draws: int, rng: np.random.Generator) -> Floats:
+    """Points drawn by their weights, shape (chains, draws, n, 2 or 3); a chain has proposals of its own."""
+    count, each = weights.points.shape[0] // CHAINS, draws // CHAINS
+    points = np.empty((CHAINS, each, *weights.points.shape[1:]))
+    for chain in range(CHAINS):
+        part = slice(chain * count, (chain + 1) * count)
+        for i in range(points.shape[2]):
+            weight = np.exp(weights.log_weight[part, i] - weights.log_weight[part, i].max())
+            level = np.cumsum(weight)
+            picks = np.searchsorted(level / level[-1], (np.arange(each) + rng.random()) / each)
+            points[chain, :, i] = weights.points[part, i][rng.permutation(np.minimum(picks, count - 1))]
+    return points
+
+
+def _walk(
+    density: ContactDensity,
+    weights: ContactWeights,
+    i: int,
+    draws: int,
+    seed: np.random.SeedSequence,
+    settings: SamplerSettings,
+) -> tuple[Floats, float, float, bool]:
+    """Draws of a density's one sample by emcee, over both branches at once, with R̂ and effective sample size."""
+    proposed = weights.points[:, i]
+    weight = np.exp(weights.log_weight[:, i] - weights.log_weight[:, i].max())
+    names = ("way", "force", "drive angle")[: proposed.shape[-1]]
+    spread = np.sqrt(np.maximum(np.cov(proposed.T, aweights=weight).diagonal(), 1e-20))
+
+    def log_probability(points: Floats) -> Floats:
+        return density.at(*density.unfold(points[:, None, :])).log_density[:, 0]
+
+    def draw(rng: np.random.Generator, count: int) -> Floats:
+        near = proposed[rng.choice(weight.size, count, p=weight / weight.sum())]
+        return np.asarray(near + spread * rng.standard_normal(near.shape))
+
+    for_start, for_walk = spawn(seed, 2)
+    start = scatter_walkers(
+        log_probability, draw, parameters=len(names), seed=for_start, settings=settings, max_rounds=1000
+    )
+    found = sample(log_probability, start, names=names, seed=for_walk, settings=settings)
+    chains = np.resize(np.arange(found.samples.shape[0]), CHAINS)
+    kept = np.linspace(0, found.samples.shape[1] - 1, draws // CHAINS).astype(int)
+    return found.samples[chains][:, kept], float(np.max(found.r_hat)), float(np.min(found.ess_bulk)), found.converged
