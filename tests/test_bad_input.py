@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from tactile_bayes.cli import app
 from tactile_bayes.contours import Circle, Parabola, PowerLaw, paper_profile
-from tactile_bayes.errors import ContourError, ReachError, RecordError
+from tactile_bayes.errors import ContourError, ParameterError, ReachError, RecordError
 from tactile_bayes.record import present_channels, read_record, write_record
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
@@ -56,12 +56,15 @@ MISTAKES = {
     "a missing column": (
         lambda rows: (NAMES[:-1], without_last(rows)),
         "there is no column 'force_y' (columns: sweep, direction, base_x, base_y, drive_angle, holding_moment, "
-        "force_x): add it, or declare the channel missing, with an empty column or missing=('force_y',), on the "
+        "force_x): add it, or say what stands for it, columns={'force_y': 'NAME[UNIT]'}, on the command line --column "
+        "'force_y=NAME[UNIT]', or declare the channel missing, with an empty column or missing=('force_y',), on the "
         "command line --missing force_y",
     ),
     "a misspelt column": (
         lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
-        "there is no column 'drive_angle', but a column 'drive_angel': did you mean 'drive_angle'? Rename it",
+        "there is no column 'drive_angle', but a column 'drive_angel': did you mean 'drive_angle'? Rename it, or "
+        "say what stands for it, columns={'drive_angle': 'drive_angel'}, on the command line --column "
+        "drive_angle=drive_angel",
     ),
     "text in a row": (
         lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),
@@ -154,6 +157,20 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
     result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run"), "-q", *options])
     assert result.exit_code == 0, result.output
     assert "No contact points: Step 2 needs all three load channels." in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Rod(True, 1.0), "the rod's length is True: give a positive number [m]"),
+        (lambda: Rod(1.0, True), "the rod's flexural_rigidity is True: give a positive number [N m²]"),
+        (lambda: Rod(1.0, 1.0, False), "the rod's diameter is False: give zero or a positive number [m]"),
+        (lambda: Rod(elastic_strain=True), "the rod's elastic strain is True: give a positive number, or none"),
+    ],
+)
+def test_true_is_no_number_of_a_rod(build, message):
+    with pytest.raises(ParameterError, match=re.escape(message)):
+        build()
 
 
 # --- Contours -----------------------------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ def test_an_impossible_range_is_refused(name, value):
 
 
 @pytest.mark.parametrize("name", [*SIZES, "force_range", "degrees_of_freedom", "drive_angle_offset"])
-@pytest.mark.parametrize("value", ["0.1", None, (0.1, 0.2), np.ones(1), [[1], [2, 3]], {}, 1j])
+@pytest.mark.parametrize("value", ["0.1", None, (0.1, 0.2), np.ones(1), [[1], [2, 3]], {}, 1j, True, np.False_])
 def test_what_is_no_number_is_refused(name, value):
     with pytest.raises(ParameterError, match=rf"the load cell's {name} is .*: give a number"):
         LoadCell(**{name: value})
@@ -49,7 +49,18 @@ def test_an_offset_that_is_no_angle_is_refused(value):
 
 @pytest.mark.parametrize(
     "value",
-    [0.1, (0.1, 0.2), "123", (0.1, 0.2, np.nan), (0.1, 0.2, "3"), np.eye(3), None, {"force_x": 1}, (1j, 0, 0)],
+    [
+        0.1,
+        (0.1, 0.2),
+        "123",
+        (0.1, 0.2, np.nan),
+        (0.1, 0.2, "3"),
+        np.eye(3),
+        None,
+        {"force_x": 1},
+        (1j, 0, 0),
+        (True, 0, 0),
+    ],
 )
 @pytest.mark.parametrize("name", ["bias", "bias_uncertainty", "correlation"])
 def test_three_numbers_are_wanted(name, value):
@@ -145,8 +156,10 @@ def test_entries_say_everything(sheet):
 
 
 def test_entries_that_are_none_are_refused():
-    with pytest.raises(ParameterError, match=r"has no entry 'force_noize': there are frame, force_noise.*call an attr"):
-        LoadCell.from_entries({"force_noize": 0.1})
+    with pytest.raises(ParameterError, match=r"has no entry 'Force_noize': did you mean 'force_noise'\? An attribute"):
+        LoadCell.from_entries({"Force_noize": 0.1})
+    with pytest.raises(ParameterError, match=r"has no entry 'q': there are frame, force_noise, .*, drive_angle_resol"):
+        LoadCell.from_entries({"q": 0.1})
     both = {"random_walk_force": 0.1, "ornstein_uhlenbeck_force": 0.1}
     with pytest.raises(ParameterError, match="drifts by a random walk or an Ornstein-Uhlenbeck process, not by both"):
         LoadCell.from_entries(both)
@@ -177,6 +190,12 @@ def test_files_keep_the_data_sheet(tmp_path_factory, ending, sheet, rod):
         assert LoadCell.from_record(record) == LoadCell.from_entries({**sheet.entries(), "frame": None})
     for name in (*CHANNELS, "drive_angle"):
         np.testing.assert_array_equal(read[name], measured[name])
+
+
+@pytest.mark.parametrize(("name", "value"), [("noise", 1e3), ("offset", 57.3)])
+def test_an_encoder_in_degrees_is_refused_where_it_measures(name, value):
+    with pytest.raises(ParameterError, match=r"the encoder reads .* more than a turn \(2π\): give a smaller .*radians"):
+        LoadCell(**{f"drive_angle_{name}": value}).measure(ideal(), seed=1)
 
 
 # --- Units ------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from matplotlib import pyplot as plt
 
 from tactile_bayes import plotting
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
@@ -407,6 +407,39 @@ def test_bases_have_colours_of_their_own_and_pivots_the_same(plain):
     assert heights[0] == heights[1] == heights[6] == heights[7] > heights[2] == heights[3] > heights[4]
     across = [line.get_transform().transform((0.0, 0.5))[0] for line in drawn]
     assert len(set(across)) == 1
+
+
+def test_the_seventh_base_has_the_first_colour_and_another_line(plain):
+    result = scan(plain.contour, base=[(0.05 * k, 0.0) for k in range(7)], direction="forward", drive_step=STEP)
+    ax = plotting.touched(result)
+    looks = [(line.get_color(), line.get_linestyle()) for line in arcs(ax, result)]
+    assert len(set(looks)) == 7
+    assert looks[0][0] == looks[6][0]
+    assert [style for _, style in looks[:6]] == ["-"] * 6
+    shown = [(handle.get_color(), handle.get_linestyle()) for handle in ax.get_legend().legend_handles]
+    assert set(looks) <= set(shown)
+
+
+@pytest.mark.parametrize(
+    ("draw", "error", "message"),
+    [
+        (
+            lambda scanned: plotting.touched(scanned.record),
+            ParameterError,
+            r"touched draws what scan\(...\) returns, and",
+        ),
+        (lambda scanned: plotting.observables(scanned), RecordError, "not a Scan: take its record"),
+        (
+            lambda scanned: plotting.observables(xr.DataTree()),
+            RecordError,
+            "not a DataTree: build one with make_record",
+        ),
+        (lambda scanned: plotting.predictive(xr.Dataset(), xr.Dataset()), RecordError, "the record states no units"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_words(plain, draw, error, message):
+    with pytest.raises(error, match=message):
+        draw(plain)
 
 
 def test_touched_is_labelled_in_the_units_of_the_record(si):

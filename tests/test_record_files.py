@@ -123,6 +123,87 @@ def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypa
     assert read_record(tmp_path / f"record{suffix}").identical(record)
 
 
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (
+            "load_cell_bias_fx: 12.5 [mN]",
+            "line 1, attribute 'load_cell_bias_fx' is '12.5 [mN]', but a load cell has no entry 'bias_fx': did you "
+            "mean 'bias_force_x'?",
+        ),
+        ("load_cell_noise_force: 0.003 [N]", "has no entry 'noise_force': did you mean 'force_noise'?"),
+        ("load_cell_noise_force: 0,003 [N]", "has no entry 'noise_force': did you mean 'force_noise'?"),
+        ("load_cell_noise_force: 3 mN", "has no entry 'noise_force': did you mean 'force_noise'?"),
+        ("load_cell_bias_fx: 0.0125", "line 1, attribute 'load_cell_bias_fx' is 0.0125, but a load cell has no entry"),
+        (
+            "load_cell_bias_fx: 0,0125",
+            "line 1, attribute 'load_cell_bias_fx' is '0,0125', but a load cell has no entry",
+        ),
+        ("load_cell_serial: 4711", "needs a name that does not begin with 'load_cell_'"),
+        (
+            "load_cell_force_noise: -1",
+            "line 1, attribute 'load_cell_force_noise' is -1.0: give zero or a positive number",
+        ),
+    ],
+)
+def test_a_load_cell_has_no_entries_but_its_own(tmp_path, line, message):
+    path = write_text(tmp_path / "lab.csv", f"# {line}", HEADER, ROW)
+    with refused(message) as caught:
+        read_record(path, rod=WIRE)
+    assert str(caught.value).startswith(f"{path}: line 1, ")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("ATI Nano17", "ATI Nano17"),
+        ("2024-05-01", "2024-05-01"),
+        ('"4711"', "4711"),
+        ("2nd one", "2nd one"),
+        ("1, 2 and 3", "1, 2 and 3"),
+    ],
+)
+def test_remarks_on_a_load_cell_are_kept(tmp_path, text, value):
+    path = write_text(tmp_path / "lab.csv", f"# load_cell_model: {text}", HEADER, ROW)
+    record = read_record(path)
+    assert record.attrs["load_cell_model"] == value
+    write_record(record, path)
+    assert read_record(path).identical(record)
+
+
+@pytest.mark.parametrize("end", [",", ",,", ", "])
+def test_separators_at_the_end_of_every_line_make_no_columns(tmp_path, end):
+    plain = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW, ROW))
+    path = write_text(tmp_path / "rig.csv", HEADER + end, ROW + end, ROW + end)
+    assert read_record(path).identical(plain)
+    cells = end.replace(",", ",7", 1)
+    write_text(path, HEADER + end, ROW + end, ROW + cells)
+    with refused("line 1: column 7 has no name: name it, or remove it (in line 3 it has '7"):
+        read_record(path)
+    write_text(path, HEADER + end, ROW)
+    with refused("columns (sweep, direction, drive_angle, holding_moment, force_x, force_y, (column 7)"):
+        read_record(path)
+
+
+def test_names_that_are_only_values_make_no_line_of_names(tmp_path):
+    """What is given for all samples stands in lines of samples too."""
+    path = write_text(tmp_path / "rig.csv", "Angle,Sense", "1.25,forward")
+    with refused("there is no column 'holding_moment' (columns: Angle, Sense)"):
+        read_record(path, columns={"drive_angle": "1.25-Angle", "sweep": "0", "direction": "forward"})
+    with refused("there is no column 'drive_angle', but a column 'Angle': did you mean 'drive_angle'?"):
+        read_record(path, columns={"sweep": "0", "direction": "forward"})
+
+
+@pytest.mark.parametrize("name", ["t", "index"])
+def test_the_one_dimension_of_a_netcdf_file_may_have_any_name(tmp_path, name):
+    record = make_record(columns(), rod=WIRE)
+    record.rename_dims(sample=name).to_netcdf(tmp_path / "rig.nc", engine="h5netcdf")
+    assert read_record(tmp_path / "rig.nc").identical(record)
+    timed = record.rename_dims(sample=name).assign_coords({name: np.arange(6.0)})
+    timed.to_netcdf(tmp_path / "rig.nc", engine="h5netcdf")
+    assert read_record(tmp_path / "rig.nc")[name].values.tolist() == list(range(6))
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_coordinates_are_written_as_columns(tmp_path, suffix):
     record = make_record(columns(time=np.arange(6.0)))
@@ -234,7 +315,24 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
             [HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"],
             "line 2, column 'holding_moment': '1.000,5' is not a",
         ),
-        (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it"),
+        (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it (in line 2 it has '0')"),
+        (
+            ["Rig 4", HEADER, ROW],
+            "line 1: this line was taken for the column names (Rig 4), but they are in line 2: put #",
+        ),
+        (
+            ["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")],
+            "(Rig 4), but they are in line 3: put",
+        ),
+        (
+            ["# note", "Rig 4,,,,,", HEADER, ROW],
+            "line 2: this line was taken for the column names (Rig 4), but they are",
+        ),
+        (
+            ["Rig 4", "Angle,Fx", "1.0,2.0"],
+            "line 1: this line was taken for the column names (Rig 4), but there are more cells in lines below: if the "
+            "names are further down, put # before the lines above them",
+        ),
         ([HEADER + ",force_x", ROW + ",1"], "line 1: there are two columns 'force_x'"),
         (["# tactile_bayes record, format 2", HEADER, ROW], "line 1: the file has format 2"),
         (["# units: SI", "# units: SI", HEADER, ROW], "line 2: 'units' is stated a second time"),
@@ -260,6 +358,19 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         ),
         (["# units: SI"], "there is no line of column names: add one, sweep,direction,"),
         ([HEADER], "there are no samples"),
+        (
+            [HEADER, ROW.replace("1.25", '"1,25"')],
+            "line 2, column 'drive_angle': '1,25' is not a number: correct it, or remove the row; where decimals have "
+            "commas, write ; between columns",
+        ),
+        (
+            [HEADER + ",a/b,a|b", ROW + ",1,2"],
+            "the name 'a/b' cannot be stored in every file, and as 'a|b' there is ano",
+        ),
+        (
+            [HEADER.replace("drive_angle", "x") + ",a/b,a|b", ROW + ",1,2"],
+            "there is no column 'drive_angle' (columns: ",
+        ),
         ([HEADER, ROW + '"' + "x" * 200_000], "line 2: the line cannot be read"),
     ],
 )
@@ -274,21 +385,45 @@ def test_files_that_are_something_else_are_refused(tmp_path):
     (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
     with refused("this is no NetCDF file that can be read"):
         read_record(tmp_path / "a.nc")
-    for line, content in ((2, HEADER.encode() + b"\n\xff\xfe"), (1, b"# rig: \xb5\n" + HEADER.encode())):
-        (tmp_path / "a.csv").write_bytes(content)
-        with refused(f"line {line}: the file is not UTF-8 text"):
-            read_record(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_bytes(b"# of\n" + HEADER.encode() + b"\n\xff\xfe")
+    with refused("line 3: the file is not UTF-8 text (byte 0xff, 'ÿ' in Windows-1252): save it as CSV in UTF-8"):
+        read_record(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_bytes(b"# rig: \xb0\n" + HEADER.encode())
+    with refused("line 1: the file is not UTF-8 text (byte 0xb0, '°' in Windows-1252): save it as CSV in UTF-8"):
+        read_record(tmp_path / "a.csv")
     for path in ("a.txt", "a"):
         with refused("a record is a .csv or a .nc file, not"):
             read_record(tmp_path / path)
         with refused("a record is a .csv or a .nc file, not"):
             write_record(make_record(columns()), tmp_path / path)
-    xr.Dataset({"image": ("pixel", [1.0])}).to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
+    image = xr.Dataset({"image": ("pixel", [1.0]), "sweep": ("t", [0])})
+    image.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
     with refused("variable 'image' has dimensions ('pixel',)"):
         read_record(tmp_path / "b.nc")
     for path in ("absent.csv", "absent.nc"):
         with pytest.raises(FileNotFoundError):
             read_record(tmp_path / path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            f"{HEADER}\n{ROW}".encode("utf-16"),
+            "the file is UTF-16 text, as its first bytes say: save it as CSV in UTF-8",
+        ),
+        (b"\xfe\xff" + HEADER.encode("utf-16-be"), "the file is UTF-16 text"),
+        (HEADER.encode("utf-32"), "the file is UTF-32 text"),
+        (HEADER.encode("utf-16-le"), "the file is no UTF-8 text, but looks like UTF-16: save it as CSV in UTF-8"),
+        (b"\x89HDF\r\n\x1a\n", "this is no CSV file, but a NetCDF (HDF5) file: rename it to end in .nc"),
+        (b"CDF\x01\x00", "this is no CSV file, but a NetCDF file of the classic kind: convert it to NetCDF-4"),
+        (b"PK\x03\x04\x14", "this is no CSV file, but a workbook of a spreadsheet, or another zip archive: save it as"),
+    ],
+)
+def test_a_file_that_is_no_csv_file_says_what_it_is(tmp_path, content, message):
+    (tmp_path / "a.csv").write_bytes(content)
+    with refused(f"a.csv: {message}"):
+        read_record(tmp_path / "a.csv")
 
 
 def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):

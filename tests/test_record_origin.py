@@ -285,6 +285,103 @@ def test_what_does_not_fit_the_file_is_refused_with_its_place(tmp_path, changes,
     assert str(caught.value).startswith(f"{path}: ")
 
 
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [("Temp / °C", "Temp [°C]"), ("Dauer / s", "Dauer [s]"), ("Fx/Fy", "Fx|Fy"), ("v / m/s", "v [m|s]")],
+)
+def test_a_further_column_with_a_slash_is_kept_under_a_name_that_every_file_can_store(tmp_path, name, kept):
+    path = rig_file(tmp_path / "rig.csv", {**RIG, name: np.arange(6.0)})
+    record = read_record(path, columns=NAMED, rod=WIRE)
+    assert record[kept].values.tolist() == list(range(6))
+    assert record[kept].attrs == {"units": "unknown", "long_name": name}
+    for suffix in ("csv", "nc"):
+        write_record(record, tmp_path / f"again.{suffix}")
+        assert read_record(tmp_path / f"again.{suffix}").identical(record)
+
+
+def test_a_further_column_with_a_slash_keeps_its_description(tmp_path):
+    path = rig_file(
+        tmp_path / "rig.csv", {**RIG, "T / °C": np.arange(6.0)}, header=['# column "T / °C": number [°C] air']
+    )
+    assert read_record(path, columns=NAMED, rod=WIRE)["T [°C]"].attrs == {"units": "°C", "long_name": "air"}
+
+
+SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "given", "message"),
+    [
+        ({}, {}, "the name 'a / b' cannot be stored in every file, and as 'a [b]' there is another column: rename one"),
+        ({}, {"force_x": "Fz"}, "there is no column 'Fz', which is given for 'force_x'"),
+        (
+            {"Fy": ["1", "2", "", "4", "5", "6"]},
+            {},
+            "line 4, column 'force_y' ('Fy' in the file): the value is missing",
+        ),
+        (
+            {"Moment": None},
+            {"holding_moment": None},
+            "there is no column 'holding_moment' (columns: Zeit [s], Hub, Richtung, Winkel [°], Fx (mN), Fy, a / b, "
+            "a [b]): add it, or say what stands for it, columns={'holding_moment': 'NAME[UNIT]'}, on the command line "
+            "--column 'holding_moment=NAME[UNIT]', or declare the channel missing",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_measured_column_comes_before_a_name_that_cannot_be_stored(
+    tmp_path, changes, given, message
+):
+    table = {name: values for name, values in {**RIG, **SLASHES, **changes}.items() if values is not None}
+    named = {target: text for target, text in {**NAMED, **given}.items() if text is not None}
+    with refused(message):
+        read_record(rig_file(tmp_path / "rig.csv", table), columns=named, rod=WIRE)
+
+
+def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_path):
+    path = rig_file(tmp_path / "rig.csv", columns(drive_angle=None, **{"drive/angle": np.ones(6)}))
+    with refused(
+        "there is no column 'drive_angle', but a column 'drive/angle': did you mean 'drive_angle'? Rename it, or say "
+        "what stands for it, columns={'drive_angle': 'drive/angle'}, on the command line --column "
+        "drive_angle=drive/angle"
+    ):
+        read_record(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("A", "columns={'drive_angle': 'A[deg]'} of read_record, on the command line --column 'drive_angle=A[deg]'"),
+        ("-A", "columns={'drive_angle': '-A[deg]'} of read_record"),
+        ("-A+90", "columns={'drive_angle': '90-A[deg]'} of read_record"),
+        ("A-0.5", "columns={'drive_angle': '-0.5+A[deg]'} of read_record"),
+    ],
+)
+def test_what_looks_like_degrees_may_be_said_to_be_in_the_words_of_the_file(tmp_path, given, message):
+    table = {**columns(sweep=None, direction=None, drive_angle=None), "A": np.degrees(columns()["drive_angle"])}
+    path = rig_file(tmp_path / "rig.csv", table)
+    with refused(message):
+        read_record(path, columns={"drive_angle": given}, split_sweeps=True)
+    remedy = re.search(r"'drive_angle': '(.*?)'", message)[1]
+    record = read_record(path, columns={"drive_angle": remedy}, split_sweeps=True)
+    offset, sign = {"A": (0, 1), "-A": (0, -1), "-A+90": (90, -1), "A-0.5": (-0.5, 1)}[given]
+    np.testing.assert_allclose(record["drive_angle"], np.radians(offset + sign * table["A"]), rtol=1e-12)
+
+
+def test_without_a_file_degrees_are_not_said_of_a_column_of_one():
+    with refused(
+        "57.29577951308232 is more than a turn (2π), so the angles look like degrees: convert the column"
+    ) as one:
+        make_record(columns(drive_angle=np.degrees(columns()["drive_angle"])))
+    assert "--column" not in str(one.value)
+    assert "columns=" not in str(one.value)
+
+
+@pytest.mark.parametrize(("wanted", "there"), [("FX / mN", "Fx / mN"), ("a", "A"), ("WINKEL", "Winkel")])
+def test_the_case_of_a_name_is_no_obstacle_to_finding_what_was_meant(wanted, there):
+    with refused(f"did you mean {there!r}?"):
+        origins_of({"force_x": wanted}, [there, "B"], Source())
+
+
 def test_a_unit_in_the_header_and_another_one_given_contradict_each_other(tmp_path):
     path = rig_file(tmp_path / "rig.csv", header=["# column Fy: number [mN]"])
     read_record(path, columns={**NAMED, "force_y": "Fy"}, rod=WIRE)

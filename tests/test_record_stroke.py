@@ -75,6 +75,20 @@ def test_a_pivot_that_moves_begins_a_sweep():
     assert split(UP, base_y=(base, {})) == ([0, 50], "ff")
 
 
+def test_a_reset_by_less_than_a_turn_begins_a_sweep():
+    assert split([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]) == ([0, 6], "ff")
+
+
+def test_a_pivot_that_moves_may_have_its_angle_reset_by_a_turn():
+    base = np.repeat([0.0, 0.5], 4)
+    assert split([0.0, 2.0, 4.0, 6.1, 0.0, 2.0, 4.0, 6.1], base_x=(base, {})) == ([0, 4], "ff")
+
+
+def test_a_sweep_of_one_sample_is_refused():
+    with refused("a sweep has one sample, sample 2, so that it has no direction"):
+        split([1.0, 1.1, 1.0], base_x=(np.array([0.0, 0.0, 1.0]), {}))
+
+
 def table_of(**changes):
     table = {"drive_angle": np.concatenate([UP, DOWN]), "holding_moment": 0.1, **changes}
     return {name: values for name, values in table.items() if values is not None}
@@ -108,6 +122,19 @@ def test_a_file_without_sweeps_is_split(tmp_path, suffix):
     [
         ([1.0, 1.0, 1.0], "the drive angle does not move from line 2 to line 4, so that the sweep has no direction"),
         ([1.0, np.nan, 1.2], "line 3, column 'drive_angle': the value is nan: give a finite number, or remove the row"),
+        ([], "there are no samples: give at least one row below the column names"),
+        ([1.0], "there is one sample, line 2, so that it has no direction: give more samples, or give columns 'sweep'"),
+        (
+            [6.0, 6.1, 6.2, 0.1, 0.2],
+            "the drive angle jumps by about a turn, from 6.2 rad (line 4) to 0.1 rad (line 5), as angles modulo 360° "
+            "do: unwrap them (numpy.unwrap), so that none is beyond a turn (±2π), or, if the drive was reset there, "
+            "give columns 'sweep' and 'direction'",
+        ),
+        ([-3.0, -3.1, 3.1, 3.0], "the drive angle jumps by about a turn, from -3.1 rad (line 3) to 3.1 rad (line 4)"),
+        (
+            [60.0, 66.3, 72.6],
+            "line 2, column 'drive_angle': 60.0 is more than a turn (2π), so the angles look like degrees",
+        ),
     ],
 )
 def test_what_cannot_be_split_is_refused_with_its_place(tmp_path, angle, message):

@@ -112,6 +112,12 @@ def test_what_cannot_be_a_record_is_refused(table, message):
         ({"load_cell_force_noise": "low"}, "attribute 'load_cell_force_noise' is 'low': give a number [N]"),
         ({"rig": [1, 2]}, "attribute 'rig' is [1, 2]: attributes of a record are strings or numbers"),
         ({"good": True}, "attribute 'good' is True: attributes of a record are strings or numbers"),
+        ({"load_cell_force_noise": True}, "attribute 'load_cell_force_noise' is True: give a number [N]"),
+        (
+            {"load_cell_bias_fx": 0.01},
+            "attribute 'load_cell_bias_fx' is 0.01, but a load cell has no entry 'bias_fx': did",
+        ),
+        ({"load_cell_bias_fx": "3 [mN]"}, "attribute 'load_cell_bias_fx' is '3 [mN]', but a load cell has no entry"),
     ],
 )
 def test_impossible_attributes_are_refused(attrs, message):
@@ -127,7 +133,7 @@ def test_a_column_in_another_unit_is_refused():
 
 
 def test_what_is_no_dataset_or_has_other_dimensions_is_refused():
-    with refused("a record is an xarray.Dataset, not a dict"):
+    with refused("a record is an xarray.Dataset, not a dict: build one with make_record"):
         validate(columns())
     with refused("variable 'image' has dimensions ('sample', 'pixel')"):
         validate(make_record(columns()).assign(image=(("sample", "pixel"), np.zeros((6, 2)))))

@@ -93,6 +93,12 @@ def test_what_cannot_be_swept_says_why():
 @pytest.mark.parametrize(
     ("arguments", "options", "message"),
     [
+        (
+            (Parabola(np.ones(2), 0.5), np.degrees(ANGLES)),
+            {},
+            r"at most a turn \(2π\), but 206\.265 is among them: those in degrees are converted by np\.radians",
+        ),
+        (([Parabola(0.5, 0.5)] * 2, ANGLES), {}, r"contours is a list: give one contour whose parameters are arrays"),
         ((Parabola(0.5, 0.5), ANGLES), {}, r"of shape \(n,\) are wanted, not of shape \(\): for one contour, use scan"),
         ((Parabola(np.ones(2), 0.5), ANGLES), {"direction": "up"}, "choose 'forward' or 'backward'"),
         (

@@ -292,6 +292,13 @@ def test_a_zero_that_moves_between_sweeps_is_told_and_counted():
     assert 0.8 < found.noise[0] < 1.2
 
 
+def test_every_zero_that_moves_is_named():
+    loads = ramp(15, 60, 15, 5.0)
+    moved = record_of(noisy(loads, 1), noisy(loads, 2, bias=(3.0, 0.0, 1.0)))
+    with pytest.warns(DriftWarning, match=r"the zeros of holding_moment and force_y moved .*\(p = \S+ and \S+ if they"):
+        zero_load(moved)
+
+
 def test_a_zero_that_moves_during_contact_is_told_and_the_snap_off_stays():
     readings = ramp(15, 100, 15, 1.0)
     readings[115:] += (5.0, 0.0, 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from numbers import Real
+from typing import TypeGuard
 
 from tactile_bayes.errors import ParameterError
 
@@ -55,7 +56,7 @@ class Rod:
             value = getattr(self, name)
             if not _is_positive(value):
                 raise ParameterError(f"the rod's {name} is {value!r}: give a positive number [{unit}]")
-        if not (_is_positive(self.diameter) or self.diameter == 0):
+        if not (_is_number(self.diameter) and self.diameter >= 0.0):
             raise ParameterError(f"the rod's diameter is {self.diameter!r}: give zero or a positive number [m]")
         if self.elastic_strain is not None and not _is_positive(self.elastic_strain):
             raise ParameterError(
@@ -117,4 +118,8 @@ class Rod:
 
 
 def _is_positive(value: object) -> bool:
-    return isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0
+    return _is_number(value) and value > 0.0
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

@@ -73,7 +73,7 @@ def scan_many(
     Raises
     ------
     ParameterError
-        If shapes do not fit, or an argument is none that is offered.
+        If shapes do not fit, drive angles are beyond a turn, or an argument is none that is offered.
 
     Examples
     --------
@@ -84,10 +84,15 @@ def scan_many(
     """
     if direction not in ("forward", "backward"):
         raise ParameterError(f"direction is {direction!r}: choose 'forward' or 'backward'")
-    if not isinstance(contours, Contour) or len(contours.shape) != 1:
-        shape = getattr(contours, "shape", None)
+    if not isinstance(contours, Contour):
         raise ParameterError(
-            f"contours with parameters of shape (n,) are wanted, not of shape {shape}: for one contour, use scan"
+            f"contours is a {type(contours).__name__}: give one contour whose parameters are arrays, as in "
+            "Parabola(a=np.array([0.5, 0.7]), q=0.5); contours of several families are scanned one by one"
+        )
+    if len(contours.shape) != 1:
+        raise ParameterError(
+            f"contours with parameters of shape (n,) are wanted, not of shape {contours.shape}: for one contour, use "
+            "scan"
         )
     rod, (count,) = rod or Rod(), contours.shape
     try:
@@ -101,6 +106,12 @@ def scan_many(
         ) from error
     if not np.all(np.isfinite(angles)):
         raise ParameterError("drive_angles must be finite angles in radians")
+    if np.any(np.abs(angles) > 2.0 * np.pi):
+        largest = float(angles.flat[np.argmax(np.abs(angles))])
+        raise ParameterError(
+            f"drive_angles must be angles in radians, at most a turn (2π), but {largest:g} is among them: those in "
+            "degrees are converted by np.radians"
+        )
     backward = np.full(count, direction == "backward")
     seen = SeenContour(contours.broadcast_to((count,)), x, y, rod.length, 0.5 * rod.diameter, backward)
     paths = trace(seen, friction_angle=friction_angle_of(friction), order=_ORDER)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
+from tactile_bayes.record.attributes import no_entry
 from tactile_bayes.rod import Rod
 
 __all__ = ["DataSheet"]
@@ -260,10 +261,7 @@ class DataSheet:
         """
         unknown = [name for name in entries if name not in LOAD_CELL_UNITS and name != "frame"]
         if unknown:
-            raise ParameterError(
-                f"a load cell has no entry {unknown[0]!r}: there are frame, {', '.join(LOAD_CELL_UNITS)}; call an "
-                "attribute of a record that is something else by a name that does not begin with 'load_cell_'"
-            )
+            raise ParameterError(no_entry(unknown[0]))
 
         def triple(stem: str, of: tuple[float, ...], names: tuple[str, ...] = CHANNELS) -> tuple[float, ...]:
             return tuple(entries.get(f"{stem}_{name}", value) for name, value in zip(names, of, strict=True))
@@ -310,10 +308,11 @@ def _rows(gain: Any) -> tuple[Triple, Triple, Triple]:
 
 
 def _number(value: Any) -> float | None:
-    """A number as such, and not in words."""
+    """A number as such, and neither in words nor a truth value."""
     if isinstance(value, str | bytes):
         return None
     try:
-        return float(value) if np.ndim(value) == 0 else None
+        array = np.asarray(value)
+        return float(value) if array.ndim == 0 and array.dtype.kind != "b" else None
     except (TypeError, ValueError):
         return None

@@ -27,7 +27,7 @@ class _Law:
         for field in fields(self):
             value = getattr(self, field.name)
             try:
-                number = math.nan if isinstance(value, str) else float(value)
+                number = math.nan if isinstance(value, str | bool | np.bool_) else float(value)
             except (TypeError, ValueError):
                 number = math.nan
             if not (math.isfinite(number) and number >= 0.0):

@@ -141,12 +141,15 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     for rows in stretches:
         unloaded[rows] = True
     statistics = _statistics([readings[rows] for rows in stretches], steps, floor, false_alarm)
-    if (statistics["same_bias_p_value"] < false_alarm / len(channels)).any():
-        worst = int(np.nanargmin(statistics["same_bias_p_value"]))
+    moved = np.flatnonzero(statistics["same_bias_p_value"] < false_alarm / len(channels))
+    if moved.size:
+        names = " and ".join(channels[index] for index in moved)
+        p_values = " and ".join(f"{statistics['same_bias_p_value'][index]:.1g}" for index in moved)
+        zeros, they = ("zeros", "they") if moved.size > 1 else ("zero", "it")
         warnings.warn(
-            f"the zero of {channels[worst]} moved from one unloaded stretch to another (p = "
-            f"{statistics['same_bias_p_value'][worst]:.1g} if it had not): bias_uncertainty has the spread between "
-            "them added; tare before each sweep, or describe the cell with a drift",
+            f"the {zeros} of {names} moved from one unloaded stretch to another (p = {p_values} if {they} had not): "
+            "bias_uncertainty has the spread between them added; tare before each sweep, or describe the cell with a "
+            "drift",
             DriftWarning,
             stacklevel=2,
         )

@@ -10,10 +10,8 @@ import xarray as xr
 from scipy.special import chdtri
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, legend_entry, single_axes
 from tactile_bayes.plotting.maps import finish_map, outline
-from tactile_bayes.uncertainty.contact_region import contact_region
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,6 +114,9 @@ def contact_regions(
     ParameterError
         If no sample has a contact, or the probability is not in (0, 1).
     """
+    from tactile_bayes.inference.result import posterior_draws
+    from tactile_bayes.uncertainty.contact_region import contact_region
+
     _refuse_probability(probability)
     draws = posterior_draws(posterior)
     x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))

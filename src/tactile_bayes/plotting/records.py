@@ -21,7 +21,7 @@ from tactile_bayes.plotting.axes import (
     legend_entry,
     set_unit,
 )
-from tactile_bayes.record import CHANNELS, Frame, frame_of, turned
+from tactile_bayes.record import CHANNELS, Frame, frame_of, turned, validate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,6 +64,8 @@ def observables(
 
     Raises
     ------
+    RecordError
+        If `record` is no record.
     ParameterError
         If there are not three axes.
 
@@ -76,6 +78,7 @@ def observables(
     >>> axes[-1].get_xlabel()
     'drive angle $\\\\varphi_0$ [°]'
     """
+    record = validate(record)
     panels, own = channel_panels(axes)
     _draw_observables(panels, record, events, with_truth=True)
     _finish_panels(panels, own)
@@ -106,6 +109,8 @@ def predictive(
 
     Raises
     ------
+    RecordError
+        If `record` is no record.
     ParameterError
         If there are not three axes, or `predicted` has not the samples of the record, or states another frame.
 
@@ -120,6 +125,7 @@ def predictive(
     >>> predictive(measured, predicted).shape
     (3,)
     """
+    record = validate(record)
     if predicted.sizes.get("sample") != record.sizes["sample"]:
         raise ParameterError(
             f"predicted has {predicted.sizes.get('sample', 'no')} samples and the record {record.sizes['sample']}: "

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import cycle
-from typing import TYPE_CHECKING
+from itertools import cycle, product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import BASES, Floats, legend_entry, number, shown_unit, single_axes
 from tactile_bayes.plotting.maps import draw_gap, draw_object, draw_pivot, finish_map, limits_of, outline, write_on_top
 from tactile_bayes.record import rod_of
+from tactile_bayes.scanning import Scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,13 +19,15 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
     from tactile_bayes.contours.base import Contour
-    from tactile_bayes.scanning import Scan
     from tactile_bayes.sweep_events import SweepEvents
 
 __all__ = ["touched"]
 
 _SAME_PLACE = 1e-7
 """Contacts that are closer [L] are in one place: at a fold, rounding leaves a contact half of its digits."""
+
+_STYLES: tuple[Any, ...] = ("solid", (0, (3.0, 1.0)), (0, (1.0, 0.5)))
+"""Lines of the first bases, and of those after them, which have the same colours again."""
 
 _ARC_WIDTH = 3.0
 _LANE = np.sqrt(2.0) * _ARC_WIDTH
@@ -34,8 +38,9 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     """Which arcs of the contour the sweeps touched, in a colour for each base, and which gaps remain between them.
 
     An arc goes from first contact to snap-off. Arcs of the first base are on the contour, those of every further base
-    a line's width below; x is true everywhere. A gap is what no sweep touched between the outermost contacts, and its
-    width in x is written where there is room; if none remains, "no gap" is written.
+    a line's width below; x is true everywhere. From the seventh base on, lines are broken. A gap is what no sweep
+    touched between the outermost contacts, and its width in x is written where there is room; if none remains,
+    "no gap" is written.
 
     Parameters
     ----------
@@ -48,6 +53,11 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     -------
     Axes
 
+    Raises
+    ------
+    ParameterError
+        If `scan` is no scan.
+
     Examples
     --------
     >>> from tactile_bayes import scan
@@ -59,27 +69,34 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.transforms import ScaledTranslation
 
+    if not isinstance(scan, Scan):
+        raise ParameterError(
+            f"touched draws what scan(...) returns, and not a {type(scan).__name__}: a record alone does not say what "
+            "was touched; plotting.observables draws it"
+        )
     rod, attrs = rod_of(scan.record), scan.record["base_x"].attrs
     same = _SAME_PLACE * rod.length_unit
     ax = single_axes() if ax is None else ax
     arcs = [_arc(scan.contour, sweep) for sweep in scan.sweeps]
-    colours = dict(zip(dict.fromkeys(sweep.base for sweep in scan.sweeps), cycle(BASES), strict=False))
+    looks = product(_STYLES, BASES)
+    lines: dict[tuple[float, float], dict[str, Any]] = {
+        base: {"color": colour, "linestyle": style, "linewidth": _ARC_WIDTH}
+        for base, (style, colour) in zip(dict.fromkeys(sweep.base for sweep in scan.sweeps), cycle(looks), strict=False)
+    }
     for (x, y), sweep in zip(arcs, scan.sweeps, strict=True):
-        (line,) = ax.plot(x, y, color=colours[sweep.base], linewidth=_ARC_WIDTH, solid_capstyle="butt", zorder=2.0)
-        lowered = ScaledTranslation(0.0, -_LANE / 72.0 * list(colours).index(sweep.base), ax.figure.dpi_scale_trans)
+        (line,) = ax.plot(x, y, **lines[sweep.base], solid_capstyle="butt", zorder=2.0)
+        lowered = ScaledTranslation(0.0, -_LANE / 72.0 * list(lines).index(sweep.base), ax.figure.dpi_scale_trans)
         line.set_transform(ax.transData + lowered)  # only now: the limits are those of the arc itself
         if x[-1] - x[0] <= same:  # an edge, and nothing beside it
             line.set_marker("o")
-    pivots = np.array(list(colours))
+    pivots = np.array(list(lines))
     x, y = (np.concatenate([*(arc[axis] for arc in arcs), pivots[:, axis]]) for axis in (0, 1))
     draw_object(ax, scan.contour, x, y, room=0.05 * rod.length_unit)
     power, unit = shown_unit("contact_x", attrs, limits_of(ax))
-    for base, colour in colours.items():
-        draw_pivot(ax, base, colour=colour, label="")
+    for base, style in lines.items():
+        draw_pivot(ax, base, colour=style["color"], label="")
         place = ", ".join(number(part, power) for part in base)
-        legend_entry(
-            ax, f"base ({place}) {unit}", color=colour, linewidth=_ARC_WIDTH, marker="o", markerfacecolor="white"
-        )
+        legend_entry(ax, f"base ({place}) {unit}", **style, marker="o", markerfacecolor="white")
 
     gaps = _gaps(arcs, same)
     texts = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,13 +11,28 @@ import numpy as np
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.cell import number_in
-from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, UNITS, Frame
+from tactile_bayes.record.quantity import unit_of
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, LOAD_CELL_UNITS, UNITS, Frame
+from tactile_bayes.record.spelling import nearest
 from tactile_bayes.record.table import Source
 from tactile_bayes.rod import Rod
 
+_QUANTITY = re.compile(
+    r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s*"
+    r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"
+)
+
 _SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_offset")
 
-__all__ = ["checked_attributes", "completed_attributes", "rod_attributes", "same_rod", "stated_frame", "stated_rod"]
+__all__ = [
+    "checked_attributes",
+    "completed_attributes",
+    "no_entry",
+    "rod_attributes",
+    "same_rod",
+    "stated_frame",
+    "stated_rod",
+]
 
 
 def rod_attributes(rod: Rod) -> dict[str, float]:
@@ -124,19 +140,41 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
             plain = _quantity(name, plain, source)
             signed = any(word in name for word in _SIGNED)
             if not (math.isfinite(plain) and (signed or plain >= 0)):
-                what = "finite number" if signed else "zero or a positive number"
-                raise source.error(f"attribute {name!r} is {plain!r}: give {what}")
+                what = "a finite number" if signed else "zero or a positive number"
+                raise source.attribute_error(name, f"is {plain!r}: give {what}")
+        elif name.startswith("load_cell_") and _is_quantity(plain):
+            raise source.attribute_error(name, f"is {plain!r}, but {no_entry(name.removeprefix('load_cell_'))}")
         is_storable = isinstance(plain, str | float) or (
             isinstance(plain, int) and not isinstance(plain, bool) and -(2**63) <= plain < 2**63
         )
         if not is_storable:
-            raise source.error(f"attribute {name!r} is {value!r}: attributes of a record are strings or numbers")
+            raise source.attribute_error(name, f"is {value!r}: attributes of a record are strings or numbers")
         checked[name] = plain
     return checked
 
 
+def no_entry(name: str) -> str:
+    """That a load cell's data sheet has no entry of this name, and which one was probably meant."""
+    near = nearest(name, [*LOAD_CELL_UNITS, "frame"])
+    hint = f"did you mean {near!r}?" if near else f"there are frame, {', '.join(LOAD_CELL_UNITS)}."
+    return (
+        f"a load cell has no entry {name!r}: {hint} An attribute of a record that is something else needs a name that "
+        "does not begin with 'load_cell_'"
+    )
+
+
 def _quantity(name: str, value: Any, source: Source) -> float:
-    number = None if value is None else number_in(value)
+    number = None if value is None or isinstance(value, bool | np.bool_) else number_in(value)
     if number is None:
-        raise source.error(f"attribute {name!r} is {value!r}: give a number [{ATTRIBUTE_UNITS[name]}]")
+        raise source.attribute_error(name, f"is {value!r}: give a number [{ATTRIBUTE_UNITS[name]}]")
     return number
+
+
+def _is_quantity(value: Any) -> bool:
+    """Whether a value is a number, or a text of a number with a unit, or with a decimal comma."""
+    if not isinstance(value, str):
+        return isinstance(value, int | float)
+    match = _QUANTITY.fullmatch(value.strip())
+    if match is None:
+        return False
+    return match["brackets"] is not None or (unit_of(match["unit"]) is not None if match["unit"] else "," in value)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -12,9 +13,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.csv_header import FORMAT, KINDS, column_line, header_line, read_header
+from tactile_bayes.record.csv_header import FORMAT, KINDS, Header, column_line, column_names, header_line, read_header
 from tactile_bayes.record.csv_rows import Layout, read_rows
-from tactile_bayes.record.origin import meant_kinds, origins_of
+from tactile_bayes.record.encoding import refuse_other_kinds
+from tactile_bayes.record.origin import any_meant, meant_kinds, origins_of
 from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
 
@@ -22,6 +24,9 @@ __all__ = ["read_csv", "write_csv"]
 
 _ROWS = 20_000
 """Samples that are written at once."""
+
+_SEARCHED, _LONGEST = 50, 10_000
+"""Lines, and bytes of each, that are looked through for the column names, where they are not in the first one."""
 
 
 def write_csv(record: xr.Dataset, path: Path) -> None:
@@ -60,26 +65,70 @@ def _quoted_cells(texts: list[str]) -> list[str]:
 
 
 def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read a table as it is in the file; columns that mean something in a record have the right kind of cells."""
+    """Read a table as it is in the file; columns that mean something in a record have the right kind of cells.
+
+    Columns without a name are left out if they are empty: a separator at the end of every line makes one.
+    """
     source = Source(str(path))
     with open(path, "rb") as file:
+        refuse_other_kinds(file.peek(8), source)
         text = _with_usual_line_ends(file)
         header = read_header(text, source)
         source = Source(str(path), heads=header.heads)
-        origins = origins_of(columns, header.names, source)
+        names = [name for name in header.names if name]
+        _refuse_title(text, header, names, columns, source)
+        origins = origins_of(columns, names, source)
         described = {
-            name: cast(Kind, header.descriptions[name]["kind"]) for name in header.names if name in header.descriptions
+            name: cast(Kind, header.descriptions[name]["kind"]) for name in names if name in header.descriptions
         }
-        layout = Layout(header.names, header.delimiter, header.line, meant_kinds(origins, header.names), described)
+        # Columns without a name are called by their place until they are left out; names in a file begin with no blank.
+        places = [name or f" (column {place})" for place, name in enumerate(header.names, start=1)]
+        unnamed = {name: place for place, name in enumerate(places, start=1) if name not in names}
+        for name in unnamed:
+            described[name] = "text"
+        layout = Layout(places, header.delimiter, header.line, meant_kinds(origins, names), described)
         values, lines = read_rows(text, layout, Source(str(path)))
+    for name, place in unnamed.items():
+        _refuse_content(values.pop(name), place, lines, header.line, source)
     attrs = {
         name: {key: word for key, word in header.descriptions.get(name, {}).items() if key != "kind"} for name in values
     }
     return Table(
         {name: (array, attrs[name]) for name, array in values.items()},
         header.attrs,
-        Source(str(path), lines, header.heads),
+        Source(str(path), lines, header.heads, names=names, stated=header.stated),
     )
+
+
+def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Mapping[str, str], source: Source) -> None:
+    """Refuse a line that was taken for the column names, but means nothing, where a line below looks more like them."""
+    if any_meant(columns, names):
+        return
+    begin = file.tell()
+    below = [column_names(line[:_LONGEST].decode("utf-8", "replace"))[0] for line in islice(file, _SEARCHED)]
+    file.seek(begin)
+    what = f"this line was taken for the column names ({', '.join(names)}), "
+    for number, others in enumerate(below, start=header.line + 1):
+        if any_meant(columns, others):
+            raise source.line_error(
+                header.line, f"{what}but they are in line {number}: put # before the lines above that"
+            )
+    if max(map(len, below), default=0) > len(header.names):
+        raise source.line_error(
+            header.line,
+            f"{what}but there are more cells in lines below: if the names are further down, put # before the lines "
+            "above them; else write one cell per column, with a point in decimals",
+        )
+
+
+def _refuse_content(texts: NDArray[Any], place: int, lines: Sequence[int], head: int, source: Source) -> None:
+    """Refuse a column without a name that has something in it."""
+    for sample in np.flatnonzero(texts != "").tolist():
+        text = str(texts[sample])
+        if text.strip():
+            raise source.line_error(
+                head, f"column {place} has no name: name it, or remove it (in line {lines[sample]} it has {text!r})"
+            )
 
 
 def _with_usual_line_ends(file: BinaryIO) -> BinaryIO:

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
+from tactile_bayes.record.encoding import not_utf8
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
 from tactile_bayes.record.table import Source
 
-__all__ = ["FORMAT", "KINDS", "Header", "column_line", "header_line", "read_header"]
+__all__ = ["FORMAT", "KINDS", "Header", "column_line", "column_names", "header_line", "read_header"]
 
 FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
@@ -43,8 +44,10 @@ class Header:
         What is said of columns: `kind`, `units`, `long_name`.
     heads : mapping of str to int
         The line that says what a column is.
+    stated : mapping of str to int
+        The line that states an attribute.
     names : list of str
-        The columns.
+        The columns; "" for one without a name.
     delimiter : str
         What separates them.
     line : int
@@ -54,6 +57,7 @@ class Header:
     attrs: Mapping[str, Any]
     descriptions: Mapping[str, Mapping[str, str]]
     heads: Mapping[str, int]
+    stated: Mapping[str, int]
     names: list[str]
     delimiter: str
     line: int
@@ -107,9 +111,11 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             continue
         if not line.startswith("#"):
             if line.strip(_DELIMITERS + " \r\n"):
-                names, delimiter = _column_names(line, delimiter, number, source)
+                names, delimiter = column_names(line, delimiter)
+                _refuse_equal(names, number, source)
                 heads = dict.fromkeys(names, number) | heads
-                return Header(_stated_attributes(stated, source), descriptions, heads, names, delimiter, number)
+                lines = {name: line for name, (line, _) in stated.items()}
+                return Header(_stated_attributes(stated, source), descriptions, heads, lines, names, delimiter, number)
             continue
         content = _unpadded(line[1:])
         if match := _FORMAT_LINE.fullmatch(content):
@@ -144,9 +150,7 @@ def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
         try:
             yield line.decode("utf-8-sig" if number == 1 else "utf-8")
         except UnicodeDecodeError as error:
-            raise source.line_error(
-                number, f"the file is not UTF-8 text ({error.reason}): save it as CSV in UTF-8"
-            ) from error
+            raise source.line_error(number, not_utf8(error)) from error
 
 
 def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) -> dict[str, str | int | float]:
@@ -196,14 +200,14 @@ def _unquoted(text: str) -> str:
         return text
 
 
-def _column_names(line: str, delimiter: str | None, number: int, source: Source) -> tuple[list[str], str]:
-    """The names of the columns, and what separates them: what makes the most columns, if it is not said."""
+def column_names(line: str, delimiter: str | None = None) -> tuple[list[str], str]:
+    """The names in a line, and what separates them: what makes the most columns, if it is not said."""
     cells = {sign: next(csv.reader([line], delimiter=sign)) for sign in delimiter or _DELIMITERS}
     delimiter = max(cells, key=lambda sign: len(cells[sign]))
-    names = [name.strip() for name in cells[delimiter]]
+    return [name.strip() for name in cells[delimiter]], delimiter
+
+
+def _refuse_equal(names: list[str], number: int, source: Source) -> None:
     for index, column in enumerate(names):
-        if not column:
-            raise source.line_error(number, f"column {index + 1} has no name: name it, or remove it")
-        if column in names[:index]:
+        if column and column in names[:index]:
             raise source.line_error(number, f"there are two columns {column!r}: rename or remove one of them")
-    return names, delimiter

@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
+from tactile_bayes.record.encoding import not_utf8
 from tactile_bayes.record.schema import Kind
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.text import FREE, text_array
@@ -306,8 +307,8 @@ def _read_carefully(
             if row and len(row) != len(layout.names):
                 raise source.line_error(
                     begin,
-                    f"there are {len(row)} cells in {len(layout.names)} columns ({', '.join(layout.names)}): write one "
-                    "per column, with a point in decimals"
+                    f"there are {len(row)} cells in {len(layout.names)} columns "
+                    f"({', '.join(map(str.strip, layout.names))}): write one per column, with a point in decimals"
                     + ("" if layout.delimiter == "," else " or a comma, but none between thousands"),
                 )
             if row:
@@ -331,9 +332,7 @@ def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
         text = chunk.decode("utf-8")
     except UnicodeDecodeError as error:
         line = above + 1 + chunk.count(b"\n", 0, error.start)
-        raise source.line_error(
-            line, f"the file is not UTF-8 text ({error.reason}): save it as CSV in UTF-8"
-        ) from error
+        raise source.line_error(line, not_utf8(error)) from error
     return io.StringIO(text, newline="").readlines()
 
 
@@ -386,6 +385,9 @@ def _refuse_cell(
         what = f"is no {kind}, as the header says the column is: correct one"
     else:
         what = f"is not {'an integer' if kind == 'integer' else 'a number'}: correct it, or remove the row"
-        if layout.delimiter != "," and layout.decimal and ("," if layout.decimal == "." else ".") in texts[sample]:
+        if layout.delimiter == ",":
+            if "," in texts[sample] and number_in(texts[sample].replace(",", ".")) is not None:
+                what += "; where decimals have commas, write ; between columns"
+        elif layout.decimal and ("," if layout.decimal == "." else ".") in texts[sample]:
             what += f"; decimals are separated by {layout.decimal!r} in this file, and thousands by nothing"
     raise source.cell_error(sample, name, f"{texts[sample]!r} {what}")

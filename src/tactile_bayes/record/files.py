@@ -40,7 +40,8 @@ def read_record(
     A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
     sample; `write_record` shows the form. The header may be absent: then the numbers are dimensionless, or SI if
     `rod` is given or a column states a unit. A load cell that turns with the drive is stated by
-    `# load_cell_frame: turning`. Semicolons or tabs may stand between columns, and then commas in decimals.
+    `# load_cell_frame: turning`. Semicolons or tabs may stand between columns, and then commas in decimals. In a NetCDF
+    file every variable lies along one dimension, "sample" or any other.
 
     Units are those of the record (SI, or those of the rod; angles in radians), or others that are stated: by
     `columns`, in the name of a column ("force_x [mN]"), in a line of the header (`# column force_x: number [mN]`,
@@ -55,7 +56,8 @@ def read_record(
         minus before it, `-NAME[UNIT]`, is for a rig that counts the other way round, a number with a sign for one
         that counts from another zero: `90-NAME[deg]` or `NAME[mN]+12.5`; it is in the same unit. For base_x,
         base_y, sweep and direction one value for all samples can be given, as "12[mm]", "0" or "forward". A unit in
-        the name of a column may be left out. Further columns keep their names.
+        the name of a column may be left out. Further columns keep their names, but for a slash, which no NetCDF file
+        can store: "Temp / °C" becomes "Temp [°C]", and another slash "|".
     split_sweeps : bool
         Whether the columns sweep and direction, which the file lacks, are found from the drive angle: a sweep ends
         where the angle comes back from an extreme by more than a tenth of its whole range, or where the pivot moves;
@@ -79,7 +81,8 @@ def read_record(
         If the content is not a record, see `validate` (the message names line and column); if the file is SI
         and no rod is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if a
         column is in a unit of another quantity, or what stands for it in `columns` is not there; if there are sweeps
-        already where they are to be split; if the suffix is another one.
+        already where they are to be split, or the drive angle jumps by about a turn there; if the suffix is another
+        one.
     ParameterError
         If `columns` names no column of a record, or what stands for it cannot be.
 

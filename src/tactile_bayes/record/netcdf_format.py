@@ -14,7 +14,10 @@ __all__ = ["read_netcdf", "write_netcdf"]
 
 
 def read_netcdf(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read a table as it is in the file; all its columns are read, whichever are meant."""
+    """Read a table as it is in the file; all its columns are read, whichever are meant.
+
+    The dimension of the samples may have any name, if all columns lie along it.
+    """
     source = Source(str(path))
     with open(path, "rb"):  # what the system refuses, it refuses in fewer words than HDF5
         pass
@@ -29,7 +32,9 @@ def read_netcdf(path: Path, columns: Mapping[str, str]) -> Table:
             record = stored.load()
     except (OSError, ValueError) as error:
         raise source.error(f"this is no NetCDF file that can be read ({error}): write it again") from error
-    return table_of(record, source)
+    dimensions = {variable.dims for variable in record.variables.values()}
+    shared = dimensions.pop() if len(dimensions) == 1 else ()
+    return table_of(record, source, shared[0] if len(shared) == 1 else "sample")
 
 
 def write_netcdf(record: xr.Dataset, path: Path) -> None:

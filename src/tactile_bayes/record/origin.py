@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,9 +13,11 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import accepted_units, unit_of
 from tactile_bayes.record.schema import COLUMNS, DIRECTIONS, MEASURED, Column, Kind, column_of
+from tactile_bayes.record.spelling import nearest
+from tactile_bayes.record.storable import storable
 from tactile_bayes.record.table import Cells, Source, Table
 
-__all__ = ["Origin", "meant_kinds", "origins_of", "renamed"]
+__all__ = ["Origin", "any_meant", "meant_kinds", "origins_of", "renamed"]
 
 CONSTANTS = ("sweep", "direction", "base_x", "base_y")
 """Columns for which a single value can be given."""
@@ -54,6 +55,13 @@ class Origin:
     sign: int = 1
     offset: float = 0.0
     value: str | float | None = None
+
+    def __str__(self) -> str:
+        """What stands for the column, as `read_record` takes it, less the unit."""
+        if self.column is None:
+            return str(self.value)
+        sign = "-" if self.sign < 0 else "+" if self.offset else ""
+        return f"{f'{self.offset:.15g}' if self.offset else ''}{sign}{self.column}"
 
 
 def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source) -> dict[str, Origin]:
@@ -96,6 +104,17 @@ def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source)
     return origins
 
 
+def any_meant(columns: Mapping[str, str], names: Iterable[str]) -> bool:
+    """Whether any of these columns means something in a record, by its own name or by what is given for one."""
+    names = list(names)
+    if any(_stem_and_unit(name)[0] in MEASURED for name in names):
+        return True
+    texts = [str(text).strip() for text in columns.values()]
+    named = [text for text in texts if not (_VALUE.fullmatch(text) or text in DIRECTIONS)]
+    readings = [origin for text in named for origin in _readings(text)]
+    return any(origin.column is not None and _found(origin.column, names) is not None for origin in readings)
+
+
 def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str, Kind]:
     """The kinds of those columns of a file that mean something in a record."""
     kinds = {name: column.kind for name in names if (column := column_of(name)) is not None}
@@ -104,19 +123,25 @@ def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str
 
 
 def renamed(table: Table, columns: Mapping[str, str]) -> Table:
-    """The table with the names of a record, its signs and its zeros; units are stated, and not converted yet."""
+    """The table with the names of a record, its signs and its zeros; units are stated, and not converted yet.
+
+    A further column whose name has a slash in it is called otherwise, if there is no column of that name yet.
+    """
     origins = origins_of(columns, table.columns, table.source)
-    if not origins:
-        return table
     used = Counter(origin.column for origin in origins.values())
-    heads, aliases = dict(table.source.heads), dict(table.source.aliases)
-    for target, origin in origins.items():
-        if origin.column is not None:
-            aliases[target] = origin.column
-            if origin.column in table.source.heads:
-                heads[target] = table.source.heads[origin.column]
-    source = replace(table.source, heads=heads, aliases=aliases)
-    cells = {name: content for name, content in table.columns.items() if name not in used}
+    further = [name for name in table.columns if name not in used]
+    forms = Counter(map(storable, further))
+    called = {name: storable(name) if forms[storable(name)] == 1 else name for name in further}
+    aliases = {other: name for name, other in called.items() if other != name}
+    aliases |= {target: origin.column for target, origin in origins.items() if origin.column is not None}
+    heads = dict(table.source.heads)
+    heads |= {name: heads[alias] for name, alias in aliases.items() if alias in heads}
+    given = {target: str(origin) for target, origin in origins.items()}
+    source = replace(table.source, heads=heads, aliases=aliases, names=list(table.columns), origins=given)
+    cells: dict[str, Cells] = {}
+    for name, other in called.items():
+        values, attrs = table.columns[name]
+        cells[other] = (values, attrs if other == name else {"long_name": name, **attrs})
     for target, origin in origins.items():
         if origin.column is None:
             unit = {} if origin.unit is None else {"units": origin.unit}
@@ -157,8 +182,8 @@ def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: S
 def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
     column = column_of(target)
     if column is None:
-        near = difflib.get_close_matches(target, COLUMNS, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(MEASURED)}"
+        near = nearest(target, COLUMNS)
+        hint = f"did you mean {near!r}?" if near else f"choose from {', '.join(MEASURED)}"
         raise ParameterError(f"columns: {target!r} is no column of a record: {hint}")
     text = text.strip()
     readings = list(_readings(text))
@@ -170,8 +195,8 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
     if value is not None:
         return value
     wanted = readings[-1].column or text
-    near = difflib.get_close_matches(wanted, names, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else "write NAME[UNIT], with a minus before it for the opposite sign"
+    near = nearest(wanted, names)
+    hint = f"did you mean {near!r}?" if near else "write NAME[UNIT], with a minus before it for the opposite sign"
     if target in CONSTANTS:
         hint += f" (or one value for all samples, like {_example(column)})"
     raise source.error(

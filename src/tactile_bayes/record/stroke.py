@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.record.parsing import parsed_column
-from tactile_bayes.record.table import Table
+from tactile_bayes.record.table import Source, Table
 
 __all__ = ["split_at_turns", "turning_points"]
+
+_WIDEST = 0.5
+"""Neighbouring samples of a sweep are closer than this [rad]."""
 
 SHARE = 0.1
 """A drive turns where it comes back by more than this share of its whole range."""
@@ -60,13 +64,15 @@ def split_at_turns(table: Table) -> Table:
     Raises
     ------
     RecordError
-        If the table has sweeps or directions already; if it has no angle, or one that does not move.
+        If the table has sweeps or directions already; if it has no samples, or an angle that does not move or that
+        begins anew after a turn.
     """
     source = table.source
+    table.refuse_empty()
     for name in ("sweep", "direction"):
         if name in table.columns:
             raise source.column_error(name, "is there already: do without split_sweeps, or remove the column")
-    if "drive_angle" not in table.columns or table.samples == 0:  # which is refused with what else is missing
+    if "drive_angle" not in table.columns:  # which is refused with what else is missing
         return table
     angle = parsed_column("drive_angle", table.columns["drive_angle"][0], source)
     bad = ~np.isfinite(angle)
@@ -81,6 +87,7 @@ def split_at_turns(table: Table) -> Table:
         if name in table.columns:
             base = parsed_column(name, table.columns[name][0], source)
             moved[1:] |= base[1:] != base[:-1]
+    _refuse_wrapped(angle, moved, source)
     starts = []
     for begin, end in pairwise([0, *np.flatnonzero(moved).tolist(), angle.size]):
         turns = turning_points(angle[begin:end], least)
@@ -93,12 +100,37 @@ def split_at_turns(table: Table) -> Table:
     for begin, end in pairwise([*starts, angle.size]):
         trend = _trend(angle[begin:end])
         if trend == 0.0:
-            raise source.error(
-                f"the drive angle does not move from {source.row(begin)} to {source.row(end - 1)}, so that the sweep "
-                "has no direction: remove these samples, or give columns 'sweep' and 'direction'"
-            )
+            if end - begin == 1:
+                what = "there is one sample" if angle.size == 1 else "a sweep has one sample"
+                what += f", {source.row(begin)}, so that it has no direction: give more samples"
+            else:
+                what = (
+                    f"the drive angle does not move from {source.row(begin)} to {source.row(end - 1)}, so that the "
+                    "sweep has no direction: remove these samples"
+                )
+            raise source.error(f"{what}, or give columns 'sweep' and 'direction'")
         direction[begin:end] = "forward" if trend > 0.0 else "backward"
     return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
+
+
+def _refuse_wrapped(angle: NDArray[np.float64], moved: NDArray[np.bool_], source: Source) -> None:
+    """Refuse an angle that jumps by about a turn between two samples.
+
+    That is an angle modulo a turn, or a drive that was reset after a stroke of a whole turn, which makes a sweep more.
+    Only who measured knows which, so it is not unwrapped here.
+    """
+    if np.abs(angle).max() > 2.0 * math.pi:  # which are degrees, and refused as such
+        return
+    step = np.diff(angle)
+    wrapped = (np.abs(np.abs(step) - 2.0 * math.pi) < _WIDEST) & ~moved[1:]
+    if wrapped.any():
+        before = int(np.argmax(wrapped))
+        one, two = float(angle[before]), float(angle[before + 1])
+        raise source.error(
+            f"the drive angle jumps by about a turn, from {one!r} rad ({source.row(before)}) to {two!r} rad "
+            f"({source.row(before + 1)}), as angles modulo 360° do: unwrap them (numpy.unwrap), so that none is beyond "
+            "a turn (±2π), or, if the drive was reset there, give columns 'sweep' and 'direction'"
+        )
 
 
 def _left_extreme(angle: NDArray[np.float64], begin: int, sense: int, least: float) -> tuple[int, int] | None:

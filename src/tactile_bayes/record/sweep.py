@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any
@@ -29,14 +30,17 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
     beyond = (angle > 2 * math.pi) | (angle < -2 * math.pi)
     if beyond.any():
         sample = int(np.argmax(beyond))
-        raise source.cell_error(
-            sample,
-            "drive_angle",
+        what = (
             f"{float(angle[sample])!r} is more than a turn (2π), so the angles look like degrees: convert the column "
-            "to radians, with numpy.radians or times 0.017453292519943295, or state its unit, as in "
-            "columns={'drive_angle': 'drive_angle[deg]'} of read_record, on the command line "
-            "--column 'drive_angle=drive_angle[deg]'",
+            "to radians, with numpy.radians or times 0.017453292519943295"
         )
+        if source.names:
+            origin = f"{source.origins.get('drive_angle', 'drive_angle')}[deg]"
+            what += (
+                f", or state its unit, as in columns={{'drive_angle': {origin!r}}} of read_record, on the command line "
+                f"--column {shlex.quote(f'drive_angle={origin}')}"
+            )
+        raise source.cell_error(sample, "drive_angle", what)
     for rows in _sweeps(values["sweep"]):
         first, last = _ends(rows)
         sweep = int(values["sweep"][first])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,12 +32,21 @@ class Source:
         The line of the file that says what a column is.
     aliases : mapping of str to str, optional
         What a column is called in the file, if that is something else.
+    names : sequence of str, optional
+        The columns of the file.
+    origins : mapping of str to str, optional
+        What stands for a column in the file, with sign and zero, as `read_record` takes it, less the unit.
+    stated : mapping of str to int, optional
+        The line of the file that states an attribute.
     """
 
     name: str = ""
     lines: Sequence[int] | None = None
     heads: Mapping[str, int] = field(default_factory=dict)
     aliases: Mapping[str, str] = field(default_factory=dict)
+    names: Sequence[str] = ()
+    origins: Mapping[str, str] = field(default_factory=dict)
+    stated: Mapping[str, int] = field(default_factory=dict)
 
     def row(self, sample: int) -> str:
         """What a sample is called."""
@@ -57,8 +66,14 @@ class Source:
 
     def column_error(self, column: str, what: str) -> RecordError:
         """A refusal that points at what is said of a column."""
-        line = self.heads.get(column)
-        return self.error(f"{'' if line is None else f'line {line}, '}{self.column(column)} {what}")
+        return self._error_at(self.heads.get(column), f"{self.column(column)} {what}")
+
+    def attribute_error(self, name: str, what: str) -> RecordError:
+        """A refusal that points at an attribute."""
+        return self._error_at(self.stated.get(name), f"attribute {name!r} {what}")
+
+    def _error_at(self, line: int | None, what: str) -> RecordError:
+        return self.error(what if line is None else f"line {line}, {what}")
 
     def column(self, name: str) -> str:
         """What a column is called."""
@@ -89,11 +104,16 @@ class Table:
         """Number of samples."""
         return next((len(values) for values, _ in self.columns.values()), 0)
 
+    def refuse_empty(self) -> None:
+        """Refuse a table without samples."""
+        if self.samples == 0:
+            raise self.source.error("there are no samples: give at least one row below the column names")
 
-def table_of(dataset: xr.Dataset, source: Source) -> Table:
-    """The table in a dataset, if all its variables have the dimension "sample" alone."""
+
+def table_of(dataset: xr.Dataset, source: Source, dimension: Hashable = "sample") -> Table:
+    """The table in a dataset, if all its variables have the dimension of the samples alone."""
     for name, variable in dataset.variables.items():
-        if variable.dims != ("sample",):
+        if variable.dims != (dimension,):
             raise source.error(
                 f"variable {str(name)!r} has dimensions {variable.dims}: a column of a record has the one dimension "
                 "'sample'; drop the variable, or stack it"

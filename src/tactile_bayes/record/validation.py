@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Collection, Iterable, Mapping
-from itertools import chain
+import shlex
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,8 @@ from numpy.typing import NDArray
 from tactile_bayes.record.attributes import checked_attributes, stated_frame
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of, same_unit
+from tactile_bayes.record.spelling import nearest
+from tactile_bayes.record.storable import is_storable, storable
 from tactile_bayes.record.sweep import refuse_impossible_sweeps
 from tactile_bayes.record.table import Cells, Source, Table, table_of
 
@@ -61,7 +62,8 @@ def validate(record: xr.Dataset) -> xr.Dataset:
     """  # noqa: E501
     source = Source()
     if not isinstance(record, xr.Dataset):
-        raise source.error(f"a record is an xarray.Dataset, not a {type(record).__name__}: build one with make_record")
+        hint = "take its record" if hasattr(record, "record") else "build one with make_record"
+        raise source.error(f"a record is an xarray.Dataset, not a {type(record).__name__}: {hint}")
     checked = checked_record(table_of(record, source))
     return checked.set_coords([name for name in record.coords if name in checked.data_vars])
 
@@ -69,15 +71,10 @@ def validate(record: xr.Dataset) -> xr.Dataset:
 def checked_record(table: Table) -> xr.Dataset:
     """The record that a table makes, or the reason why it makes none."""
     columns, attrs, source = table.columns, table.attrs, table.source
-    for name in chain(columns, attrs):
-        if not _is_storable(name):
-            raise source.error(
-                f"the name {name!r} cannot be stored in every file: use printable characters, no '/', and not '.' alone"
-            )
+    _refuse_names(attrs, source)
     attributes = checked_attributes(attrs, source)
     _refuse_absent_columns(columns, source)
-    if table.samples == 0:
-        raise source.error("there are no samples: give at least one row below the column names")
+    table.refuse_empty()
 
     at_origin: dict[str, Cells] = {name: (np.zeros(table.samples), {}) for name in ("base_x", "base_y")}
     filled = at_origin | dict(columns)
@@ -85,6 +82,7 @@ def checked_record(table: Table) -> xr.Dataset:
     values = {name: parsed_column(name, filled[name][0], source) for name in order}
     _refuse_gaps(values, source)
     refuse_impossible_sweeps(values, source)
+    _refuse_names(columns, source)
     variables = {
         name: ("sample", values[name], _checked_column_attributes(name, filled[name][1], attributes, source))
         for name in order
@@ -92,14 +90,16 @@ def checked_record(table: Table) -> xr.Dataset:
     return xr.Dataset(variables, attrs=attributes)
 
 
-def _is_storable(name: Any) -> bool:
-    return (
-        isinstance(name, str)
-        and name.strip() == name
-        and name not in ("", ".")
-        and name.isprintable()
-        and "/" not in name
-    )
+def _refuse_names(names: Collection[Any], source: Source) -> None:
+    for name in names:
+        if is_storable(name):
+            continue
+        what = f"the name {name!r} cannot be stored in every file"
+        if isinstance(name, str) and name in source.names and is_storable(storable(name)):
+            what += f", and as {storable(name)!r} there is another column: rename one of the two"
+        else:
+            what += ": use printable characters, no '/', and not '.' alone"
+        raise source.error(what)
 
 
 def _checked_column_attributes(
@@ -124,17 +124,25 @@ def _checked_column_attributes(
 
 def _refuse_absent_columns(columns: Collection[str], source: Source) -> None:
     unknown = [name for name in columns if column_of(name) is None]
+    is_file = bool(source.names)
     for name in MEASURED:
         if name in columns:
             continue
         is_required = name in REQUIRED
-        similar = _nearest(name, unknown, cutoff=0.6 if is_required else 0.8)
+        similar = nearest(name, unknown, cutoff=0.6 if is_required else 0.8)
         if similar is not None:
-            what = f"there is no column {name!r}, but a column {similar!r}: did you mean {name!r}? Rename it"
+            stands = source.aliases.get(similar, similar)
+            what = f"there is no column {name!r}, but a column {stands!r}: did you mean {name!r}? Rename it"
         elif is_required:
-            what = f"there is no column {name!r} (columns: {', '.join(columns) or 'none'}): add it"
+            stands = "NAME[UNIT]" if COLUMNS[name].kind == "number" else "NAME"
+            what = f"there is no column {name!r} (columns: {', '.join(source.names or columns) or 'none'}): add it"
         else:
             continue
+        if is_file:
+            what += (
+                f", or say what stands for it, columns={{{name!r}: {stands!r}}}, on the command line "
+                f"--column {shlex.quote(f'{name}={stands}')}"
+            )
         if name in CHANNELS:
             what += (
                 f", or declare the channel missing, with an empty column or missing=({name!r},), on the command line "
@@ -167,9 +175,3 @@ def _refuse_gaps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
             raise source.cell_error(
                 int(bad[0]), name, f"the value {what}: give a finite number, remove the row{way_out}"
             )
-
-
-def _nearest(name: str, candidates: Iterable[str], cutoff: float) -> str | None:
-    by_lower_case = {candidate.lower(): candidate for candidate in candidates}
-    found = difflib.get_close_matches(name.lower(), by_lower_case, n=1, cutoff=cutoff)
-    return by_lower_case[found[0]] if found else None
