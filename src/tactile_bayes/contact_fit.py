@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.elastica import TANGENTIAL, TIP, Contact
+from tactile_bayes.elastica import TANGENTIAL, TIP, contact_from_wrench
 from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, Touching, touching, touching_and_slopes
 
 __all__ = ["ContactFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet"]
@@ -33,7 +33,10 @@ _OUTDONE = 2.0, 10.0
 """Factor on the other sheet's sum of squares, and addend, beyond which a sheet that is roughly fitted is given up."""
 
 _STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Arc lengths to start from in tangential contact, and shares of a right angle for ψ1 in tip contact."""
+"""Arc lengths to start from in tangential contact, and shares of its whole range for ψ1 in tip contact."""
+
+_LEAST_MOMENT = 0.1
+"""Standard deviations of the moment below which a start has not less of it."""
 
 
 class Reading(NamedTuple):
@@ -80,7 +83,7 @@ class ContactFit(NamedTuple):
     """By how much the sum of squares of the best contact of the other phase is larger; infinite where it has none."""
 
 
-def fit_contacts(reading: Reading, friction_angle: Floats, raw: Contact) -> ContactFit:
+def fit_contacts(reading: Reading, friction_angle: Floats) -> ContactFit:
     """Most likely contacts of samples.
 
     Parameters
@@ -89,24 +92,18 @@ def fit_contacts(reading: Reading, friction_angle: Floats, raw: Contact) -> Cont
         n samples.
     friction_angle : ndarray, shape (n,)
         δ = arctan μ.
-    raw : Contact
-        What `contact_from_wrench` says, to start from where it says anything.
     """
     size = reading.drive_angle.size
     blocks = []
     for begin in range(0, max(size, 1), _BLOCK):
         part = slice(begin, begin + _BLOCK)
-        start = raw.contact_arclength[part], raw.tip_angle[part], raw.slope_angle[part]
-        blocks.append(_fit_block(reading.take(part), friction_angle[part], *start))
+        blocks.append(_fit_block(reading.take(part), friction_angle[part]))
     return ContactFit(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
 
 
-def _fit_block(
-    reading: Reading, delta: Floats, arclength: Floats, tip_angle: Floats, slope_angle: Floats
-) -> ContactFit:
+def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
     target = _Target(reading, delta)
-    tip = _Descent(target, TIP, tip_angle - slope_angle - delta)
-    lying = _Descent(target, TANGENTIAL, arclength)
+    tip, lying = _Descent(target, TIP), _Descent(target, TANGENTIAL)
     everyone = np.arange(delta.size)
     for descent in (tip, lying):
         descent.go(everyone, _ROUGH, _ROUGH_STEPS)
@@ -128,7 +125,7 @@ def _fit_block(
         clearance = np.where(ends, coordinates[:, PSI1] + delta, 1.0 - coordinates[:, ARCLENGTH]) / spread
     where = np.flatnonzero(at_edge)
     if where.size:
-        edge = _Descent(_Target(reading.take(where), delta[where]), None, np.ones(where.size))
+        edge = _Descent(_Target(reading.take(where), delta[where]), None)
         edge.go(np.arange(where.size), _SETTLED, _MOST_STEPS)
         coordinates[where], misfit[where], clearance[where] = edge.z, edge.misfit, 0.0
     phase = np.where(ends, np.int8(TIP), np.int8(TANGENTIAL))
@@ -137,7 +134,7 @@ def _fit_block(
     return ContactFit(coordinates, covariance, misfit, phase, at_edge, clearance, rival)
 
 
-def fit_sheet(reading: Reading, delta: Floats, phase: int | None, start: Floats) -> SheetFit:
+def fit_sheet(reading: Reading, delta: Floats, phase: int | None) -> SheetFit:
     """The best contact of one phase, or on the edge (None), wherever on its sheet, beyond the edge as well.
 
     Parameters
@@ -147,10 +144,8 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None, start: Floats)
     delta : ndarray, shape (n,)
         δ = arctan μ.
     phase : TIP, TANGENTIAL or None
-    start : ndarray, shape (n,)
-        ψ1 in tip contact, the arc length in tangential contact, to start from; NaN where several are to be tried.
     """
-    descent = _Descent(_Target(reading, delta), phase, start)
+    descent = _Descent(_Target(reading, delta), phase)
     descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
     return SheetFit(descent.z, descent.covariance(), descent.misfit)
 
@@ -158,11 +153,11 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None, start: Floats)
 class _Descent:
     """Levenberg's and Marquardt's method on one sheet, for many samples."""
 
-    def __init__(self, target: _Target, phase: int | None, start: Floats) -> None:
+    def __init__(self, target: _Target, phase: int | None) -> None:
         self._target = target
         self._phase = phase
         self._free = _FREE[phase] if target.is_exact else (*_FREE[phase], DRIVE_ANGLE)
-        self.z = _starts(target, phase, start)
+        self.z = _starts(target, phase)
         self._miss, self._slopes = target.at(self.z, np.arange(len(self.z)), self._free)
         self.misfit = np.nan_to_num((self._miss * self._miss).sum(axis=1), nan=np.inf)
         self._hardness = np.full(len(self.z), 1e-3)
@@ -170,26 +165,30 @@ class _Descent:
     def go(self, who: NDArray[np.intp], tolerance: float, most_steps: int) -> None:
         """Descend until the gain that the next step promises is small."""
         who = who[np.isfinite(self.misfit[who])]
-        for _ in range(most_steps):
-            if not who.size:
-                return
-            slopes, miss = self._slopes[who], self._miss[who]
-            normal, pull = np.swapaxes(slopes, 1, 2) @ slopes, (slopes * miss[:, :, None]).sum(axis=1)
-            index = np.arange(len(self._free))
-            normal[:, index, index] *= 1.0 + self._hardness[who, None]
-            step = (_inverse(normal) * pull[:, None, :]).sum(axis=2)
-            trial = self.z[who]
-            trial[:, self._free] -= step
-            new_miss, new_slopes = self._target.at(trial, who, self._free)
-            new = (new_miss * new_miss).sum(axis=1)
-            with np.errstate(invalid="ignore"):
-                better = new <= self.misfit[who]
-            settled = (step * pull).sum(axis=1) <= tolerance * (1.0 + self.misfit[who])
-            lucky = who[better]
-            self.z[lucky], self.misfit[lucky] = trial[better], new[better]
-            self._miss[lucky], self._slopes[lucky] = new_miss[better], new_slopes[better]
-            self._hardness[who] *= np.where(better, 0.1, 10.0)
-            who = who[~settled]
+        with np.errstate(all="ignore"):  # a step into the impossible is none
+            for _ in range(most_steps):
+                if not who.size:
+                    return
+                who = self._step(who, tolerance)
+
+    def _step(self, who: NDArray[np.intp], tolerance: float) -> NDArray[np.intp]:
+        """One step, and who has not arrived with it."""
+        slopes, miss = self._slopes[who], self._miss[who]
+        normal, pull = np.swapaxes(slopes, 1, 2) @ slopes, (slopes * miss[:, :, None]).sum(axis=1)
+        index = np.arange(len(self._free))
+        normal[:, index, index] *= 1.0 + self._hardness[who, None]
+        step = (_inverse(normal) * pull[:, None, :]).sum(axis=2)
+        trial = self.z[who]
+        trial[:, self._free] -= step
+        new_miss, new_slopes = self._target.at(trial, who, self._free)
+        new = (new_miss * new_miss).sum(axis=1)
+        better = new <= self.misfit[who]
+        settled = (step * pull).sum(axis=1) <= tolerance * (1.0 + self.misfit[who])
+        lucky = who[better]
+        self.z[lucky], self.misfit[lucky] = trial[better], new[better]
+        self._miss[lucky], self._slopes[lucky] = new_miss[better], new_slopes[better]
+        self._hardness[who] *= np.where(better, 0.1, 10.0)
+        return who[~settled]
 
     def misfit_before(self, delta: Floats) -> Floats:
         """Sum of squares; infinite for contacts beyond the edge."""
@@ -254,23 +253,25 @@ class _Target:
         return np.concatenate([miss, (turned / reading.angle_deviation[who])[:, None]], axis=1)
 
 
-def _starts(target: _Target, phase: int | None, start: Floats) -> Floats:
-    """Coordinates to start from: the given ones, or the best of several."""
-    reading = target.reading
+def _starts(target: _Target, phase: int | None) -> Floats:
+    """Coordinates to start from: those of raw Step 2, or the best of several where it has no answer."""
+    reading, delta = target.reading, target.delta
     force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
-    z = np.stack([force, -target.delta, np.ones(force.size), reading.drive_angle], axis=1)
+    z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
     if phase is None:
-        options = [(FORCE, force * share) for share in (1.0, 0.5, 2.0)]
-    elif phase == TIP:
-        options = [(PSI1, np.full(force.size, 0.5 * np.pi * share)) for share in _STARTS]
-        options.insert(0, (PSI1, np.clip(start, -target.delta, 1.4)))
+        coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
     else:
-        options = [(ARCLENGTH, np.full(force.size, share)) for share in _STARTS]
-        options.insert(0, (ARCLENGTH, np.clip(start, 0.02, 1.0)))
+        arclength, psi1 = _raw_start(reading, delta)
+        if phase == TIP:
+            spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
+            coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
+        else:
+            spread = [np.full(force.size, share) for share in _STARTS]
+            coordinate, options = ARCLENGTH, [np.clip(arclength, 0.02, 1.0), *spread]
     best = np.full(force.size, np.inf)
     found = np.full(z.shape, np.nan)
     left = np.arange(force.size)
-    for number, (coordinate, values) in enumerate(options):
+    for number, values in enumerate(options):
         trial = z[left]
         trial[:, coordinate] = values[left]
         misfit = target.misfit(trial, left)
@@ -282,3 +283,11 @@ def _starts(target: _Target, phase: int | None, start: Floats) -> Floats:
             if not left.size:
                 break
     return found
+
+
+def _raw_start(reading: Reading, delta: Floats) -> tuple[Floats, Floats]:
+    """Arc length and ψ1 of raw Step 2; where the moment has the wrong sign, of one that is small and right."""
+    moment, force_x, force_y = reading.loads.T
+    least = _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
+    raw = contact_from_wrench(reading.drive_angle, np.maximum(moment, least), force_x, force_y, delta, side=1.0)
+    return raw.contact_arclength, raw.tip_angle - raw.slope_angle - delta

@@ -76,13 +76,13 @@ class _Bent(NamedTuple):
 
 def _bent(force: Floats, psi1: Floats, arclength: Floats) -> _Bent:
     m = np.sin(0.25 * np.pi - 0.5 * psi1) ** 2
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         root = np.sqrt(force)
         load = root * arclength
-        possible = (m > 0.0) & (m < 1.0) & (load > 0.0) & (arclength > 0.0)
-        # Beyond a little more than this, the line of force has passed the pivot.
-        possible &= load <= 2.2 * ellipk(np.where(possible, m, 0.5))
-    m, load = np.where(possible, m, 0.5), np.where(possible, load, 1.0)
+        possible = (np.abs(psi1) < 0.5 * np.pi) & (load > 0.0) & (arclength > 0.0) & (force < np.inf)
+        # With twice K the line of force passes through the pivot.
+        possible &= load <= 2.0 * ellipk(np.where(possible, m, 0.5))
+    m, load, force = np.where(possible, m, 0.5), np.where(possible, load, 1.0), np.where(possible, force, 1.0)
     root = np.where(possible, root, np.nan)
     arc, by_chi, by_psi1 = arc_and_slopes(ellipj(load, m)[3], m)
     # With the length of the arc held, its amplitude gives way.

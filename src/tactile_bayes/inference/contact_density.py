@@ -40,7 +40,7 @@ class ContactDensity:
     Parameters
     ----------
     samples : Samples
-        From a record with all channels; see `samples_of`.
+        From a record with all channels; see `samples_of`. Of its covariance only proposals are made.
     readings : LoneSamples
         The same samples as the load cell gave them, dimensionless.
     base : ndarray, shape (n, 2)
@@ -62,7 +62,7 @@ class ContactDensity:
         delta: float,
         prior: ContactPrior,
     ) -> None:
-        if not (callable(prior) or prior in ("flat", "polar")):
+        if not (callable(prior) or (isinstance(prior, str) and prior in ("flat", "polar"))):
             raise ParameterError(
                 f"prior is {prior!r}: choose 'flat' or 'polar', or give a function of contact_x, contact_y and "
                 "slope_angle that returns a log-density"
@@ -141,6 +141,8 @@ class ContactDensity:
                 f"the prior gave an array of shape {values.shape} for arguments of shape {shape}: it has to work "
                 "element by element"
             )
+        if np.any((np.isnan(values) | (values == np.inf)) & np.isfinite(place[0])):
+            raise ParameterError("the prior is not a number, or +inf, somewhere within reach: give a log-density")
         return values
 
     def unfold(self, points: Floats) -> tuple[Floats, NDArray[np.int8]]:

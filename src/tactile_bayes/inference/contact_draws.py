@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contact_density import ContactDensity
 from tactile_bayes.inference.contact_importance import ContactWeights, weigh_contacts
 from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_walkers, spawn
@@ -88,6 +89,7 @@ def _draw_block(
     weights = weigh_contacts(density, _START if method == "emcee" else max(_PROPOSALS * draws, _START), for_weights)
     points = _resampled(weights, draws, np.random.default_rng(for_picks))
     tangential = np.where(weights.points[..., 0] < 0.0, np.exp(weights.log_weight), 0.0).sum(axis=0)
+    tangential[weights.effective_draws == 0.0] = np.nan
     found = ContactDraws(
         points,
         np.full(count, IMPORTANCE, dtype=np.int8),
@@ -99,6 +101,7 @@ def _draw_block(
         np.full(count, np.nan),
         np.full(count, np.nan),
     )
+    points[:, :, weights.effective_draws == 0.0] = np.nan
     if method == "importance":
         return found
     for i in np.flatnonzero((method == "emcee") | ~found.converged).tolist():
@@ -106,16 +109,18 @@ def _draw_block(
         points[:, :, i], found.r_hat[i], found.ess[i], found.converged[i] = _walk(
             density.take(np.array([i])), weights, i, draws, own[i], settings or EMCEE_SETTINGS
         )
-        tangential[i] = np.mean(points[:, :, i, 0] < 0.0)
+        lost = np.isnan(points[0, 0, i, 0])
+        tangential[i] = np.nan if lost else np.mean(points[:, :, i, 0] < 0.0)
     return found
 
 
 def _resampled(weights: ContactWeights, draws: int, rng: np.random.Generator) -> Floats:
     """Points drawn by their weights, shape (chains, draws, n, 2 or 3); a chain has proposals of its own."""
-    count, each = weights.points.shape[0] // CHAINS, draws // CHAINS
+    each = draws // CHAINS
     points = np.empty((CHAINS, each, *weights.points.shape[1:]))
     for chain in range(CHAINS):
-        part = slice(chain * count, (chain + 1) * count)
+        part = slice(chain, None, CHAINS)  # proposals stand in the order of their phases
+        count = len(weights.points[part])
         for i in range(points.shape[2]):
             weight = np.exp(weights.log_weight[part, i] - weights.log_weight[part, i].max())
             level = np.cumsum(weight)
@@ -146,10 +151,13 @@ def _walk(
         return np.asarray(near + spread * rng.standard_normal(near.shape))
 
     for_start, for_walk = spawn(seed, 2)
-    start = scatter_walkers(
-        log_probability, draw, parameters=len(names), seed=for_start, settings=settings, max_rounds=1000
-    )
+    try:
+        start = scatter_walkers(
+            log_probability, draw, parameters=len(names), seed=for_start, settings=settings, max_rounds=1000
+        )
+    except InferenceError:  # no contact at all is possible there
+        return np.full((CHAINS, draws // CHAINS, len(names)), np.nan), np.nan, 0.0, False
     found = sample(log_probability, start, names=names, seed=for_walk, settings=settings)
-    chains = np.resize(np.arange(found.samples.shape[0]), CHAINS)
     kept = np.linspace(0, found.samples.shape[1] - 1, draws // CHAINS).astype(int)
-    return found.samples[chains][:, kept], float(np.max(found.r_hat)), float(np.min(found.ess_bulk)), found.converged
+    ess = float(np.min([found.ess_bulk, found.ess_tail]))
+    return found.samples[:, kept], float(np.max(found.r_hat)), ess, found.converged

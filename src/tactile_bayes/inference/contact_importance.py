@@ -13,7 +13,6 @@ from tactile_bayes.contact_fit import fit_sheet
 from tactile_bayes.elastica import TANGENTIAL, TIP
 from tactile_bayes.inference.contact_density import ContactDensity
 from tactile_bayes.inference.contact_proposal import ContactProposal
-from tactile_bayes.reconstruction.raw import raw_contact
 from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 
 __all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
@@ -25,6 +24,9 @@ LARGEST_K = 0.7
 
 LEAST_DRAWS = 400.0
 """Effective draws below which there are too few."""
+
+_NOTHING = 600.0
+"""Logarithm of a ratio of weights at which the smaller counts for nothing."""
 
 _PILOTS = ((600, 0.25), (600, 0.15))
 """Proposals of each pilot run, and the share that the less probable phase then has at least in the next run: the edge
@@ -80,13 +82,14 @@ def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequ
         log_evidence = logsumexp(log_weight, axis=0) - np.log(draws)
     lost = ~np.isfinite(log_evidence)
     log_weight[:, lost] = 0.0
-    smoothed, k = array_stats.psislw(-log_weight, axis=0)  # it takes the logarithm of what to divide by
-    smoothed = np.moveaxis(smoothed, -1, 0)
+    smoothed, k = log_weight.copy(), np.full(lost.size, np.inf)
+    # Where nearly all weights are nothing there is no tail to smooth.
+    many = np.count_nonzero(log_weight > log_weight.max(axis=0) - _NOTHING, axis=0) >= 0.25 * draws
+    for i in np.flatnonzero(many & ~lost).tolist():
+        smoothed[:, i], k[i] = array_stats.psislw(-log_weight[:, i])  # it takes the logarithm of what to divide by
     smoothed = smoothed - logsumexp(smoothed, axis=0)
     effective = np.exp(-logsumexp(2.0 * smoothed, axis=0))
-    return ContactWeights(
-        points, place, smoothed, np.where(lost, np.inf, k), np.where(lost, 0.0, effective), log_evidence
-    )
+    return ContactWeights(points, place, smoothed, k, np.where(lost, 0.0, effective), log_evidence)
 
 
 def _evaluated(
@@ -100,9 +103,7 @@ def _evaluated(
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
     """Normal approximations on both sheets: means of points (2, n, k), covariances, and the share of tip contact."""
     reading, delta = density.samples.reading, np.full(density.samples.side.size, density.delta)
-    raw = raw_contact(reading, delta)
-    tip = fit_sheet(reading, delta, TIP, raw.tip_angle - raw.slope_angle - delta)
-    lying = fit_sheet(reading, delta, TANGENTIAL, raw.contact_arclength)
+    tip, lying = fit_sheet(reading, delta, TIP), fit_sheet(reading, delta, TANGENTIAL)
     free = [DRIVE_ANGLE] if density.has_free_angle else []
     means, covariances, usable = [], [], []
     for sheet, way, shift in ((tip, PSI1, density.delta), (lying, ARCLENGTH, -1.0)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -26,6 +26,7 @@ from tactile_bayes.inference.contact_draws import (
 )
 from tactile_bayes.inference.contact_importance import LARGEST_K, LEAST_DRAWS
 from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
+from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.reconstruction import samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
@@ -65,12 +66,13 @@ def infer_contacts(
         A record with all three load channels.
     load_cell : LoadCell, optional
         The sensor, in the record's units; by default the data sheet that the record carries. Its likelihood is used in
-        full: outliers, steps and cut-off readings too. What samples share, unknown bias and drift, counts as noise of
-        each.
+        full: outliers and steps, too. What samples share, unknown bias and drift, counts as noise of each. A sample
+        with a reading at the end of its range is left out: the load was larger, by an amount that one sample cannot
+        tell.
     prior : {"flat", "polar"} or callable
         Density over contact point and slope angle, within the rod's reach and |slope_angle| < π/2; see Notes.
     seed : int or numpy.random.SeedSequence
-        The same seed, the same draws.
+        The same seed, the same draws of the same samples; a sample more, or less, changes those of others, too.
     rod : Rod, optional
         In place of the rod that an SI record states.
     friction : float
@@ -88,12 +90,12 @@ def infer_contacts(
     Returns
     -------
     xr.DataTree
-        In ArviZ's layout. Group `posterior`, dimensions (chain, draw, sample), NaN where a sample is not loaded:
+        In ArviZ's layout. Group `posterior`, dimensions (chain, draw, sample), NaN where a sample has no contact:
         contact_x, contact_y (on the object's surface), slope_angle, contact_arclength, drive_angle where the encoder is
         not exact, all in the record's units, and tangential (1 in tangential contact, 0 in tip contact). Draws of
         different samples are independent. Group `sample_stats`, by sample: tangential_probability, log_evidence (of the
-        dimensionless sample under the flat prior; NaN with emcee), pareto_k, effective_draws (of the weights), r_hat
-        and ess (of emcee), engine and converged. Groups `observed_data` and `constant_data`: the record.
+        dimensionless sample under the prior as it stands; NaN with emcee), pareto_k, effective_draws (of the weights),
+        r_hat and ess (of emcee), engine and converged. Groups `observed_data` and `constant_data`: the record.
 
     Raises
     ------
@@ -128,7 +130,7 @@ def infer_contacts(
     (250, 46)
     """
     measured = with_rod(validate(measured), rod)
-    _refuse_options(draws, method)
+    _refuse_options(draws, method, settings)
     cell = load_cell or LoadCell.from_record(measured)
     if cell is None:
         raise ParameterError(
@@ -150,7 +152,9 @@ def infer_contacts(
     return tree
 
 
-def _refuse_options(draws: int, method: str) -> None:
+def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -> None:
+    if settings is not None and settings.ensembles != CHAINS:
+        raise ParameterError(f"{settings.ensembles} ensembles: give {CHAINS}, one for each chain of the result")
     if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < CHAINS or draws % CHAINS:
         raise ParameterError(f"draws is {draws!r}: give a multiple of {CHAINS}, one share for each chain")
     if method not in ("auto", "importance", "emcee"):
@@ -162,6 +166,9 @@ def _density(
 ) -> tuple[ContactDensity, NDArray[np.intp]]:
     """The density of the loaded samples, and which they are."""
     samples = samples_of(measured, cell)
+    if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
+        about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))
+        samples = samples._replace(reading=about.reading)
     rod = samples.rod
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     readings = LoneSamples(
@@ -169,7 +176,7 @@ def _density(
     )
     base = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
     turning = frame_of(measured) == "turning"
-    loaded = np.flatnonzero(samples.loaded)
+    loaded = np.flatnonzero(samples.loaded & ~samples.cut_off)
     return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
 
 
@@ -265,7 +272,7 @@ def _attributes(
         "inference_library": "tactile-bayes",
         "inference_library_version": version("tactile-bayes"),
         "sampler": f"importance sampling, emcee {version('emcee')}",
-        "seed": str(seed.entropy if isinstance(seed, np.random.SeedSequence) else seed),
+        "seed": seed_words(seed),
         "settings": json.dumps(asdict(settings or EMCEE_SETTINGS)),
         "data_sha256": record_hash(measured),
         "prior": prior if isinstance(prior, str) else getattr(prior, "__name__", repr(prior)),

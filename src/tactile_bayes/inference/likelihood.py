@@ -70,7 +70,7 @@ class RecordLikelihood:
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         angle = record.drive_angle.values - load_cell.drive_angle_offset
         self._turn = angle if frame_of(record) == "turning" else None
-        backward = contact_sides(_without_errors(measured, load_cell)) < 0.0
+        backward = contact_sides(_without_errors(measured, load_cell), load_cell) < 0.0
         place = np.stack([measured.base_x.values, measured.base_y.values, backward], axis=-1)
         kinds, which = np.unique(place, axis=0, return_inverse=True)
         self.strokes = [

@@ -16,7 +16,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
 
-__all__ = ["posterior_draws", "provenance", "read_result", "sample_stats", "to_arviz", "write_result"]
+__all__ = ["posterior_draws", "provenance", "read_result", "sample_stats", "seed_words", "to_arviz", "write_result"]
 
 
 def sample_stats(draws: Draws) -> xr.Dataset:
@@ -45,21 +45,24 @@ def sample_stats(draws: Draws) -> xr.Dataset:
 
 def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha256: str, **more: Any) -> dict[str, Any]:
     """Attributes of a result: software, seed, settings, hash of the data, and how the run ended."""
-    if isinstance(seed, np.random.SeedSequence):
-        seed_words = f"{seed.entropy}" + (f", spawn key {seed.spawn_key}" if seed.spawn_key else "")
-    else:
-        seed_words = str(seed)
     return {
         "inference_library": "tactile-bayes",
         "inference_library_version": version("tactile-bayes"),
         "sampler": f"emcee {version('emcee')}",
-        "seed": seed_words,
+        "seed": seed_words(seed),
         "settings": json.dumps(asdict(settings)),
         "data_sha256": data_sha256,
         "converged": int(draws.converged),
         "message": draws.message,
         **more,
     }
+
+
+def seed_words(seed: Seed) -> str:
+    """A seed as an attribute."""
+    if isinstance(seed, np.random.SeedSequence):
+        return f"{seed.entropy}" + (f", spawn key {seed.spawn_key}" if seed.spawn_key else "")
+    return str(seed)
 
 
 def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:

@@ -43,6 +43,7 @@ class LoneSamples:
         self._sheet = sheet
         self._readings = readings
         self._wandering = wandering_deviation(sheet, len(readings))
+        self._wanders = bool(np.any(self._wandering))
         for index, noise in enumerate(sheet.noise):
             if noise == 0.0:
                 name = "moment_noise" if index == 0 else "force_noise"
@@ -50,7 +51,7 @@ class LoneSamples:
                     f"{CHANNELS[index]} is measured, but the load cell has no noise on it: give LoadCell({name}=...) a "
                     "positive standard deviation"
                 )
-        if np.any(self._wandering):
+        if self._wanders:
             if math.isfinite(sheet.degrees_of_freedom):
                 raise ParameterError(
                     "drift or an unknown bias with outliers (degrees_of_freedom) has no closed form: leave one of them "
@@ -68,13 +69,14 @@ class LoneSamples:
     def take(self, where: NDArray[np.intp]) -> LoneSamples:
         """Some of the samples."""
         some = object.__new__(LoneSamples)
-        some._sheet, some._readings, some._wandering = self._sheet, self._readings[where], self._wandering[where]
+        some._sheet, some._wanders = self._sheet, self._wanders
+        some._readings, some._wandering = self._readings[where], self._wandering[where]
         return some
 
     def log_density(self, loads: Floats) -> Floats:
         """Of the readings, shape (..., n), for loads of shape (..., n, 3); NaN where a load is."""
         sheet = self._sheet
-        if not np.any(self._wandering):
+        if not self._wanders:
             return log_likelihood(sheet, self._readings, loads, pointwise=True)
         residual = self._readings - sheet.expected(loads)
         deviation = np.broadcast_to(

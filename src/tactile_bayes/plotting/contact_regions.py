@@ -99,7 +99,7 @@ def contact_regions(
     probability : float
         Of each region.
     samples : sequence of int, optional
-        Which samples; by default a dozen of those with a contact, evenly spread.
+        Which samples, by the coordinate "sample"; by default a dozen of those with a contact, evenly spread.
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
@@ -122,17 +122,26 @@ def contact_regions(
     x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))
     tangential = draws["tangential"].mean(("chain", "draw")).values
     has = np.isfinite(x) & np.isfinite(y)
+    labels = draws["sample"].values
+    if samples is not None:
+        absent = np.setdiff1d(samples, labels)
+        if absent.size:
+            raise ParameterError(f"there is no sample {absent[0]}: the posterior has {labels.min()} to {labels.max()}")
+        samples = np.flatnonzero(np.isin(labels, samples)).tolist()
     chosen = _spread(np.flatnonzero(has), samples)
     chosen = chosen[has[chosen]]
     if not chosen.size:
         raise ParameterError("no sample here has a contact: choose others")
     ax = single_axes() if ax is None else ax
     phase = np.where(tangential > 0.5, "tangential", "tip")
+    corners: list[Any] = []
     for i in chosen.tolist():
-        region = contact_region(draws, int(draws["sample"].values[i]), probability)
+        region = contact_region(draws, int(labels[i]), probability)
         grid_x, grid_y, density = region.grid()
-        ax.contour(grid_x, grid_y, density, levels=[region.level], colors=[PALETTE[phase[i]]], linewidths=1.0)
+        lines = ax.contour(grid_x, grid_y, density, levels=[region.level], colors=[PALETTE[phase[i]]], linewidths=1.0)
+        corners.extend(line for path in lines.get_paths() for line in path.to_polygons(closed_only=False))
         ax.plot(x[i], y[i], marker="+", color=PALETTE[phase[i]], markersize=5.0, zorder=3)
+    ax.dataLim.update_from_data_xy(np.concatenate(corners), ignore=True)  # of the outlines, not of their grids
     _finish(ax, draws, chosen, x, y, truth, phase, f"{100 * probability:.6g} % region")
     return ax
 

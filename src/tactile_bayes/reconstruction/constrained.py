@@ -12,6 +12,7 @@ from tactile_bayes.reconstruction.estimate import (
     CUT_OFF,
     EITHER_PHASE,
     NO_CONTACT,
+    NO_FIT,
     NO_ZERO,
     NONLINEAR,
     OK,
@@ -19,13 +20,15 @@ from tactile_bayes.reconstruction.estimate import (
     bends_too_much,
     is_weak,
 )
-from tactile_bayes.reconstruction.raw import raw_contact
 from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.touching import touching, touching_and_slopes
 
 __all__ = ["constrained_estimate", "refuse_without_noise"]
 
 Floats = NDArray[np.float64]
+
+_MISFIT = 25.0
+"""Sum of squares, of one degree of freedom, that noise exceeds in less than one of a million samples."""
 
 _RIVAL = 6.0
 """Lead in the sum of squares, below which the other phase is too likely to be left out: by a factor of 20."""
@@ -50,18 +53,24 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)
     if where.size:
         reading = samples.reading.take(where)
-        fit = fit_contacts(reading, delta[where], raw_contact(reading, delta[where]))
+        fit = fit_contacts(reading, delta[where])
         rod, slopes = touching_and_slopes(fit.coordinates, delta[where])
         found = np.isfinite(fit.misfit) & np.isfinite(rod.place).all(axis=0)
         by = slopes.place
-        covariance[where] = np.where(found[:, None, None], by @ fit.covariance @ np.swapaxes(by, 1, 2), np.nan)
+        with np.errstate(over="ignore", invalid="ignore"):
+            spread = by @ fit.covariance @ np.swapaxes(by, 1, 2)
+        covariance[where] = np.where(found[:, None, None], spread, np.nan)
         place[where] = np.where(found[:, None], rod.place.T, np.nan)
         phase[where] = np.where(found, fit.phase, 0)
         misfit[where], distance[where] = np.where(found, (fit.misfit, fit.clearance), np.nan)
         bent = is_weak(reading.loads, reading.covariance)
+        with np.errstate(invalid="ignore"):
+            # At the ends of what is possible: the line of force through the pivot, or an upright contour.
+            bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
+            bent |= np.abs(rod.place[2]) > 0.49 * np.pi
         bent |= bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
-        kinds = (~found, fit.at_edge, fit.rival < _RIVAL, bent)
-        status[where] = np.select(kinds, (NO_ZERO, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
+        kinds = (~found, fit.misfit > _MISFIT, fit.at_edge, fit.rival < _RIVAL, bent)
+        status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
     return Estimate(place, covariance, phase, status, misfit, distance)
 
 

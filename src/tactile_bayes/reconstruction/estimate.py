@@ -14,6 +14,7 @@ __all__ = [
     "EITHER_PHASE",
     "NONLINEAR",
     "NO_CONTACT",
+    "NO_FIT",
     "NO_ZERO",
     "OK",
     "STATUSES",
@@ -25,7 +26,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE = range(8)
+NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE, NO_FIT = range(9)
 
 STATUSES = (
     "no contact",
@@ -36,6 +37,7 @@ STATUSES = (
     "beyond the tip",
     "at the edge",
     "either phase",
+    "does not fit",
 )
 """What can become of a sample, by code."""
 
@@ -100,7 +102,7 @@ def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, 
     """
     xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
     bent = np.zeros(len(place), dtype=bool)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         area = xx * yy - xy * xy
         for more, less in aside:
             x, y = (0.5 * (more[:, axis] + less[:, axis]) - place[:, axis] for axis in (0, 1))

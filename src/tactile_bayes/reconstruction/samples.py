@@ -23,6 +23,8 @@ Flags = NDArray[np.bool_]
 FALSE_ALARM = 1e-3
 """Share of unloaded samples that noise makes look loaded."""
 
+_ALL_BUT_OUTLIERS = 0.98
+
 _MIRROR = np.array([-1.0, -1.0, 1.0])
 """Signs of the loads of a backward contact seen as a forward one."""
 
@@ -53,15 +55,15 @@ def samples_of(measured: xr.Dataset, cell: LoadCell) -> Samples:
     absent = [name for name in CHANNELS if name not in present_channels(measured)]
     if absent:
         raise RecordError(
-            f"Step 2 needs all of {', '.join(CHANNELS)}, and {', '.join(absent)} was not measured: infer_contour works "
-            "without"
+            f"a contact point takes all of {', '.join(CHANNELS)}, and {', '.join(absent)} was not measured: "
+            "infer_contour works without"
         )
     rod = rod_of(measured)
     loaded = loaded_samples(measured, cell)
     readings = np.stack([measured[name].values for name in CHANNELS], axis=-1)
     cut_off: Flags = np.any(cell.cuts_off(readings), axis=-1)
     corrected = cell.corrected(measured)
-    side = contact_sides(corrected)
+    side = contact_sides(corrected, cell)
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     angle = corrected.drive_angle.values
     with np.errstate(over="ignore", invalid="ignore"):  # a load beyond all numbers has no zero of curvature
@@ -121,19 +123,23 @@ def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> F
     return loaded | (load_cell.surprise(readings) > chdtri(noisy, FALSE_ALARM)) if noisy else loaded
 
 
-def contact_sides(record: xr.Dataset) -> Floats:
+def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
     """+1 where the object is met as in a forward sweep, −1 as in a backward one, shape (samples,).
 
-    It is the sign of a sweep's total holding moment, so that a drive may also turn back in contact; the direction of
-    the drive decides where the moment is missing, or sums to no more than six standard errors of its noise.
+    It is the sign of a sweep's total holding moment, so that a drive may also turn back in contact; single outliers do
+    not count for more than the largest others. The direction of the drive decides where the moment is missing, or sums
+    to no more than six standard errors of its noise, which is the load cell's, or what neighbours differ by if that is
+    more.
     """
+    known = 0.0 if load_cell is None else float(np.sqrt(load_cell.covariance(np.zeros((1, 3)))[0, 0, 0]))
     sweep, moment = record.sweep.values, record.holding_moment.values
     side = np.empty(sweep.size)
     order = np.argsort(sweep, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1):
         of_sweep = moment[rows]
-        total = of_sweep.sum()
-        if abs(total) > 6.0 * rough_noise(of_sweep) * np.sqrt(rows.size):
+        most = np.quantile(np.abs(of_sweep), _ALL_BUT_OUTLIERS)
+        total = np.clip(of_sweep, -most, most).sum()
+        if abs(total) > 6.0 * max(rough_noise(of_sweep), known) * np.sqrt(rows.size):
             side[rows] = np.sign(total)
         else:
             side[rows] = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0

@@ -97,11 +97,14 @@ def reconstruct(
             The curvature vanishes only beyond the rod's end, at the point that is returned; under noise this is what
             becomes of about half of the tip contacts. With method="raw" only.
         at the edge
-            Where tip and tangential contact meet; the data lie beyond both. Its standard deviations are too large. With
-            method="constrained" only.
+            Where tip and tangential contact meet; the data lie beyond both. Standard deviations do not hold: they are
+            too large across the contour, and too small along it. With method="constrained" only.
         either phase
             Tip and tangential contact are both likely, at different places, the one returned at most 20 times more than
             the other. `infer_contacts` weighs them. With method="constrained" only.
+        does not fit
+            No contact gives such loads: the misfit is above 25, which noise makes of less than one in a million. Is the
+            rod right, and the noise? With method="constrained" only.
 
     Raises
     ------

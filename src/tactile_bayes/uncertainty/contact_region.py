@@ -116,7 +116,9 @@ def _kernel_sums(at: Floats, centres: Floats, bandwidth: float) -> Floats:
     """Sum of the kernels around centres (n, 2) at places (m, 2); a kernel is one at its centre."""
     sums = np.empty(len(at))
     step = max(1, _BLOCK // len(centres))
+    squares = (centres * centres).sum(axis=1)
     for begin in range(0, len(at), step):
-        part = at[begin : begin + step, None, :] - centres
-        sums[begin : begin + step] = np.exp(-0.5 * (part * part).sum(axis=-1) / bandwidth**2).sum(axis=1)
+        part = at[begin : begin + step]
+        distance = (part * part).sum(axis=1)[:, None] + squares - 2.0 * (part @ centres.T)
+        sums[begin : begin + step] = np.exp(-0.5 / bandwidth**2 * np.maximum(distance, 0.0)).sum(axis=1)
     return sums

@@ -1,0 +1,133 @@
+"""Figures of single contacts: ellipses and regions."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+mpl.use("Agg")
+
+from matplotlib import colors
+from matplotlib import pyplot as plt
+from matplotlib.patches import Ellipse
+
+from helpers.contact_posteriors import CELL, SI_CELL, measured
+from tactile_bayes import plotting
+from tactile_bayes.contours import paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contacts import infer_contacts
+from tactile_bayes.plotting import contact_ellipses, contact_regions
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.uncertainty.contact_region import contact_region
+
+SOME = np.array([2, 22, 24, 30, 45, 61, 120])
+
+
+@pytest.fixture(autouse=True)
+def _settings_are_left_alone():
+    before = dict(mpl.rcParams)
+    yield
+    plt.close("all")
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return infer_contacts(measured().isel(sample=SOME), load_cell=CELL, seed=1, draws=400, method="importance")
+
+
+@pytest.fixture(scope="module")
+def contacts():
+    return reconstruct(measured(), method="constrained", load_cell=CELL)
+
+
+def labels(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def own_axes():
+    """Axes of a figure that pyplot does not know."""
+    return mpl.figure.Figure().subplots()
+
+
+def outlines(ax):
+    return [part for part in ax.collections if getattr(part, "levels", None) is not None]
+
+
+def test_they_draw_where_they_are_told_and_nowhere_else(contacts, posterior):
+    for function, data in ((contact_ellipses, contacts), (contact_regions, posterior)):
+        ax = own_axes()
+        assert function(data, ax=ax) is ax
+        assert not plt.get_fignums()
+        assert "x" in ax.get_xlabel()
+        assert ax.get_aspect() == 1.0
+
+
+def test_ellipses_are_those_of_the_covariance(contacts):
+    ax = contact_ellipses(contacts, probability=0.9, samples=[45, 120], ax=own_axes())
+    ellipses = [patch for patch in ax.patches if isinstance(patch, Ellipse)]
+    assert len(ellipses) == 2
+    for i, ellipse in zip((45, 120), ellipses, strict=True):
+        at = contacts.isel(sample=i)
+        spread_x, spread_y, rho = (
+            float(at[name]) for name in ("contact_x_sd", "contact_y_sd", "contact_xy_correlation")
+        )
+        shared = rho * spread_x * spread_y
+        precision = np.linalg.inv([[spread_x**2, shared], [shared, spread_y**2]])
+        turns = np.linspace(0.0, 2.0 * np.pi, 7)
+        rim = ellipse.get_patch_transform().transform(np.stack([np.cos(turns), np.sin(turns)], axis=-1))
+        off = rim - [float(at.contact_x), float(at.contact_y)]
+        np.testing.assert_allclose(np.einsum("ni,ij,nj->n", off, precision, off), 2.0 * np.log(10.0), rtol=1e-6)
+        phase = str(at.contact_phase.values)
+        assert colors.to_hex(ellipse.get_edgecolor()) == colors.to_hex(plotting.PALETTE[phase])
+
+
+def test_by_default_a_dozen_is_drawn(contacts):
+    ax = contact_ellipses(contacts, ax=own_axes())
+    assert len([patch for patch in ax.patches if isinstance(patch, Ellipse)]) == 12
+
+
+def test_regions_are_outlined_at_their_level(posterior):
+    ax = contact_regions(posterior, probability=0.5, ax=own_axes())
+    drawn = outlines(ax)
+    assert len(drawn) == SOME.size - 1
+    for i, part in zip(range(1, SOME.size), drawn, strict=True):
+        region = contact_region(posterior, i, 0.5)
+        rim = np.concatenate([path.vertices for path in part.get_paths()])
+        np.testing.assert_allclose(region.density(*rim.T), region.level, rtol=0.25)
+
+
+def test_labels_say_probability_and_phase(contacts, posterior):
+    assert labels(contact_ellipses(contacts, probability=0.5, samples=[45], ax=own_axes()))[0] == (
+        "50 % ellipse, tangential contact"
+    )
+    words = labels(contact_regions(posterior, probability=0.95, truth=paper_profile("II", q=0.5), ax=own_axes()))
+    assert words[:2] == ["95 % region, tip contact", "95 % region, tangential contact"]
+
+
+def test_the_true_contour_leaves_the_limits_alone(posterior):
+    plain = contact_regions(posterior, ax=own_axes())
+    true = contact_regions(posterior, truth=paper_profile("II", q=0.5), ax=own_axes())
+    assert true.get_xlim() == plain.get_xlim()
+    assert true.get_ylim() == plain.get_ylim()
+
+
+def test_si_axes_are_labelled_in_their_unit():
+    record = measured("SI")
+    ax = contact_ellipses(reconstruct(record, method="constrained", load_cell=SI_CELL), ax=own_axes())
+    assert "mm" in ax.get_xlabel() or "m]" in ax.get_xlabel()
+
+
+@pytest.mark.parametrize("probability", [0.0, 1.0, 90.0, np.nan])
+def test_impossible_probabilities_are_refused(contacts, posterior, probability):
+    for function, data in ((contact_ellipses, contacts), (contact_regions, posterior)):
+        with pytest.raises(ParameterError, match=r"probability is .*: give a number between 0 and 1"):
+            function(data, probability=probability, ax=own_axes())
+
+
+def test_samples_without_a_contact_are_refused(contacts, posterior):
+    with pytest.raises(ParameterError, match="no contact here has a standard deviation"):
+        contact_ellipses(contacts, samples=[0, 1], ax=own_axes())
+    with pytest.raises(ParameterError, match="no sample here has a contact: choose others"):
+        contact_regions(posterior, samples=[0], ax=own_axes())
