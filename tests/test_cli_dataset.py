@@ -17,6 +17,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import tactile_bayes as tb
+from helpers.tasks import alive, wait_until
 from tactile_bayes.cli import app
 from tactile_bayes.datasets.families import FAMILIES, FLANKS
 from tactile_bayes.record import LOAD_CELL_UNITS
@@ -133,12 +134,11 @@ def test_the_example_is_a_specification_with_every_law(example):
 
 
 def test_every_option_of_the_example_is_taken(example):
-    whole = tb.datasets.read_specification(tomllib.loads(example))
     taken = list(options_taken(example))
     assert len(taken) > 20
     for line, text in taken:
         spec = tb.datasets.read_specification(tomllib.loads(text))
-        assert spec.sha256 != whole.sha256, line
+        assert tomllib.loads(text) != tomllib.loads(example), line
         assert spec.units == ("SI" if line == "#[rod]" else "dimensionless")
 
 
@@ -189,7 +189,8 @@ def test_what_is_there_is_not_made_again(small, tmp_path):
     folder, _ = small
     result = call("generate", folder.parent / "small.toml", "--out", folder)
     assert result.exit_code == 0
-    assert result.stdout.splitlines()[0].endswith(": all were there already")
+    words = ": all were there already, by their sizes; dataset verify compares every byte"
+    assert result.stdout.splitlines()[0].endswith(words)
 
 
 def test_contours_that_were_drawn_again_are_counted(specification, tmp_path):
@@ -273,24 +274,58 @@ main()
 """
 
 
+STOPS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
+@pytest.mark.parametrize("sent", STOPS)
 @pytest.mark.parametrize(("shard", "suppressed"), [(2, "ValueError"), (1, "KeyboardInterrupt")])
-def test_control_c_says_how_to_go_on_and_the_same_command_does(specification, tmp_path, shard, suppressed):
-    """At once, or after the shard if the interrupt was lost."""
+def test_control_c_says_how_to_go_on_and_the_same_command_does(specification, tmp_path, shard, suppressed, sent):
+    """At once, or after the shard if the interrupt was lost; so does a batch system's SIGTERM."""
+    code, word = STOPS[sent]
     slow = SLOW.format(shard=shard, suppressed=suppressed)
     arguments = ["dataset", "generate", "small.toml", "--out", "set", "--workers", "1"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path}
     with subprocess.Popen([sys.executable, "-c", slow, *arguments], **pipes) as process:
         while not (tmp_path / "begun").exists() and process.poll() is None:
             time.sleep(0.01)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         out, errors = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
-    assert errors == "tactile-bayes: interrupted, 4 of 6 records are in set: the same command goes on\n"
+    assert (process.returncode, out) == (code, "")
+    assert errors == f"tactile-bayes: {word}, 4 of 6 records are in set: the same command goes on\n"
     done = subprocess.run([COMMAND, *arguments], **pipes, timeout=300)
     assert done.returncode == 0, done.stderr
     assert re.match(r"6 records in 3 files, .* MB: 2 made in ", done.stdout)
     assert tb.datasets.verify(tmp_path / "set").records == 6
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+def test_workers_end_when_it_is_terminated(specification, tmp_path):
+    """In the middle of their work, of which there are hours."""
+    specification.write_text(SMALL.replace("records = 6", "records = 600000").replace("= 2\n", "= 2000\n", 1))
+    arguments = ["dataset", "generate", "small.toml", "--out", "set", "--workers", "2"]
+    with subprocess.Popen([COMMAND, *arguments], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        wait_until(lambda: len(children.read_text().split()) >= 3)  # two, and the tracker of resources
+        team = children.read_text().split()
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert errors == "tactile-bayes: terminated, no further file was finished: the same command goes on\n"
+    wait_until(lambda: not any(map(alive, team)), seconds=5.0)
+
+
+def test_rods_that_are_strained_and_sweeps_without_contact_are_told(specification, tmp_path):
+    rod = "\n[rod]\nlength = 1.0\nflexural_rigidity = 1.0\ndiameter = 0.2\n"
+    text = SMALL.replace("samples = 20", "samples = 20\nfrom_degrees = 170\nto_degrees = 175") + rod
+    specification.write_text(text, encoding="utf-8")
+    result = call("generate", specification, "--out", tmp_path / "set", "--workers", 1)
+    assert result.exit_code == 0, result.output
+    stated = json.loads((tmp_path / "set" / "manifest.json").read_text())
+    assert stated["strained"] > 1
+    assert stated["untouched"] > 1
+    assert f"\n{stated['strained']} records with a rod strained beyond the model: their loads" in result.stdout
+    assert f"\n{stated['untouched']} sweeps without a sample in contact\n" in result.stdout
 
 
 # --- Verify ---------------------------------------------------------------------------------------------------------
@@ -304,6 +339,15 @@ def test_a_whole_data_set_is_verified(small):
         f"{folder}: 6 records in 3 files, every byte as it was written",
         "3 files made again: every number is the same",
     ]
+
+
+def test_the_progress_of_verify_is_shown_on_a_terminal(small, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "120")
+    result = call("verify", small[0], "--regenerate", 1)
+    assert result.exit_code == 0, result.output
+    assert "4 of 4 files" in result.stderr
+    assert call("verify", small[0], "--quiet").stderr == ""
 
 
 def test_a_byte_that_differs_is_found(specification, tmp_path):

@@ -237,7 +237,7 @@ def test_a_cluster_makes_the_same_though_a_worker_is_killed(many, tmp_path):
 
 def test_no_scheduler_is_told(tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    with pytest.raises(ParameterError, match="no Dask scheduler answers at 'nowhere': "):
+    with pytest.raises(ParameterError, match=r"'nowhere' is no address of a Dask scheduler \(missing port number"):
         generate(PLAIN, tmp_path, scheduler="nowhere")
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ParameterError, match=r"Dask is not installed: pip install 'tactile-bayes\[cluster\]'"):
@@ -296,9 +296,100 @@ def test_a_disk_that_takes_no_more_is_told_and_leaves_no_half_files(tmp_path, wo
 def test_another_data_set_is_left_alone(tmp_path):
     generate(PLAIN, tmp_path, workers=1)
     before = hashes(tmp_path)
-    with pytest.raises(SpecificationError, match=r"holds a data set of another specification \('parabolas'\): choose"):
-        generate(changed(PLAIN, seed=8), tmp_path)
+    for change, message in {
+        "seed": ({"seed": 8}, r"\('parabolas'\), seed is 7 there and is 8 here: choose another folder, or give"),
+        "law": (
+            {"contours": [{**PLAIN["contours"][0], "q": 0.5}]},
+            r"\), contours\[0\]\.q is \{'uniform': \[0\.3, 0\.7\]\} there and is 0\.5 here: choose",
+        ),
+        "table": ({"scan__friction": 0.1}, r"\), scan\.friction is left out there and is 0\.1 here: choose"),
+        "many": ({"name": "n", "seed": 8, "records": 48, "precision": "single"}, r" here, 1 more: choose another"),
+        "more": ({"records": 48}, r"\), records is 24 there and is 48 here: a data set does not grow: choose another"),
+    }.values():
+        with pytest.raises(SpecificationError, match="holds a data set of another specification .*" + message):
+            generate(changed(PLAIN, **change), tmp_path)
     assert hashes(tmp_path) == before
+
+
+def test_a_data_set_without_name_has_none_in_the_refusal(tmp_path):
+    generate(changed(PLAIN, name=None), tmp_path, workers=1)
+    with pytest.raises(SpecificationError, match="another specification, seed is 7 there"):
+        generate(changed(PLAIN, name=None, seed=8), tmp_path)
+
+
+def test_defaults_that_are_written_out_are_no_other_data_set(tmp_path):
+    generate(PLAIN, tmp_path, workers=1)
+    before = hashes(tmp_path)
+    generate(changed(PLAIN, scan__margin=0.1, precision="double", description=""), tmp_path, workers=1)
+    assert hashes(tmp_path) == before
+
+
+def test_a_run_that_made_nothing_stands_in_nobodys_way(tmp_path):
+    """Nor do shards that its manifest did not come to state."""
+    wrong = changed(PLAIN, contours=[{"family": "parabola", "a": 1.0, "q": -0.5}])
+    with pytest.raises(SpecificationError, match="drawn 1000 times"):
+        generate(wrong, tmp_path, workers=1)
+    (tmp_path / "shard-000007.nc").write_text("of a run that was killed")
+    generate(PLAIN, tmp_path, workers=1)
+    verify(tmp_path)
+
+
+CARDS = {
+    "plain": ({}, ["3 NetCDF files"], ["Of 48", "strained", "drift", "Records go", "32 bits"]),
+    "one file": ({"shard_records": 24}, ["in 1 NetCDF file, "], []),
+    "thick": (
+        {"rod": {"length": 1.0, "flexural_rigidity": 1.0, "diameter": 0.1}},
+        ["In 24 of 24 records the rod is strained beyond 0.1 (`truth_largest_strain`)"],
+        [],
+    ),
+    "fixed angles": (
+        {"scan": {"samples": 24, "from_degrees": -20, "to_degrees": -10}},
+        ["driven far enough, reaches, whatever the drive angles above", "Of 48 sweeps, 48 have no sample in contact"],
+        [],
+    ),
+    "drift": (
+        {"load_cell__ornstein_uhlenbeck_force": 0.01},
+        [
+            "| load cell: ornstein_uhlenbeck_time | 100 |",
+            "What a record's drift and its unknown bias came to is not kept",
+        ],
+        [],
+    ),
+    "single": (
+        {"precision": "single", "load_cell__force_range": 1.0},
+        ["Readings at the end of the load cell's range are that end rounded to 32 bits"],
+        [],
+    ),
+    "one list": (
+        {"load_cell__force_noise": {"each": [0.01, 0.02, 0.03]}},
+        ["Records go through the 3 entries of load_cell.force_noise, 8 times."],
+        [],
+    ),
+    "lists in step": (
+        {
+            "scan": {"samples": 24, "bases": [[{"each": [0.0, 0.1]}, 0.0]]},
+            "load_cell__force_noise": {"each": [0.01, 0.02], "axis": "noise"},
+            "load_cell__moment_noise": {"each": [0.1, 0.2], "axis": "noise"},
+        },
+        [
+            "Records go through all 4 combinations of the lists, 6 times, the last of these fastest: "
+            "scan.bases[0][0]; noise (load_cell.moment_noise and load_cell.force_noise in step).",
+            "| load cell: force_noise | each of 0.01, 0.02, on the axis noise |",
+        ],
+        [],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CARDS)
+def test_the_card_says_what_else_there_is_to_know(name, tmp_path):
+    change, said, unsaid = CARDS[name]
+    generate(changed(PLAIN, **change), tmp_path, workers=1)
+    card = (tmp_path / "README.md").read_text()
+    for words in said:
+        assert words in card
+    for words in unsaid:
+        assert words not in card
 
 
 @pytest.mark.parametrize("name", ["shard-000000.nc", "README.md"])
@@ -359,7 +450,7 @@ def test_two_runs_at_once_in_one_folder_are_refused(tmp_path):
 
 def test_an_impossible_specification_ends_with_the_counts(tmp_path):
     spec = changed(PLAIN, contours=[{"family": "circle", "r": 0.5, "q": 2.0}])
-    with pytest.raises(SpecificationError, match=r"drawn 1000 times.*draws of its shard: 8000 out of reach"):
+    with pytest.raises(SpecificationError, match=r"drawn 1000 times.* \(1000 out of reach\): bring contours and"):
         generate(spec, tmp_path, workers=1)
 
 

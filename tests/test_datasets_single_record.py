@@ -60,6 +60,23 @@ def test_it_goes_to_a_file_and_back(made, suffix, tmp_path):
     np.testing.assert_allclose(contour_of(back).point(angle), contour_of(one).point(angle), rtol=1e-12)
 
 
+@pytest.mark.parametrize("limit", [0.15, 0.7, 0.3])
+def test_readings_at_the_end_of_the_range_are_there_also_from_32_bits(limit, tmp_path):
+    """Which round 0.15 and 0.3 up, and 0.7 down."""
+    spec = changed(PLAIN, load_cell__force_range=limit, load_cell__moment_range=limit)
+    single = changed(spec, precision="single")
+    generate(single, tmp_path, workers=1)
+    for one in (record(tmp_path, 3), record(single, 3)):
+        cell, exact = tb.LoadCell.from_record(one), record(spec, 3)
+        for name in ("holding_moment", "force_x", "force_y"):
+            at_limit = np.abs(exact[name].values) == limit
+            assert np.any(at_limit)
+            np.testing.assert_array_equal(one[name].values[at_limit], exact[name].values[at_limit])
+        readings = np.stack([one[name].values for name in ("holding_moment", "force_x", "force_y")], axis=-1)
+        assert np.abs(readings).max() == limit
+        assert np.count_nonzero(cell.cuts_off(readings)) == np.count_nonzero(np.abs(readings) == limit)
+
+
 def test_step_2_finds_the_contacts():
     """Of a record without noise, the true ones."""
     one = record(changed(RICH, precision=None, load_cell={"frame": "turning"}, scan__friction=0.0), 4)

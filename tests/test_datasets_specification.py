@@ -13,6 +13,7 @@ from tactile_bayes.datasets import read_specification
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.specification_text import toml_of
 from tactile_bayes.errors import SpecificationError
+from tactile_bayes.load_cell import OrnsteinUhlenbeck
 
 PARABOLA = {"family": "parabola", "a": 1.0, "q": 0.5}
 WORDS = """
@@ -62,6 +63,26 @@ def test_comments_layout_and_kinds_of_number_do_not_count(tmp_path):
 @pytest.mark.parametrize(
     "change",
     [
+        {"precision": "double", "each_contour": False, "description": "", "rod": {}},
+        {
+            "scan__margin": 0.1,
+            "scan__bases": [[0, 0]],
+            "scan__directions": ["forward", "backward"],
+            "scan__friction": 0,
+        },
+        {"load_cell__frame": "fixed"},
+        {"contours": [{**PLAIN["contours"][0], "weight": 1}]},
+    ],
+)
+def test_defaults_that_are_written_out_do_not_count(change):
+    assert read_specification(changed(PLAIN, **change)).sha256 == read_specification(PLAIN).sha256
+    flat = {**PLAIN, "contours": [PARABOLA]}
+    assert read_specification(changed(flat, **contour(x_c=0.0))).sha256 == read_specification(flat).sha256
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
         {"seed": 8},
         {"records": 32},
         {"shard_records": 4},
@@ -93,7 +114,7 @@ REFUSED = [
     ({"records": 24.0}, "records is 24.0: give a whole number"),
     ({"records": True}, "records is True: give a whole number"),
     ({"records": 8_000_001}, "records is 8000001: give a whole number from 1 to 8000000"),
-    ({"seed": -1}, "seed is -1: give a whole number from 0 to"),
+    ({"seed": -1}, "seed is -1: give a whole number from 0 to 2^63 - 1"),
     ({"seed": "x"}, "seed is 'x': give a whole number"),
     ({"shard_records": 0}, "shard_records is 0: give a whole number from 1 to 100000"),
     ({"name": 3}, "name is 3: give a text"),
@@ -103,8 +124,34 @@ REFUSED = [
     ({"contours": None}, "there are no contours: give at least one table [[contours]]"),
     ({"contours": []}, "there are no contours"),
     ({"contours": 5}, "there are no contours"),
-    ({"contours": {"family": "circle"}}, "there are no contours"),
-    ({"contours": [{"a": 1.0}]}, "contours[0].family is None: choose from parabola, circle"),
+    ({"contours": {"family": "circle"}}, "contours is one table: write [[contours]], in two pairs of brackets"),
+    ({"contours": [{"a": 1.0}]}, "contours[0].family is missing: choose from parabola, circle"),
+    (contour(a=-1.0), "contours[0].a is -1: a must be positive, else the object is not strictly convex"),
+    (contour(a={"uniform": [-0.5, 3.0]}), "contours[0].a may be -0.5: a must be positive, else"),
+    (contour(a={"choice": [1.0, 0.0]}), "contours[0].a may be 0: a must be positive, else"),
+    (contour(a={"each": [1.0, -2.0]}), "contours[0].a may be -2: a must be positive, else"),
+    (contour(a={"normal": [-1.0, 0.0]}), "contours[0].a may be -1: a must be positive, else"),
+    ({"contours": [{"family": "circle", "r": -1, "q": 0.5}]}, "contours[0].r is -1: the radius r must be positive"),
+    (
+        {"contours": [PARABOLA, {"family": "power-law", "a": 1.0, "n": 1.0, "q": 0.5}]},
+        "contours[1].n is 1: n must be at least 1.1: below, the vertex is as good as an edge",
+    ),
+    (
+        {"contours": [{"family": "power-law", "a": 1.0, "n": {"log_uniform": [1.5, 80.0]}, "q": 0.5}]},
+        "contours[0].n may be 80: n must be at most 50",
+    ),
+    (
+        {"contours": [{"family": "ellipse/power-law", "left_a": 1, "left_b": 0, "right_a": 1, "right_n": 2, "q": 1}]},
+        "contours[0].left_b is 0: the half-axis b must be positive and finite",
+    ),
+    (
+        {"contours": [{"family": "shape-free", "radius": 0.5, "amplitude": 20.0, "length_scale": 1.0, "q": 0.5}]},
+        "contours[0].amplitude is 20: amplitude must be from 0 to 3, the latter a factor of 20 in the radius",
+    ),
+    (
+        {"contours": [{"family": "shape-free", "radius": 0.5, "amplitude": 0.5, "length_scale": 0.01, "q": 0.5}]},
+        "contours[0].length_scale is 0.01: length_scale must be at least 0.1 rad: the radius is drawn at slope angles",
+    ),
     ({"contours": [{"family": ["circle"]}]}, "contours[0].family is ['circle']: choose from parabola, circle"),
     ({"contours": [PARABOLA, {"family": "square"}]}, "contours[1].family is 'square': choose from parabola, circle"),
     (
@@ -171,16 +218,20 @@ REFUSED = [
     ({"scan__samples": 1}, "scan.samples is 1: give a whole number from 2 to"),
     ({"scan__margin": -0.1}, "scan.margin is -0.1: give a number from 0 to 1"),
     ({"scan__margin": "wide"}, "scan.margin is 'wide': give a number"),
-    ({"scan__from_degrees": 10}, "scan takes from_degrees and to_degrees, or a margin, and not one of each"),
+    ({"scan__from_degrees": 10}, "scan.to_degrees is missing: give it beside from_degrees, or neither"),
+    ({"scan__to_degrees": 10}, "scan.from_degrees is missing: give it beside to_degrees, or neither"),
+    ({"scan__seed": 10}, "there is no key 'scan.seed': its place is the top, above the first table"),
     (
         {"scan": {"from_degrees": 10, "to_degrees": 90, "margin": 0.1}},
-        "scan takes from_degrees and to_degrees, or a margin",
+        "scan has from_degrees and to_degrees, and a margin: leave the one or the others out",
     ),
     ({"scan": {"from_degrees": 90, "to_degrees": 10}}, "scan.from_degrees is 90, not below to_degrees, 10"),
     ({"scan": {"from_degrees": -400, "to_degrees": 10}}, "scan.from_degrees is -400: give a number from -360 to 360"),
     ({"scan__friction": 2.0}, "scan.friction is 2.0: give a number from 0 to 0.84"),
     ({"load_cell": [1]}, "load_cell is [1]: write it as a table, [load_cell]"),
     ({"load_cell__noise": 1.0}, "there is no key 'load_cell.noise'"),
+    ({"load_cell__samples": 9}, "there is no key 'load_cell.samples': its place is the table [scan]"),
+    ({"load_cell__frce_noise": 9}, "there is no key 'load_cell.frce_noise': did you mean 'force_noise'?"),
     ({"load_cell__frame": "loose"}, "load_cell.frame is 'loose': write 'fixed' or 'turning'"),
     ({"load_cell__frame": ["fixed"]}, "load_cell.frame is ['fixed']: write 'fixed' or 'turning'"),
     ({"load_cell__force_noise": -1.0}, "load_cell: the load cell's force_noise is -1.0"),
@@ -213,7 +264,8 @@ def test_what_is_impossible_is_refused_by_its_key(change, message):
         (b"records = 1\nrecords = 2", "not TOML: Cannot overwrite a value"),
         (b"name = '\xff'", "not a text in UTF-8: invalid start byte at byte 8"),
         (b"seed = 1979-05-27", "seed is datetime.date"),
-        (b"", "seed is missing"),
+        (b"", "it is empty: `tactile-bayes dataset example` prints one to start from"),
+        (b"# nothing\n", "it is empty"),
     ],
 )
 def test_a_refusal_names_the_file(tmp_path, content, message):
@@ -235,6 +287,16 @@ def test_what_no_toml_holds_is_refused():
 def test_a_missing_file_is_that():
     with pytest.raises(FileNotFoundError):
         read_specification("no such file.toml")
+
+
+def test_a_key_of_no_table_is_refused_without_all_there_are():
+    with pytest.raises(SpecificationError, match=r"'load_cell\.xyz': there are frame(, \w+){7} and others: `tactile-b"):
+        read_specification(changed(PLAIN, load_cell__xyz=1.0))
+
+
+def test_the_time_of_a_drift_is_stated_though_it_is_left_out():
+    laws = read_specification(changed(PLAIN, load_cell={"ornstein_uhlenbeck_force": 0.1})).load_cell
+    assert laws["ornstein_uhlenbeck_time"].numbers == (OrnsteinUhlenbeck().time,)
 
 
 def test_defaults():

@@ -62,7 +62,7 @@ def test_another_length_is_found(folder, name, cut):
     [
         ("shard-000001.nc", r"shard-000001\.nc is missing: dataset generate makes it again"),
         ("README.md", r"README\.md is missing: dataset generate makes it again"),
-        ("manifest.json", r"holds no data set: there is no manifest\.json"),
+        ("manifest.json", r"holds no data set: there is no manifest\.json, but shards: put a copy of it back, or run"),
     ],
 )
 def test_a_missing_file_is_found(folder, name, message):
@@ -99,6 +99,21 @@ def test_an_edited_manifest_is_found(folder, edit):
     path.write_text(json.dumps(edit(json.loads(path.read_text())), indent=1, ensure_ascii=False) + "\n")
     with pytest.raises(SpecificationError, match=r"manifest\.json is no"):
         verify(folder)
+
+
+def test_a_damaged_manifest_comes_with_a_remedy(folder):
+    path = folder / "manifest.json"
+    for content in (path.read_text().replace('"seed": 7', '"seed": 8'), "no JSON", path.read_text()[:-30]):
+        path.write_text(content)
+        for act in (lambda: verify(folder), lambda: generate(PLAIN, folder, workers=1)):
+            with pytest.raises(SpecificationError, match="put a copy of it back, or run dataset generate with"):
+                act()
+
+
+def test_progress_is_told(folder):
+    told = []
+    verify(folder, regenerate=2, progress=told.append)
+    assert told == [(files, 5) for files in range(1, 6)]
 
 
 def test_a_specification_that_is_not_the_stated_one_is_found(folder):

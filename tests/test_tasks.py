@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from helpers.tasks import alive, die, die_once, double, fail, fail_strangely, note_and_sleep, wait_until
+from tactile_bayes import tasks
 from tactile_bayes.errors import ParameterError, TaskError
 from tactile_bayes.tasks import run_tasks
 
@@ -123,6 +124,24 @@ def test_an_interrupt_ends_all_at_once(tmp_path, begun):
     assert words.count("Traceback") == 1, words
     assert words.rstrip().endswith("KeyboardInterrupt")
     wait_until(lambda: not group_lives(parent.pid), seconds=5.0)
+
+
+@pytest.mark.parametrize("address", ["nonsense", "foo://1", "tcp://x:y", "http://localhost:8786", ""])
+def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address, monkeypatch):
+    """Before there is a client, whose destructor would fail."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", None)
+    with pytest.raises(ParameterError, match=f"^'{address}' is no address of a Dask scheduler .*: give one like 'tcp"):
+        list(run_tasks(double, [1, 2], scheduler=address))
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "127.0.0.1:1"])
+def test_a_scheduler_that_does_not_answer_is_waited_for_no_longer_than_it_takes(address, monkeypatch):
+    pytest.importorskip("distributed")
+    assert tasks._PATIENCE == "10s"
+    monkeypatch.setattr(tasks, "_PATIENCE", "0.2s")
+    with pytest.raises(ParameterError, match=f"no Dask scheduler answers at '{address}': Timed out"):
+        list(run_tasks(double, [1, 2], scheduler=address))
 
 
 def test_a_script_without_guard_is_told_so(tmp_path):

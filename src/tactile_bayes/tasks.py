@@ -24,6 +24,9 @@ __all__ = ["run_tasks"]
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
+_PATIENCE = "10s"
+"""How long a scheduler may take to answer."""
+
 _RETRIES = 3
 """How often a task is tried again after a process died over it."""
 
@@ -61,7 +64,8 @@ def run_tasks(
     Raises
     ------
     ParameterError
-        If `workers` is no positive number, or Dask is wanted and not installed, or its scheduler does not answer.
+        If `workers` is no positive number, or Dask is wanted and not installed, or its scheduler does not answer in ten
+        seconds.
     TaskError
         If processes died over a task again and again, or cannot begin, or the scheduler is lost. What a task raises
         itself is raised here.
@@ -174,16 +178,34 @@ def _refuse_hopeless(process: _Process, code: int | None, deaths: Counter[int | 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """A process started here never hears Ctrl-C; this one hears it afterwards."""
+    """A process started here never hears Ctrl-C; this one hears it afterwards, and SIGTERM if it listens to that."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
     resource_tracker.ensure_running()  # which else would let the signals through, as it starts with the first process
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        with _termination_held():
+            yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _termination_held() -> Iterator[None]:
+    """Not by blocking it, which the process started here would go on doing."""
+    handler = signal.getsignal(signal.SIGTERM)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    come: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, frame: come.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, handler)
+        if come:
+            signal.raise_signal(signal.SIGTERM)
 
 
 def _work(function: Callable[[Any], Any], connection: Connection) -> None:
@@ -226,6 +248,22 @@ def _travels(error: Exception) -> bool:
 # ---- a cluster
 
 
+def _refuse_malformed(address: str) -> None:
+    """A client would take a minute over such an address, and fail in its destructor."""
+    from distributed.comm.addressing import get_address_host_port, parse_address
+    from distributed.comm.registry import get_backend
+
+    try:
+        scheme, _ = parse_address(address)
+        get_backend(scheme)
+        if scheme in ("tcp", "tls", "ws", "wss"):
+            get_address_host_port(address)
+    except (ValueError, TypeError) as error:
+        raise ParameterError(
+            f"{address!r} is no address of a Dask scheduler ({error}): give one like 'tcp://10.0.0.1:8786'"
+        ) from None
+
+
 def _on_cluster(
     function: Callable[[Task], Result], tasks: Sequence[Task], address: str
 ) -> Generator[tuple[Task, Result], None, None]:
@@ -235,8 +273,9 @@ def _on_cluster(
         raise ParameterError(
             "a scheduler was given, but Dask is not installed: pip install 'tactile-bayes[cluster]'"
         ) from None
+    _refuse_malformed(address)
     try:
-        client = Client(address, set_as_default=False, timeout="30s")
+        client = Client(address, set_as_default=False, timeout=_PATIENCE)
     except (OSError, ValueError) as error:
         raise ParameterError(f"no Dask scheduler answers at {address!r}: {error}") from error
     with client:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-    from tactile_bayes.datasets import Production
+    from tactile_bayes.datasets import Production, Verification
     from tactile_bayes.datasets.manifest import Manifest
 
 __all__ = ["dataset"]
@@ -74,9 +74,14 @@ def generate(
                 raise_lost()
 
             datasets.generate(spec, out, workers=workers, scheduler=scheduler, progress=note)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
         have = f"{last.records:,} of {spec.records:,} records are in {out}" if last else "no further file was finished"
-        raise KeyboardInterrupt(f"interrupted, {have}: the same command goes on") from None
+        is_terminated = isinstance(interrupt, _Terminated)
+        words = f"{'terminated' if is_terminated else 'interrupted'}, {have}: the same command goes on"
+        if is_terminated:
+            typer.echo(f"tactile-bayes: {words}", err=True)
+            raise typer.Exit(143) from None
+        raise KeyboardInterrupt(words) from None
     _print_result(out, read_manifest(out), last)
 
 
@@ -84,6 +89,7 @@ def generate(
 def verify(
     folder: Folder,
     regenerate: Annotated[int, typer.Option(help="Files to be made again, and compared number by number.", min=0)] = 0,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False,
 ) -> None:
     """Check every byte of a data set.
 
@@ -91,7 +97,8 @@ def verify(
     """
     from tactile_bayes import datasets
 
-    manifest = datasets.verify(folder, regenerate=regenerate)
+    with _verification_progress(quiet) as show:
+        manifest = datasets.verify(folder, regenerate=regenerate, progress=show)
     count = len(manifest.shards)
     typer.echo(f"{folder}: {_records(manifest.records)} in {_files(count)}, every byte as it was written")
     if regenerate:
@@ -143,36 +150,63 @@ def _progress(records: int, quiet: bool) -> Iterator[Callable[[Production], obje
 
 
 @contextmanager
+def _verification_progress(quiet: bool) -> Iterator[Callable[[Verification], object]]:
+    """A bar that fills with files; none where nobody sees it move."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield lambda verification: None
+        return
+    words = (TextColumn("{task.description}"), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
+    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
+        task = bar.add_task("files to be read", total=None, left="")
+
+        def show(verification: Verification) -> None:
+            done, wanted = verification
+            bar.update(task, total=wanted, completed=done, description=f"{done:,} of {_files(wanted)}", left="left")
+
+        yield show
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, as batch systems send it before they kill."""
+
+
+@contextmanager
 def _interrupts_kept() -> Iterator[Callable[[], object]]:
     """Raises an interrupt that was lost: Python ignores one that comes in the callback of a weak reference."""
     import signal
     import threading
 
-    usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if not usual or threading.current_thread() is not threading.main_thread():
+    usual: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    ours = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
+    if not ours or threading.current_thread() is not threading.main_thread():
         yield lambda: None
         return
-    has_come = False
+    come: list[type[KeyboardInterrupt]] = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        nonlocal has_come
-        has_come = True
-        raise KeyboardInterrupt
+        come.append(_Terminated if number == signal.SIGTERM else KeyboardInterrupt)
+        raise come[0]
 
     def raise_lost() -> None:
-        if has_come:
-            raise KeyboardInterrupt
+        if come:
+            raise come[0]
 
-    signal.signal(signal.SIGINT, interrupt)
+    for number in ours:
+        signal.signal(number, interrupt)
     try:
         yield raise_lost
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number in ours:
+            signal.signal(number, usual[number])
 
 
 def _print_result(out: Path, manifest: Manifest, last: Production | None) -> None:
     size = sum(shard.bytes for shard in manifest.shards)
-    made = "all were there already"
+    made = "all were there already, by their sizes; dataset verify compares every byte"
     if last is not None:
         made = f"{last.made:,} made in {last.seconds:.3g} s, {_rate(last)} records/s"
     typer.echo(f"{_records(manifest.records)} in {_files(len(manifest.shards))}, {size / 1e6:,.1f} MB: {made}")
@@ -180,6 +214,13 @@ def _print_result(out: Path, manifest: Manifest, last: Production | None) -> Non
     if total := sum(redrawn.values()):
         why = ", ".join(f"{count:,} {reason}" for reason, count in redrawn.most_common())
         typer.echo(f"{total:,} contours were drawn again: {why}")
+    if manifest.strained:
+        typer.echo(
+            f"{_records(manifest.strained)} with a rod strained beyond the model: their loads are not to be trusted"
+        )
+    if manifest.untouched:
+        sweeps = f"{manifest.untouched:,} sweep{'s' * (manifest.untouched != 1)}"
+        typer.echo(f"{sweeps} without a sample in contact")
     typer.echo(f"{out / 'README.md'} says what is in the files")
 
 

@@ -4,6 +4,16 @@ from tactile_bayes.datasets.collection import open_dataset as open
 from tactile_bayes.datasets.production import Production, generate
 from tactile_bayes.datasets.single_record import contour_of, record
 from tactile_bayes.datasets.specification import Specification, read_specification
-from tactile_bayes.datasets.verification import verify
+from tactile_bayes.datasets.verification import Verification, verify
 
-__all__ = ["Production", "Specification", "contour_of", "generate", "open", "read_specification", "record", "verify"]
+__all__ = [
+    "Production",
+    "Specification",
+    "Verification",
+    "contour_of",
+    "generate",
+    "open",
+    "read_specification",
+    "record",
+    "verify",
+]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tactile_bayes.datasets.laws import Law
 from tactile_bayes.datasets.manifest import Manifest
 from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.strain import LARGEST_STRAIN
 
 __all__ = ["CARD", "card"]
 
@@ -14,6 +15,7 @@ CARD = "README.md"
 def card(spec: Specification, manifest: Manifest) -> str:
     """The data card, in Markdown."""
     size = sum(shard.bytes for shard in manifest.shards)
+    files = len(manifest.shards)
     bases = len(spec.bases)
     where = "" if bases == 1 else f" from {bases} bases"
     lines = [
@@ -22,7 +24,7 @@ def card(spec: Specification, manifest: Manifest) -> str:
         *([spec.description.strip(), ""] if spec.description.strip() else []),
         f"Simulated sweeps of a flexible rod on a pivot along strictly convex contours: {spec.records} records of "
         f"{len(spec.sweeps)} sweeps ({', '.join(spec.directions)}{where}) with {spec.drive.samples} samples each, in "
-        f"{len(manifest.shards)} NetCDF files, {size / 1e6:.1f} MB. "
+        f"{files} NetCDF file{'s' * (files != 1)}, {size / 1e6:.1f} MB. "
         + ("Lengths in m, forces in N, moments in N m." if spec.units == "SI" else
            "Lengths in rod lengths L, forces in EI/L², moments in EI/L, angles in rad."),
         "",
@@ -56,8 +58,10 @@ def card(spec: Specification, manifest: Manifest) -> str:
         f"| friction | {spec.friction:g} |",
         f"| frame of the load cell | {spec.frame} |",
         "",
-        _redrawn(manifest),
+        *_in_turn(spec),
+        _redrawn(spec, manifest),
         "",
+        *_to_beware_of(spec, manifest),
         "## What is in the files",
         "",
         "Dimensions are record, sweep and sample. `drive_angle`, `holding_moment`, `force_x` and `force_y` are what "
@@ -66,6 +70,7 @@ def card(spec: Specification, manifest: Manifest) -> str:
         "and first contact, snap-off and phases of each sweep. Whole numbers with `flag_meanings` stand for words. "
         f"Numbers over samples have {32 if spec.single else 64} bits; true loads are right to 1e-6 of the largest.",
         "",
+        *_not_in_the_files(spec),
         "## Where it is from",
         "",
         f"Seed {spec.seed}; specification {spec.sha256[:16]}…, whole in `manifest.json` with a checksum of each file: "
@@ -89,15 +94,74 @@ def _names(spec: Specification) -> list[str]:
     ]
 
 
-def _redrawn(manifest: Manifest) -> str:
+def _in_turn(spec: Specification) -> list[str]:
+    """How the lists are gone through."""
+    if not spec.lists:
+        return []
+    times = spec.records // spec.combinations
+    often = "once" if times == 1 else f"{times} times"
+    names = [_of_axis(spec, name) for name, _ in spec.lists]
+    if len(names) == 1:
+        return [f"Records go through the {spec.combinations} entries of {names[0]}, {often}.", ""]
+    return [
+        f"Records go through all {spec.combinations} combinations of the lists, {often}, the last of these fastest: "
+        f"{'; '.join(names)}.",
+        "",
+    ]
+
+
+def _of_axis(spec: Specification, name: str) -> str:
+    """The list of this name, or those on the axis of this name."""
+    together = [key for key, law in spec.laws if law.axis == name]
+    return f"{name} ({' and '.join(together)} in step)" if together else name
+
+
+def _redrawn(spec: Specification, manifest: Manifest) -> str:
     """How many draws came to nothing, and what that does to the laws."""
+    reached = "that every sweep reaches and that the rod is clear of after snap-off"
+    if spec.drive.begin is not None:
+        reached = (
+            "that every sweep, driven far enough, reaches, whatever the drive angles above, and that the rod is clear "
+            "of after snap-off"
+        )
     if not (total := sum(manifest.redrawn.values())):
-        return "Every contour drawn is one that every sweep reaches and that the rod is clear of after snap-off."
+        return f"Every contour drawn is one {reached}."
     why = ", ".join(f"{count} {reason}" for reason, count in sorted(manifest.redrawn.items()))
-    return (
-        f"{total} contours were drawn again ({why}), so the laws above hold among contours that every sweep reaches "
-        "and that the rod is clear of after snap-off."
-    )
+    return f"{total} contours were drawn again ({why}), so the laws above hold among contours {reached}."
+
+
+def _to_beware_of(spec: Specification, manifest: Manifest) -> list[str]:
+    """Records that are there, and may not be wanted."""
+    lines = []
+    sweeps = spec.records * len(spec.sweeps)
+    if manifest.untouched or spec.drive.begin is not None:
+        lines += [f"Of {sweeps} sweeps, {manifest.untouched} have no sample in contact (`truth_contact_phase`).", ""]
+    if spec.has_thickness:
+        lines += [
+            f"In {manifest.strained} of {spec.records} records the rod is strained beyond {LARGEST_STRAIN:g} "
+            "(`truth_largest_strain`): it is neither slender nor linearly elastic there, and the loads are not to be "
+            "trusted.",
+            "",
+        ]
+    return lines
+
+
+def _not_in_the_files(spec: Specification) -> list[str]:
+    """What the readings are made of and the files do not say, or say a little otherwise."""
+    lines = []
+    if any(name.startswith(("bias_uncertainty", "random_walk", "ornstein_uhlenbeck")) for name in spec.load_cell):
+        lines += [
+            "What a record's drift and its unknown bias came to is not kept: only readings minus true loads tell, with "
+            "the noise in them.",
+            "",
+        ]
+    if spec.single and any(name.endswith("_range") for name in spec.load_cell):
+        lines += [
+            "Readings at the end of the load cell's range are that end rounded to 32 bits, and may be a little less or "
+            "more; `tb.datasets.record` gives them back as the end itself.",
+            "",
+        ]
+    return lines
 
 
 def _words(law: Law) -> str:
@@ -116,4 +180,5 @@ def _words(law: Law) -> str:
         case "choice":
             return f"one of {', '.join(numbers)}"
         case _:
-            return f"each of {', '.join(numbers)}"
+            axis = f", on the axis {law.axis}" if law.axis else ""
+            return f"each of {', '.join(numbers)}{axis}"

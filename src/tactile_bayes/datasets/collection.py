@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,7 @@ from xarray.core import indexing
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.errors import SpecificationError
 
-__all__ = ["open_dataset", "opened_shard"]
+__all__ = ["open_dataset", "opened", "opened_shard"]
 
 
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -39,9 +40,26 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     ------
     SpecificationError
         If the folder holds no data set, or none of its shards is there yet.
+
+    Warns
+    -----
+    UserWarning
+        If not all of its shards are there yet.
     """
     folder = Path(path)
     manifest = read_manifest(folder)
+    if manifest.shards and not manifest.is_complete:
+        have = sum(shard.records for shard in manifest.shards)
+        warnings.warn(
+            f"{folder} has {have} of {manifest.records} records: run dataset generate again for the others",
+            UserWarning,
+            stacklevel=2,
+        )
+    return opened(folder, manifest)
+
+
+def opened(folder: Path, manifest: Manifest) -> xr.Dataset:
+    """What there is of a data set; see `open_dataset`."""
     if not manifest.shards:
         raise SpecificationError(f"{folder} holds no shard yet: run dataset generate again")
     with opened_shard(folder / manifest.shards[0].file) as first:

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw, ShapeFree
+from tactile_bayes.contours.base import refuse_unless
+from tactile_bayes.errors import ContourError
 
-__all__ = ["FAMILIES", "FLANKS", "KNOTS", "LOG_RADIUS", "Family"]
+__all__ = ["FAMILIES", "FLANKS", "KNOTS", "LOG_RADIUS", "Family", "rule_of"]
 
 Floats = NDArray[np.float64]
 
@@ -19,6 +21,9 @@ KNOTS = np.linspace(-1.5, 1.5, 13)
 
 LOG_RADIUS = "log_radius"
 """Its logarithm there, a parameter of shape (..., knots)."""
+
+_LARGEST_AMPLITUDE, _LEAST_LENGTH_SCALE = 3.0, 0.1
+"""Beyond, radii of curvature change by powers of ten from knot to knot, and paths along them take for ever."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,37 @@ class Family:
     build: Callable[[Mapping[str, Floats]], Contour]
     draw_log_radius: Callable[[Mapping[str, Floats], Floats], Floats] | None = None
 
+    def refuse(self, name: str, value: float) -> None:
+        """Raise ContourError if no contour has this value of a parameter, whatever the others are."""
+        possible = {key: np.full(1, 2.0 if key.endswith("n") else 1.0) for key in (*self.parameters, *self.optional)}
+        if self.draw_log_radius is not None:
+            possible[LOG_RADIUS] = np.zeros((1, KNOTS.size))
+        self.build(possible | {name: np.full(1, value)})
+
+
+def rule_of(error: ContourError) -> str:
+    """The rule that parameters have broken, without their values, so that many breaches of it count as one."""
+    words = str(error).partition("; found ")[0]
+    return words.partition(": ")[2] or words
+
+
+def _shape_free(values: Mapping[str, Floats]) -> Contour:
+    amplitude, length_scale = values["amplitude"], values["length_scale"]
+    refuse_unless(
+        (amplitude >= 0.0) & (amplitude <= _LARGEST_AMPLITUDE),
+        "shape-free",
+        f"amplitude must be from 0 to {_LARGEST_AMPLITUDE:g}, the latter a factor of 20 in the radius",
+        amplitude=amplitude,
+    )
+    refuse_unless(
+        length_scale >= _LEAST_LENGTH_SCALE,
+        "shape-free",
+        f"length_scale must be at least {_LEAST_LENGTH_SCALE:g} rad: the radius is drawn at slope angles "
+        f"{KNOTS[1] - KNOTS[0]:g} rad apart",
+        length_scale=length_scale,
+    )
+    return ShapeFree(KNOTS, values[LOG_RADIUS], values["x_c"], values["q"])
+
 
 def _log_radius(values: Mapping[str, Floats], normals: Floats) -> Floats:
     """log ρ is a Gaussian process over the slope angle, with a squared-exponential kernel."""
@@ -60,7 +96,7 @@ FLANKS: Mapping[str, Family] = {
     "ellipse": Family(("a", "b", "q"), _PLACE, lambda v: Ellipse(v["a"], v["b"], v["q"], v["x_c"])),
     "power-law": Family(("a", "n", "q"), _PLACE, lambda v: PowerLaw(v["a"], v["n"], v["q"], v["x_c"])),
 }
-"""Families with a vertex, of which any two make a joined contour."""
+"""Families with a vertex, of which any two, or one twice, make a joined contour."""
 
 
 def _joined(left: str, right: str) -> Family:
@@ -84,9 +120,9 @@ FAMILIES: Mapping[str, Family] = {
     "shape-free": Family(
         ("radius", "amplitude", "length_scale", "q"),
         _PLACE,
-        lambda v: ShapeFree(KNOTS, v[LOG_RADIUS], v["x_c"], v["q"]),
+        _shape_free,
         _log_radius,
     ),
-    **{f"{left}/{right}": _joined(left, right) for left in FLANKS for right in FLANKS if left != right},
+    **{f"{left}/{right}": _joined(left, right) for left in FLANKS for right in FLANKS},
 }
 """Families that data sets may draw from; "parabola/circle" is a parabola on the left and a circle on the right."""

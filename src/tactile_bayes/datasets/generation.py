@@ -13,9 +13,10 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS
+from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS, rule_of
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.strain import LARGEST_STRAIN, largest_strain
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.path import Paths, Reach, trace
 from tactile_bayes.reach import clear_angle
@@ -34,6 +35,10 @@ _MOST_DRAWS = 1000
 _AT_ONCE = 500
 """Draws that are tried together, while fewer records are left: what is drawn in vain costs less than to begin anew."""
 
+_APART = 2**20
+"""Random numbers from where one draw of a record begins to where the next does: far more than there are laws, so that a
+contour is the same whatever is drawn after it."""
+
 _GOOD = ""
 
 
@@ -48,11 +53,22 @@ class Records:
     """By the keys of the specification's laws, shape (n,), and "contours[…].log_radius", shape (n, knots); NaN where
     another family's."""
     sweep: dict[str, NDArray[Any]]
-    """Of each sweep, shape (n, sweeps): base_x, base_y, phases, and events."""
+    """Of each sweep, shape (n, sweeps): base_x, base_y, phases, events, and the largest strain of a thick rod."""
     sample: dict[str, NDArray[Any]]
     """Of each sample, shape (n, sweeps, samples): what was measured, and "truth_" columns."""
     redrawn: Counter[str]
     """Draws that came to nothing, by the reason."""
+
+    @property
+    def strained(self) -> int:
+        """How many have a sweep in which the rod is strained beyond the model."""
+        strain = self.sweep.get("largest_strain", np.zeros((1, 1)))
+        return int(np.count_nonzero(np.any(strain > LARGEST_STRAIN, axis=1)))
+
+    @property
+    def untouched(self) -> int:
+        """How many sweeps have no sample in contact."""
+        return int(np.count_nonzero(~np.any(self.sample["truth_contact_phase"], axis=2)))
 
 
 _REASONS = {
@@ -63,14 +79,29 @@ _REASONS = {
     Reach.TOO_CLOSE: "too close to the pivot",
     Reach.RUNS_OUT: "still touched at its other end",
 }
+_NOT_CLEAR = "not clear after snap-off"
+_NO_CONTOUR = "no contour"
+
+_HIGHER = "raise the contours above the pivots, by a larger q or lower bases"
+_WIDER = "give wider contours, or bring the pivots nearer to them, or to their middle"
+_REMEDIES = {
+    "out of reach": "bring contours and pivots closer to one another (are contours, bases and rod in one unit?)",
+    "cuts the pivot": _HIGHER,
+    "first touched beyond its end": _WIDER,
+    "too close to the pivot": _HIGHER,
+    "still touched at its other end": _WIDER,
+    _NOT_CLEAR: "give wider contours, or raise them: the straight rod would still cut the object",
+    _NO_CONTOUR: "change the law of that parameter",
+}
 
 
 @threadpool_limits.wrap(limits=1)  # with more threads, products of matrices are rounded otherwise
 def generate_records(spec: Specification, begin: int, end: int) -> Records:
     """Records from index `begin` to before `end`.
 
-    The random numbers of a record follow from the seed and its index alone; rounding may depend on which records are
-    made together, so that bit by bit only the same stretch gives the same numbers.
+    The random numbers of a record follow from the seed and its index alone, and those of its contour are drawn before
+    all others; rounding may depend on which records are made together, so that bit by bit only the same stretch gives
+    the same numbers.
 
     Raises
     ------
@@ -78,33 +109,35 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         If of 1000 draws of a record none is a contour that every sweep can reach.
     """
     index = np.arange(begin, end)
-    streams = [np.random.default_rng(np.random.SeedSequence(spec.seed, spawn_key=(i, 0))) for i in index.tolist()]
+    streams = [_Stream(spec.seed, i) for i in index.tolist()]
     keys = [key for key, _ in spec.laws]
-    free = {g: FAMILIES[group.family].draw_log_radius for g, group in enumerate(spec.groups)}
-    normals = KNOTS.size if any(free.values()) else 0
+    free = {g: draw for g, group in enumerate(spec.groups) if (draw := FAMILIES[group.family].draw_log_radius)}
     turns = _turns(spec, index)
     drawn = {key: np.full(index.size, np.nan) for key in keys}
-    drawn |= {f"contours[{g}].{LOG_RADIUS}": np.full((index.size, normals), np.nan) for g in free if free[g]}
+    drawn |= {f"contours[{g}].{LOG_RADIUS}": np.full((index.size, KNOTS.size), np.nan) for g in free}
     family = np.zeros(index.size, dtype=np.intp)
     sweep: dict[str, NDArray[Any]] = {}
     sample: dict[str, NDArray[Any]] = {}
     redrawn: Counter[str] = Counter()
+    in_vain: list[tuple[Index, NDArray[Any]]] = []
     left, draws, ahead = np.arange(index.size), 0, 1
     while left.size:
         if draws == _MOST_DRAWS:
-            raise _hopeless(int(index[left[0]]), redrawn)
+            reasons = [why for rows, whys in in_vain for why in whys[rows == left[0]].ravel()]
+            raise _hopeless(int(index[left[0]]), Counter(reasons))
         of_record = np.repeat(left, ahead)
-        pairs = [(streams[i].random(1 + len(keys)), streams[i].standard_normal(normals)) for i in of_record]
-        shares, normal = (np.array(part) for part in zip(*pairs, strict=True))
+        shares = np.array([streams[i].shares(1 + len(keys)) for i in of_record])
         group = _group(spec, shares[:, 0], turns.get("contours"), of_record)
         values = {
             key: law.at(shares[:, 1 + k], turns[law.axis or key][of_record] if law.kind == "each" else of_record)
             for k, (key, law) in enumerate(spec.laws)
         }
+        normals = np.full((of_record.size, KNOTS.size if free else 0), np.nan)
+        for k in np.flatnonzero(np.isin(group, list(free))):
+            normals[k] = streams[of_record[k]].normals(KNOTS.size)
         for g, draw_log_radius in free.items():
-            if draw_log_radius is not None:
-                parameters = {name: values[f"contours[{g}].{name}"] for name in spec.groups[g].laws}
-                values[f"contours[{g}].{LOG_RADIUS}"] = draw_log_radius(parameters, normal)
+            parameters = {name: values[f"contours[{g}].{name}"] for name in spec.groups[g].laws}
+            values[f"contours[{g}].{LOG_RADIUS}"] = draw_log_radius(parameters, normals)
         why = np.empty(of_record.size, dtype=object)
         found = []
         for g in np.unique(group).tolist():
@@ -113,7 +146,8 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
             found.append((g, among[why[among] == _GOOD], swept))
         is_good = (why == _GOOD).reshape(left.size, ahead)
         before = is_good.cumsum(axis=1)
-        redrawn.update(why.reshape(left.size, ahead)[before == 0].tolist())
+        in_vain.append((left, why.reshape(left.size, ahead)))
+        redrawn.update(in_vain[-1][1][before == 0].tolist())
         first = (is_good & (before == 1)).ravel()
         for g, good, swept in found:
             chosen = good[first[good]]
@@ -135,11 +169,36 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
     return Records(index, family, drawn, sweep, sample, redrawn)
 
 
-def _hopeless(record: int, redrawn: Counter[str]) -> SpecificationError:
-    why_not = ", ".join(f"{count} {why}" for why, count in redrawn.most_common())
+class _Stream:
+    """The random numbers that a record is drawn with."""
+
+    def __init__(self, seed: int, record: int) -> None:
+        self.key = seed, record
+        self.bits = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(record, 0)))
+        self.uniform = np.random.Generator(self.bits)
+        self.normal: np.random.Generator | None = None
+
+    def shares(self, count: int) -> Floats:
+        """Uniform numbers of the next draw."""
+        found = self.uniform.random(count)
+        self.bits.advance(_APART - count)
+        return found
+
+    def normals(self, count: int) -> Floats:
+        """Normal numbers of the next shape-free contour, from a stream of their own."""
+        if self.normal is None:
+            seed, record = self.key
+            self.normal = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(record, 2)))
+        return self.normal.standard_normal(count)
+
+
+def _hopeless(record: int, reasons: Counter[str]) -> SpecificationError:
+    found = reasons.most_common()
+    commonest = found[0][0]
+    remedy = next(remedy for reason, remedy in _REMEDIES.items() if commonest.startswith(reason))
     return SpecificationError(
-        f"record {record} was drawn {_MOST_DRAWS} times, and no contour was one that every sweep can reach (draws of "
-        f"its shard: {why_not}): are contours, bases and rod in one unit, and the contours above the pivots?"
+        f"record {record} was drawn {_MOST_DRAWS} times, and no contour was one that every sweep can reach "
+        f"({', '.join(f'{count} {why}' for why, count in found)}): {remedy}"
     )
 
 
@@ -162,11 +221,10 @@ def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
     """Draws of one group: why each comes to nothing, `_GOOD` if it does not, and the sweeps of the good ones."""
     prefix = f"contours[{g}]."
     parameters = {key.removeprefix(prefix): v for key, v in values.items() if key.startswith(prefix)}
-    count = len(next(iter(parameters.values())))
-    why = np.full(count, "no contour", dtype=object)
-    built, contours = _built(spec.groups[g].family, parameters, count)
+    why, contours = _built(spec.groups[g].family, parameters, len(next(iter(parameters.values()))))
     if contours is None:
         return why, {}
+    built = np.flatnonzero(why == _GOOD)
     lengths = values["rod.length"][built] if spec.rod else np.ones(built.size)
     standoffs = 0.5 * values["rod.diameter"][built] if spec.rod else np.zeros(built.size)
     sweeps = len(spec.sweeps)
@@ -183,29 +241,28 @@ def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
     with np.errstate(invalid="ignore"):
         clear = (paths.snap_angle > clear_angle(seen)).reshape(sweeps, -1).all(axis=0)
     reasons = np.array([_REASONS[Reach(reach)] for reach in range(len(_REASONS))], dtype=object)[fate]
-    why[built] = np.where((fate == Reach.TOUCHES) & ~clear, "not clear after snap-off", reasons)
+    why[built] = np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
     return why, _recorded(spec, paths, why[built] == _GOOD, _units(spec, values, lane_of, built))
 
 
-def _built(family: str, parameters: Mapping[str, Floats], count: int) -> tuple[Index, Contour | None]:
-    """Contours of the draws that make one, with all parameters arrays, and which draws these are."""
+def _built(family: str, parameters: Mapping[str, Floats], count: int) -> tuple[NDArray[Any], Contour | None]:
+    """Why each draw is no contour, `_GOOD` if it is one, and the contours of these, with all parameters arrays."""
     definition = FAMILIES[family]
+    why = np.full(count, _GOOD, dtype=object)
     try:
-        return np.arange(count), definition.build(parameters).broadcast_to((count,))
+        return why, definition.build(parameters).broadcast_to((count,))
     except ContourError:
         pass
-    good = []
     for i in range(count):
         try:
             definition.build({name: values[i : i + 1] for name, values in parameters.items()})
-        except ContourError:
-            continue
-        good.append(i)
-    chosen = np.array(good, dtype=np.intp)
-    if not good:
-        return chosen, None
-    some = {name: values[chosen] for name, values in parameters.items()}
-    return chosen, definition.build(some).broadcast_to((chosen.size,))
+        except ContourError as error:
+            why[i] = f"{_NO_CONTOUR} ({rule_of(error)})"
+    built = np.flatnonzero(why == _GOOD)
+    if not built.size:
+        return why, None
+    some = {name: values[built] for name, values in parameters.items()}
+    return why, definition.build(some).broadcast_to((built.size,))
 
 
 def _units(spec: Specification, values: Mapping[str, Floats], lane_of: Index, built: Index) -> ManyUnits:
@@ -239,6 +296,8 @@ def _recorded(spec: Specification, paths: Paths, good: NDArray[np.bool_], units:
     for event, columns in sweep_events(paths, units).items():
         found |= {f"{event}_{name}": columns[name] for name in EVENT_COLUMNS}
     found["snap_off_kind"] = paths.snap_off
+    if spec.has_thickness:
+        found["largest_strain"] = largest_strain(paths, np.tile(good, len(spec.sweeps)))
     samples = sweep_samples(paths, angles, units)
     found["drive_angle"] = angles
     found |= {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}

@@ -21,7 +21,12 @@ __all__ = ["MANIFEST", "Manifest", "read_manifest", "versions_here", "write_mani
 
 MANIFEST = "manifest.json"
 
-_FORMAT = 1
+_FORMAT = 2
+"""1 had other random numbers of the same seed."""
+_REMEDY = (
+    "put a copy of it back, or run dataset generate with the same specification into another folder, which makes the "
+    "same files again"
+)
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "xarray", "h5netcdf", "h5py")
 
 
@@ -77,6 +82,16 @@ class Manifest:
             total.update(shard.redrawn)
         return total
 
+    @property
+    def strained(self) -> int:
+        """Records in these files with a sweep in which the rod is strained beyond the model."""
+        return sum(shard.strained for shard in self.shards)
+
+    @property
+    def untouched(self) -> int:
+        """Sweeps in these files without any sample in contact."""
+        return sum(shard.untouched for shard in self.shards)
+
 
 def versions_here() -> dict[str, str]:
     return {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}}
@@ -85,6 +100,7 @@ def versions_here() -> dict[str, str]:
 def write_manifest(manifest: Manifest, folder: Path) -> None:
     """Write a manifest whole."""
     table = {"format": _FORMAT, "complete": manifest.is_complete, "redrawn": dict(sorted(manifest.redrawn.items()))}
+    table |= {"strained": manifest.strained, "untouched": manifest.untouched}
     table |= {**asdict(manifest), "shards": [shard._asdict() for shard in manifest.shards]}
     with write_atomically(folder / MANIFEST) as temporary:
         temporary.write_bytes(_content(table))
@@ -104,18 +120,22 @@ def read_manifest(folder: Path) -> Manifest:
         table = json.loads(content)
         table.pop("sha256")
         if content != _content(table):
-            raise SpecificationError(f"{path} is not as it was written: its own checksum differs")
+            raise SpecificationError(f"{path} is not as it was written, its own checksum differs: {_REMEDY}")
         if table["format"] != _FORMAT:
-            raise SpecificationError(f"{path} has format {table['format']}, and this version reads format {_FORMAT}")
+            raise SpecificationError(
+                f"{path} has format {table['format']}, and this version reads format {_FORMAT}: take the version that "
+                "it was made with, or make it again in another folder"
+            )
         shards = tuple(Written(**shard) for shard in table["shards"])
         rest = {name: table[name] for name in Manifest.__dataclass_fields__ if name != "shards"}
         return Manifest(**rest, shards=shards)
     except (FileNotFoundError, NotADirectoryError):
-        raise SpecificationError(f"{folder} holds no data set: there is no {MANIFEST}") from None
+        lost = f", but shards: {_REMEDY}" if any(folder.glob("shard-*.nc")) else ""
+        raise SpecificationError(f"{folder} holds no data set: there is no {MANIFEST}{lost}") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, SpecificationError):
             raise
-        raise SpecificationError(f"{path} is no manifest of a data set ({error})") from error
+        raise SpecificationError(f"{path} is no manifest of a data set ({error}): {_REMEDY}") from error
 
 
 def _content(table: Mapping[str, Any]) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import reprlib
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -14,7 +15,8 @@ from typing import Any, NamedTuple
 from tactile_bayes.datasets.card import CARD, card
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
 from tactile_bayes.datasets.shard import Written, shard_file, write_shard
-from tactile_bayes.datasets.specification import Specification, read_specification
+from tactile_bayes.datasets.specification import UNNAMED, Specification, meaning, read_specification
+from tactile_bayes.datasets.specification_text import differences
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.tasks import run_tasks
@@ -23,6 +25,10 @@ __all__ = ["Production", "generate"]
 
 _NOTING = 0.05
 """Share of the time that goes into notes of what is finished: what is not noted when all is killed is made again."""
+
+
+_MOST_TOLD = 3
+"""Differences between two specifications that a refusal names."""
 
 
 class Production(NamedTuple):
@@ -149,17 +155,15 @@ def _begun(spec: Specification, folder: Path) -> Manifest:
         strangers = [*folder.glob("shard-*.nc"), *folder.glob(CARD)]
         if strangers:
             raise SpecificationError(
-                f"{folder} holds {strangers[0].name}, but no {MANIFEST}: choose another folder, or empty this one"
+                f"{folder} holds {strangers[0].name}, but no {MANIFEST}: choose another folder, or empty this one, as "
+                "the same specification makes the same files again; or put a copy of the manifest back"
             )
-        manifest = Manifest.of(spec)
-        write_manifest(manifest, folder)
-        return manifest
+        return _first(spec, folder)
     manifest = read_manifest(folder)
+    if not manifest.shards:
+        return _first(spec, folder)
     if manifest.specification_sha256 != spec.sha256:
-        raise SpecificationError(
-            f"{folder} holds a data set of another specification ({manifest.name!r}): choose another folder, or give "
-            "the specification that its manifest states"
-        )
+        raise _other(manifest, spec, folder)
     whole = tuple(
         s for s in manifest.shards if (folder / s.file).is_file() and (folder / s.file).stat().st_size == s.bytes
     )
@@ -172,6 +176,33 @@ def _begun(spec: Specification, folder: Path) -> Manifest:
             "versions, or start again in another folder"
         )
     return manifest
+
+
+def _first(spec: Specification, folder: Path) -> Manifest:
+    """The manifest of which nothing is there yet; files that no manifest came to state are of a run that ended."""
+    for file in folder.glob("shard-*.nc"):
+        file.unlink()
+    manifest = Manifest.of(spec)
+    write_manifest(manifest, folder)
+    return manifest
+
+
+def _other(manifest: Manifest, spec: Specification, folder: Path) -> SpecificationError:
+    found = differences(meaning(manifest.specification), meaning(spec.text))
+    told = [f"{key} {_said(there)} there and {_said(here)} here" for key, there, here in found[:_MOST_TOLD]]
+    told += [f"{len(found) - _MOST_TOLD} more"] if len(found) > _MOST_TOLD else []
+    name = "" if manifest.name == UNNAMED else f" ({manifest.name!r})"
+    remedy = "choose another folder, or give the specification that its manifest states"
+    if [key for key, _, _ in found] == ["records"]:
+        remedy = "a data set does not grow: choose another folder, where the first records will be the same"
+    return SpecificationError(f"{folder} holds a data set of another specification{name}, {', '.join(told)}: {remedy}")
+
+
+def _said(value: Any) -> str:
+    if value is None:
+        return "is left out"
+    is_whole = isinstance(value, float) and value.is_integer()
+    return f"is {int(value) if is_whole else reprlib.repr(value)}"
 
 
 @contextmanager

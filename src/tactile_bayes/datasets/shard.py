@@ -53,6 +53,10 @@ class Written(NamedTuple):
     bytes: int
     sha256: str
     redrawn: dict[str, int]
+    strained: int
+    """Records with a sweep in which the rod is strained beyond the model."""
+    untouched: int
+    """Sweeps without any sample in contact."""
 
 
 def shard_file(shard: int) -> str:
@@ -88,7 +92,16 @@ def write_shard(task: tuple[str, int, str]) -> Written:
         raise OSError(error.errno, error.strerror, str(path)) from error
     digest = hashlib.sha256(content).hexdigest()
     redrawn = {reason: count for reason, count in sorted(records.redrawn.items()) if count}
-    return Written(path.name, begin, records.index.size, len(content), digest, redrawn)
+    return Written(
+        path.name,
+        begin,
+        records.index.size,
+        len(content),
+        digest,
+        redrawn,
+        records.strained,
+        records.untouched,
+    )
 
 
 @lru_cache(maxsize=1)
@@ -185,6 +198,9 @@ def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[s
                 values.astype(np.int8),
                 _flags("kind of the snap-off", kinds, np.int8),
             )
+        elif name == "largest_strain":
+            long_name = "largest bending strain of the rod up to snap-off"
+            found["truth_largest_strain"] = (dims, values, {"units": "1", "long_name": long_name})
         elif name in COLUMNS:
             found[name] = (dims, values, _described(spec, name))
         else:

@@ -11,14 +11,15 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.datasets.collection import open_dataset
+from tactile_bayes.datasets.collection import opened
 from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import read_manifest
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification import Specification, read_specification, read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
-from tactile_bayes.record import COLUMNS, column_of, make_record
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, COLUMNS, column_of, make_record
 from tactile_bayes.rod import Rod
 
 __all__ = ["contour_of", "record"]
@@ -63,14 +64,15 @@ def record(
     """
     folder = None if isinstance(source, Mapping | Specification) or not Path(source).is_dir() else Path(source)
     if folder is not None:
-        spec = read_text(read_manifest(folder).specification)
+        manifest = read_manifest(folder)
+        spec = read_text(manifest.specification)
     else:
         spec = source if isinstance(source, Specification) else read_specification(source)
     if not isinstance(index, int | np.integer) or not 0 <= index < spec.records:
         raise ParameterError(f"there is no record {index!r}: they are numbered from 0 to {spec.records - 1}")
     begin = int(index) - int(index) % spec.shard_records
     if folder is not None:
-        data = open_dataset(folder)
+        data = opened(folder, manifest)
         if index not in data.indexes["record"]:
             raise SpecificationError(f"record {index} is not there yet: run dataset generate again")
     else:
@@ -127,6 +129,8 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
             attrs[name] = float(variable)
         elif variable.dims == ("knot",) and np.all(np.isfinite(variable.values)):
             attrs |= {f"{name}_{knot}": float(value) for knot, value in enumerate(variable.values)}
+    if spec.single:
+        _restore_limits(columns, LoadCell.from_entries(_entries(attrs)))
     if spec.friction:
         attrs["truth_friction"] = spec.friction
     if not truth:
@@ -137,3 +141,17 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
     order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
     known = {name: columns[name] for name in order if column_of(name) is not None}
     return make_record(known, rod=rod, attrs=attrs, load_cell_frame=spec.frame)
+
+
+def _entries(attrs: Mapping[str, Any]) -> dict[str, float]:
+    """The data sheet in a record's attributes."""
+    prefix = "load_cell_"
+    return {name.removeprefix(prefix): value for name, value in attrs.items() if name.startswith(prefix)}
+
+
+def _restore_limits(columns: dict[str, Any], cell: LoadCell) -> None:
+    """Put readings at the end of the range back there, from where 32 bits have moved them."""
+    for name, limit in zip(CHANNELS, cell.limit, strict=True):
+        with np.errstate(over="ignore"):
+            at_limit = np.abs(columns[name]) == np.float32(limit)
+        columns[name][at_limit] = np.copysign(limit, columns[name][at_limit])

@@ -7,7 +7,7 @@ import json
 import math
 import os
 import tomllib
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -16,19 +16,52 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.datasets.families import FAMILIES, FLANKS
+from tactile_bayes.datasets.families import FAMILIES, FLANKS, Family, rule_of
 from tactile_bayes.datasets.laws import Law, law_of
-from tactile_bayes.datasets.specification_text import canonical, toml_of
-from tactile_bayes.errors import ParameterError, SpecificationError
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.datasets.specification_text import canonical, toml_of, without
+from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
+from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.rod import Rod
 
-__all__ = ["Drive", "Group", "Specification", "read_specification", "read_text"]
+__all__ = ["UNNAMED", "Drive", "Group", "Specification", "meaning", "read_specification", "read_text"]
 
 Floats = NDArray[np.float64]
 
+UNNAMED = "unnamed"
+
 _MOST_SHARDS = 1_000_000
+_MOST_NAMED = 8
+"""Keys in a refusal of one that there is not."""
+
+_LARGEST_SEED = 2**63 - 1
+
+_SCAN = {
+    "bases": [[0.0, 0.0]],
+    "directions": ["forward", "backward"],
+    "samples": 180,
+    "margin": 0.1,
+    "friction": 0.0,
+}
+_DEFAULTS = {
+    "name": UNNAMED,
+    "description": "",
+    "shard_records": 500,
+    "precision": "double",
+    "each_contour": False,
+    "scan": _SCAN,
+    "load_cell": {"frame": "fixed"},
+    "rod": {"diameter": 0.0},
+}
+"""What is meant where a key is left out; written out it says the same."""
+
+_TABLES: Mapping[str, Iterable[str]] = {
+    "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour"),
+    "rod.": ("length", "flexural_rigidity", "diameter"),
+    "scan.": ("bases", "directions", "samples", "from_degrees", "to_degrees", "margin", "friction"),
+    "load_cell.": ("frame", *LOAD_CELL_UNITS),
+}
+"""The keys of each table."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +147,13 @@ class Specification:
 
     @property
     def sha256(self) -> str:
-        """Of what the specification says; comments, layout, and whether a number is written 1 or 1.0 do not count."""
-        said = canonical(tomllib.loads(self.text))
-        return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        """Of what the specification means; see `meaning`."""
+        return hashlib.sha256(json.dumps(meaning(self.text), sort_keys=True).encode()).hexdigest()
+
+    @property
+    def has_thickness(self) -> bool:
+        """Whether the rod has a diameter, or may have one."""
+        return bool(self.rod) and (self.rod["diameter"].is_drawn or any(self.rod["diameter"].numbers))
 
     @property
     def shards(self) -> int:
@@ -137,6 +174,11 @@ class Specification:
         for b, pair in enumerate(self.bases):
             found += [(f"scan.bases[{b}][{axis}]", law) for axis, law in enumerate(pair)]
         return (*found, *((f"load_cell.{name}", law) for name, law in self.load_cell.items()))
+
+    @property
+    def combinations(self) -> int:
+        """Of the entries of all lists."""
+        return math.prod(count for _, count in self.lists)
 
     @property
     def lists(self) -> tuple[tuple[str, int], ...]:
@@ -186,12 +228,24 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
         raise SpecificationError(f"{where}: {error}") from error
 
 
+def meaning(text: str) -> dict[str, Any]:
+    """What the text of a specification says; comments, layout, whether a number is written 1 or 1.0, and whether a key
+    is left out or written with the value that it has then, do not count."""
+    said = without(_DEFAULTS, tomllib.loads(text))
+    said["contours"] = [
+        without({"weight": 1.0, **FAMILIES[group["family"]].optional}, group) for group in said["contours"]
+    ]
+    return dict(canonical(said))
+
+
 def read_text(text: str) -> Specification:
     """The specification that a TOML text states; see `read_specification`."""
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SpecificationError(f"not TOML: {error}") from error
+    if not table:
+        raise SpecificationError("it is empty: `tactile-bayes dataset example` prints one to start from")
     return _Reader(table).specification(text)
 
 
@@ -203,41 +257,38 @@ class _Reader:
 
     def specification(self, text: str) -> Specification:
         table = self.table
-        known = ("name", "description", "records", "seed", "shard_records", "precision", "each_contour")
-        _refuse_unknown(table, (*known, "contours", "rod", "scan", "load_cell"), "")
-        each = table.get("each_contour", False)
+        _refuse_unknown(table, (*_TABLES[""], "contours", "rod", "scan", "load_cell"), "")
+        each = table.get("each_contour", _DEFAULTS["each_contour"])
         if not isinstance(each, bool):
             raise SpecificationError(f"each_contour is {each!r}: write true or false")
-        precision = table.get("precision", "double")
+        precision = table.get("precision", _DEFAULTS["precision"])
         if precision not in ("double", "single"):
             raise SpecificationError(f"precision is {precision!r}: write 'double' or 'single'")
         scan = _table(table, "scan")
-        _refuse_unknown(
-            scan, ("bases", "directions", "samples", "from_degrees", "to_degrees", "margin", "friction"), "scan."
-        )
+        _refuse_unknown(scan, _TABLES["scan."], "scan.")
         load_cell = dict(_table(table, "load_cell"))
         frame = load_cell.pop("frame", "fixed")
         if not isinstance(frame, str) or frame not in FRAMES:
             raise SpecificationError(f"load_cell.frame is {frame!r}: write 'fixed' or 'turning'")
         found = Specification(
             text=text,
-            name=_text(table, "name", "unnamed"),
-            description=_text(table, "description", ""),
+            name=_text(table, "name"),
+            description=_text(table, "description"),
             records=1,
-            shard_records=_whole(table.get("shard_records", 500), "shard_records", 1, 100_000),
-            seed=_whole(table.get("seed"), "seed", 0, 2**63),
+            shard_records=_whole(table.get("shard_records", _DEFAULTS["shard_records"]), "shard_records", 1, 100_000),
+            seed=_whole(table.get("seed"), "seed", 0, _LARGEST_SEED),
             groups=self._groups(each),
             each_group=each,
             rod=self._rod(),
-            bases=_bases(scan.get("bases", [[0.0, 0.0]])),
-            directions=_directions(scan.get("directions", ["forward", "backward"])),
+            bases=_bases(scan.get("bases", _SCAN["bases"])),
+            directions=_directions(scan.get("directions", _SCAN["directions"])),
             drive=_drive(scan),
-            friction=_number(scan.get("friction", 0.0), "scan.friction", 0.0, 0.84),
+            friction=_number(scan.get("friction", _SCAN["friction"]), "scan.friction", 0.0, 0.84),
             load_cell=_load_cell(load_cell),
             frame=frame,
             single=precision == "single",
         )
-        turns = math.prod(count for _, count in found.lists)
+        turns = found.combinations
         records = table.get("records", turns if found.lists else None)
         records = _whole(records, "records", 1, _MOST_SHARDS * found.shard_records)
         if records % turns:
@@ -248,6 +299,10 @@ class _Reader:
 
     def _groups(self, each: bool) -> tuple[Group, ...]:
         groups = self.table.get("contours")
+        if isinstance(groups, dict):
+            raise SpecificationError(
+                "contours is one table: write [[contours]], in two pairs of brackets, for each family"
+            )
         if not isinstance(groups, list) or not groups or not all(isinstance(group, dict) for group in groups):
             raise SpecificationError("there are no contours: give at least one table [[contours]], with its family")
         found = []
@@ -256,8 +311,9 @@ class _Reader:
             name = group.get("family")
             if not isinstance(name, str) or name not in FAMILIES:
                 joined = f"{' or '.join(FLANKS)} on either side, as in 'parabola/circle'"
+                found_is = f"is {name!r}" if "family" in group else "is missing"
                 raise SpecificationError(
-                    f"{key}.family is {name!r}: choose from {', '.join(FLANKS)}, shape-free, or two flanks ({joined})"
+                    f"{key}.family {found_is}: choose from {', '.join(FLANKS)}, shape-free, or two flanks ({joined})"
                 )
             family = FAMILIES[name]
             _refuse_unknown(group, ("family", "weight", *family.parameters, *family.optional), f"{key}.")
@@ -272,19 +328,20 @@ class _Reader:
             names = (*family.parameters, *family.optional)
             laws = {parameter: law_of(values[parameter], f"{key}.{parameter}") for parameter in names}
             _refuse_negative({n: law for n, law in laws.items() if n in ("radius", "length_scale")}, f"{key}.")
+            _refuse_no_contour(family, laws, key)
             found.append(Group(name, weight, laws))
         return tuple(found)
 
     def _rod(self) -> dict[str, Law]:
         rod = _table(self.table, "rod")
-        _refuse_unknown(rod, ("length", "flexural_rigidity", "diameter"), "rod.")
+        _refuse_unknown(rod, _TABLES["rod."], "rod.")
         if not rod:
             return {}
         if "length" not in rod or "flexural_rigidity" not in rod:
             raise SpecificationError(
                 "rod needs length [m] and flexural_rigidity [N m²]; without [rod] lengths are in rod lengths"
             )
-        laws = {name: law_of(rod.get(name, 0.0), f"rod.{name}") for name in ("length", "flexural_rigidity", "diameter")}
+        laws = {name: law_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
         _refuse_negative(laws, "rod.", or_zero={"diameter"})
         try:
             Rod(*(law.at(np.full(1, 0.5), np.zeros(1, dtype=np.intp))[0] for law in laws.values()))
@@ -294,8 +351,10 @@ class _Reader:
 
 
 def _load_cell(table: Mapping[str, Any]) -> dict[str, Law]:
-    _refuse_unknown(table, LOAD_CELL_UNITS, "load_cell.")
+    _refuse_unknown(table, _TABLES["load_cell."], "load_cell.")
     laws = {name: law_of(value, f"load_cell.{name}") for name, value in table.items()}
+    if any(name.startswith("ornstein_uhlenbeck") for name in laws):
+        laws.setdefault("ornstein_uhlenbeck_time", Law("constant", (OrnsteinUhlenbeck().time,)))
     for share in (0.05, 0.5, 0.95):
         entries = {name: float(law.at(np.full(1, share), np.zeros(1, dtype=np.intp))[0]) for name, law in laws.items()}
         try:
@@ -306,6 +365,21 @@ def _load_cell(table: Mapping[str, Any]) -> dict[str, Law]:
     unsigned = {name: law for name, law in laws.items() if not name.startswith(signed)}
     _refuse_negative(unsigned, "load_cell.", or_zero=set(unsigned))
     return laws
+
+
+def _refuse_no_contour(family: Family, laws: Mapping[str, Law], key: str) -> None:
+    """Refuse parameters that no contour has, by what a law may give at its ends; draws of laws without end are
+    tried as they come."""
+    for name, law in laws.items():
+        numbers = law.numbers
+        if law.kind in ("normal", "log_normal"):
+            numbers = () if law.numbers[1] else law.numbers[:1]
+        for number in numbers:
+            try:
+                family.refuse(name, number)
+            except ContourError as error:
+                verb = "is" if law.kind == "constant" else "may be"
+                raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
 
 
 def _refuse_negative(laws: Mapping[str, Law], prefix: str, or_zero: Container[str] = ()) -> None:
@@ -337,15 +411,19 @@ def _directions(value: Any) -> tuple[str, ...]:
 
 
 def _drive(scan: Mapping[str, Any]) -> Drive:
-    samples = _whole(scan.get("samples", 180), "scan.samples", 2, 1_000_000)
-    ends = [scan.get(name) for name in ("from_degrees", "to_degrees")]
-    if all(end is None for end in ends):
-        return Drive(samples, None, None, _number(scan.get("margin", 0.1), "scan.margin", 0.0, 1.0))
-    if any(end is None for end in ends) or "margin" in scan:
-        raise SpecificationError("scan takes from_degrees and to_degrees, or a margin, and not one of each")
-    begin, end = (
-        _number(v, f"scan.{name}", -360.0, 360.0) for name, v in zip(("from_degrees", "to_degrees"), ends, strict=True)
-    )
+    samples = _whole(scan.get("samples", _SCAN["samples"]), "scan.samples", 2, 1_000_000)
+    names = ("from_degrees", "to_degrees")
+    given = [name for name in names if name in scan]
+    if not given:
+        return Drive(samples, None, None, _number(scan.get("margin", _SCAN["margin"]), "scan.margin", 0.0, 1.0))
+    if len(given) == 1:
+        missing = names[1 - names.index(given[0])]
+        raise SpecificationError(
+            f"scan.{missing} is missing: give it beside {given[0]}, or neither, and sweeps go from contact to snap-off"
+        )
+    if "margin" in scan:
+        raise SpecificationError("scan has from_degrees and to_degrees, and a margin: leave the one or the others out")
+    begin, end = (_number(scan[name], f"scan.{name}", -360.0, 360.0) for name in names)
     if not begin < end:
         raise SpecificationError(f"scan.from_degrees is {begin:g}, not below to_degrees, {end:g}")
     return Drive(samples, math.radians(begin), math.radians(end), 0.0)
@@ -358,8 +436,8 @@ def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
     return value
 
 
-def _text(table: Mapping[str, Any], key: str, default: str) -> str:
-    value = table.get(key, default)
+def _text(table: Mapping[str, Any], key: str) -> str:
+    value = table.get(key, _DEFAULTS[key])
     if not isinstance(value, str):
         raise SpecificationError(f"{key} is {value!r}: give a text")
     return value
@@ -369,7 +447,8 @@ def _whole(value: Any, key: str, least: int, most: int) -> int:
     if value is None:
         raise SpecificationError(f"{key} is missing: give a whole number")
     if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise SpecificationError(f"{key} is {value!r}: give a whole number from {least} to {most}")
+        largest = "2^63 - 1" if most == _LARGEST_SEED else most
+        raise SpecificationError(f"{key} is {value!r}: give a whole number from {least} to {largest}")
     return value
 
 
@@ -379,9 +458,17 @@ def _number(value: Any, key: str, least: float, most: float) -> float:
     return float(value)
 
 
-def _refuse_unknown(table: Mapping[str, Any], known: Any, prefix: str) -> None:
+def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
+    known = list(known)
     for key in table:
-        if key not in known:
-            near = get_close_matches(key, list(known), n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-            raise SpecificationError(f"there is no key {prefix + key!r}: {hint}")
+        if key in known:
+            continue
+        if elsewhere := [where for where, keys in _TABLES.items() if key in keys]:
+            place = f"the table [{elsewhere[0][:-1]}]" if elsewhere[0] else "the top, above the first table"
+            hint = f"its place is {place}"
+        elif near := get_close_matches(key, known, n=1):
+            hint = f"did you mean {near[0]!r}?"
+        else:
+            more = " and others: `tactile-bayes dataset example` names all" if len(known) > _MOST_NAMED else ""
+            hint = f"there are {', '.join(known[:_MOST_NAMED])}{more}"
+        raise SpecificationError(f"there is no key {prefix + key!r}: {hint}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from tactile_bayes.errors import SpecificationError
 
-__all__ = ["canonical", "toml_of"]
+__all__ = ["canonical", "differences", "toml_of", "without"]
 
 
 def canonical(value: Any) -> Any:
@@ -22,6 +22,32 @@ def canonical(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53:
         return float(value)
     return value
+
+
+def without(defaults: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    """What is said, without the keys that have their default, and without tables that have no other."""
+    found = {}
+    for key, value in said.items():
+        default = defaults.get(key)
+        if isinstance(default, Mapping):
+            value = without(default, value)
+            default = {}
+        if canonical(value) != canonical(default):
+            found[key] = value
+    return found
+
+
+def differences(one: Any, other: Any, key: str = "") -> list[tuple[str, Any, Any]]:
+    """Where two canonical values differ: the key, and both values, None where there is none."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return [
+            difference
+            for name in dict.fromkeys([*one, *other])
+            for difference in differences(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))
+        ]
+    if key == "contours" and isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        return [d for k, (a, b) in enumerate(zip(one, other, strict=True)) for d in differences(a, b, f"{key}[{k}]")]
+    return [] if one == other else [(key, one, other)]
 
 
 def toml_of(table: Mapping[str, Any]) -> str:

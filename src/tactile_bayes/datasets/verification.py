@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,12 +18,25 @@ from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification import Specification, read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
 
-__all__ = ["verify"]
+__all__ = ["Verification", "verify"]
 
 _CHUNK = 2**22
 
 
-def verify(path: str | os.PathLike[str], *, regenerate: int = 0) -> Manifest:
+class Verification(NamedTuple):
+    """How far a data set is verified."""
+
+    files: int
+    """Files that are as they were written, or came out the same when they were made again."""
+    wanted: int
+
+
+def verify(
+    path: str | os.PathLike[str],
+    *,
+    regenerate: int = 0,
+    progress: Callable[[Verification], object] | None = None,
+) -> Manifest:
     """Check every byte of a data set against its manifest.
 
     Parameters
@@ -31,6 +46,8 @@ def verify(path: str | os.PathLike[str], *, regenerate: int = 0) -> Manifest:
     regenerate : int
         How many shards, evenly spread, are made again and compared number by number: with other versions of the
         libraries they may differ in the last digit.
+    progress : callable, optional
+        Is given a `Verification` after each file, and after each that was made again.
 
     Returns
     -------
@@ -50,9 +67,22 @@ def verify(path: str | os.PathLike[str], *, regenerate: int = 0) -> Manifest:
     manifest = read_manifest(folder)
     spec = read_text(manifest.specification)
     if spec.sha256 != manifest.specification_sha256:
-        raise SpecificationError(f"{folder}: the manifest's specification is not the one that its checksum states")
+        raise SpecificationError(
+            f"{folder}: the manifest's specification is not the one that its checksum states: put a copy of the "
+            "manifest back, or make the data set again in another folder"
+        )
+    again = np.unique(np.linspace(0, len(manifest.shards) - 1, min(regenerate, len(manifest.shards))).astype(int))
+    done, wanted = 0, len(manifest.shards) + again.size
+
+    def note() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(Verification(done, wanted))
+
     for shard in manifest.shards:
         _check(folder / shard.file, shard.sha256)
+        note()
     if manifest.card_sha256:
         _check(folder / CARD, manifest.card_sha256)
     listed = {shard.file for shard in manifest.shards}
@@ -64,9 +94,9 @@ def verify(path: str | os.PathLike[str], *, regenerate: int = 0) -> Manifest:
     if not (manifest.is_complete and manifest.card_sha256):
         have = sum(shard.records for shard in manifest.shards)
         raise SpecificationError(f"{folder} has {have} of {manifest.records} records: run dataset generate again")
-    chosen = np.unique(np.linspace(0, len(manifest.shards) - 1, min(regenerate, len(manifest.shards))).astype(int))
-    for number in chosen.tolist() if regenerate else []:
+    for number in again.tolist():
         _compare(spec, manifest, folder, number)
+        note()
     return manifest
 
 
