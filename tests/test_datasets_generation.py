@@ -11,13 +11,11 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.data_sets import PLAIN, RICH, changed
-from tactile_bayes import scanning
 from tactile_bayes.contours import Circle
 from tactile_bayes.datasets import contour_of, read_specification, record
 from tactile_bayes.datasets.families import FAMILIES
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
-from tactile_bayes.datasets.strain import LARGEST_STRAIN
 from tactile_bayes.errors import ParameterError, SpecificationError, StrainWarning
 from tactile_bayes.record import in_frame
 
@@ -393,7 +391,6 @@ def test_records_whose_rod_is_strained_beyond_the_model_are_counted(diameter):
             scan = tb.scan(contour_of(one), rod=tb.Rod(0.2, 0.0024, diameter))
             largest[i] = [scan.events[direction].largest_strain for direction in ("forward", "backward")]
     np.testing.assert_allclose(records.sweep["largest_strain"], largest, rtol=0.01)
-    assert LARGEST_STRAIN == scanning._LARGEST_STRAIN
     assert records.strained == np.count_nonzero(np.any(largest > 0.1, axis=1))
     assert (records.strained == 12) == (diameter == 0.05)
     stored = records_as_dataset(said, records).truth_largest_strain

@@ -9,7 +9,10 @@ from typing import TypeGuard
 
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["Rod"]
+__all__ = ["LARGEST_STRAIN", "Rod"]
+
+LARGEST_STRAIN = 0.1
+"""Bending strain up to which a rod is slender and its bending moment proportional to its curvature."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from tactile_bayes.elastica import wrench_from_contact
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
 from tactile_bayes.path import Paths, States
 from tactile_bayes.record import COLUMNS, make_record
-from tactile_bayes.rod import Rod
+from tactile_bayes.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.sweep_events import SweepEvents, events_of
 from tactile_bayes.sweep_path import Direction, friction_angle_of, seen_from, sweep_paths
 from tactile_bayes.world import in_world
@@ -32,9 +32,6 @@ _MARGIN = 15
 
 _COARSEST = 0.5
 """Steps of the drive [rad] above this are taken for degrees: a sweep would have a handful of samples."""
-
-_LARGEST_STRAIN = 0.1
-"""Bending strain up to which a rod is slender and its bending moment proportional to its curvature."""
 
 
 class _ByDirection(dict[str, SweepEvents]):
@@ -270,9 +267,9 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
             ClearanceWarning,
             stacklevel=3,
         )
-    if sweep.largest_strain > _LARGEST_STRAIN:
+    if sweep.largest_strain > LARGEST_STRAIN:
         warnings.warn(
-            f"{where} the rod is strained by {sweep.largest_strain:.3g}: beyond {_LARGEST_STRAIN:g} it is neither "
+            f"{where} the rod is strained by {sweep.largest_strain:.3g}: beyond {LARGEST_STRAIN:g} it is neither "
             "slender nor linearly elastic, and the loads are not to be trusted; take a thinner or longer rod",
             StrainWarning,
             stacklevel=3,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactile_bayes.datasets.laws import Law
 from tactile_bayes.datasets.manifest import Manifest
 from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.datasets.strain import LARGEST_STRAIN
+from tactile_bayes.rod import LARGEST_STRAIN
 
 __all__ = ["CARD", "card"]
 

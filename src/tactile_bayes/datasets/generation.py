@@ -16,10 +16,11 @@ from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS, rule_of
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.datasets.strain import LARGEST_STRAIN, largest_strain
+from tactile_bayes.datasets.strain import largest_strain
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.path import Paths, Reach, trace
 from tactile_bayes.reach import clear_angle
+from tactile_bayes.rod import LARGEST_STRAIN
 from tactile_bayes.sweeps import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
 __all__ = ["Records", "generate_records"]

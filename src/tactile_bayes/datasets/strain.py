@@ -8,12 +8,9 @@ from numpy.typing import NDArray
 from tactile_bayes.elastica import largest_curvature
 from tactile_bayes.path import Paths
 
-__all__ = ["LARGEST_STRAIN", "largest_strain"]
+__all__ = ["largest_strain"]
 
 Floats = NDArray[np.float64]
-
-LARGEST_STRAIN = 0.1
-"""Bending strain up to which a rod is slender and its bending moment proportional to its curvature, as for `scan`."""
 
 _STATES = 9
 """On each stretch of a path, of which the largest strain is taken."""
