@@ -120,6 +120,11 @@ def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_p
         assert (tmp_path / line.split()[-1]).stat().st_size > 0
 
 
+def test_a_run_may_be_given_a_time(record, tmp_path):
+    result = call("infer", record, "--out", tmp_path / "run", "--max-seconds", 0.1, "--quiet")
+    assert "NOT CONVERGED, the time allowed ran out" in result.stdout
+
+
 @pytest.mark.usefixtures("quick")
 def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
     result = call("demo", "--out", tmp_path / "demo")

@@ -59,6 +59,9 @@ def infer(
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)] = 0.0,
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
+    max_seconds: Annotated[
+        float | None, typer.Option(help="Time for sampling, at most [s]; what is there by then is the result.")
+    ] = None,
     seed: Seed = 1,
     quiet: Quiet = False,
 ) -> None:
@@ -107,7 +110,7 @@ def infer(
             friction=friction,
             probability=probability,
             seed=seed,
-            settings=SamplerSettings(max_steps=max_steps),
+            settings=SamplerSettings(max_steps=max_steps, max_seconds=max_seconds),
             progress=progress,
         )
     _print_run(run, {})

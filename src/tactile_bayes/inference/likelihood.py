@@ -64,7 +64,8 @@ class RecordLikelihood:
         if load_cell.drive_angle_noise or load_cell.drive_angle_resolution:
             raise ParameterError(
                 "the load cell's drive_angle_noise and drive_angle_resolution have no place in the likelihood of a "
-                "record: give a cell without them, and what they do to the loads as force_noise and moment_noise"
+                "record yet: give a cell without them (infer --force-noise ... --moment-noise ...), with what they do "
+                "to the loads in force_noise and moment_noise"
             )
         self.load_cell = load_cell.dimensionless(self.rod)
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
