@@ -16,7 +16,7 @@ from helpers.contact_posteriors import CELL, SI_CELL, measured
 from tactile_bayes import plotting
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.contacts import infer_contacts
+from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.plotting import contact_ellipses, contact_regions
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.uncertainty.contact_region import contact_region

@@ -30,7 +30,7 @@ _HOMES = {
     "equilibria": "scanning",
     "gap": "uncertainty.gap",
     "in_frame": "record",
-    "infer_contacts": "inference.contacts",
+    "infer_contacts": "inference.contact_posterior",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
     "make_record": "record",
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from tactile_bayes import elastica as elastica
     from tactile_bayes import errors as errors
     from tactile_bayes import plotting as plotting
-    from tactile_bayes.inference.contacts import infer_contacts as infer_contacts
+    from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
     from tactile_bayes.inference.point_load import infer_point_load as infer_point_load

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.contact_density import ContactDensity, ContactPrior
-from tactile_bayes.inference.contact_draws import (
+from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
+from tactile_bayes.inference.contact_posterior.draws import (
     CHAINS,
     EMCEE,
     EMCEE_SETTINGS,
@@ -24,7 +24,7 @@ from tactile_bayes.inference.contact_draws import (
     Method,
     draw_contacts,
 )
-from tactile_bayes.inference.contact_importance import LARGEST_K, LEAST_DRAWS
+from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAST_DRAWS
 from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples

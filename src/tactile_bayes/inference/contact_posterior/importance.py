@@ -11,8 +11,8 @@ from scipy.special import logsumexp
 
 from tactile_bayes.contact_fit import fit_sheet
 from tactile_bayes.elastica import TANGENTIAL, TIP
-from tactile_bayes.inference.contact_density import ContactDensity
-from tactile_bayes.inference.contact_proposal import ContactProposal
+from tactile_bayes.inference.contact_posterior.density import ContactDensity
+from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
 from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 
 __all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]

@@ -13,7 +13,7 @@ from arviz_stats.base.array import array_stats
 from helpers.contact_posteriors import CELL, EXACT_ANGLE, NAMES, ROD, SI_CELL, measured
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
-from tactile_bayes.inference.contacts import infer_contacts
+from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.result import read_result, to_arviz, write_result
 from tactile_bayes.load_cell import LoadCell, RandomWalk

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contact_density import ContactDensity
-from tactile_bayes.inference.contact_importance import ContactWeights, weigh_contacts
+from tactile_bayes.inference.contact_posterior.density import ContactDensity
+from tactile_bayes.inference.contact_posterior.importance import ContactWeights, weigh_contacts
 from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_walkers, spawn
 
 __all__ = ["CHAINS", "EMCEE", "EMCEE_SETTINGS", "IMPORTANCE", "ContactDraws", "Method", "draw_contacts"]
