@@ -179,7 +179,7 @@ def test_no_other_contact_is_more_likely(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_other_contact_is_more_likely_of_many(kind):
     options, _ = KINDS[kind]
-    assert_nothing_is_better(some_case(125, seed=6, **options), starts=3)
+    assert_nothing_is_better(some_case(50, seed=6, **options), starts=3)
 
 
 # --- What is known of the best contact ----------------------------------------------------------------------------

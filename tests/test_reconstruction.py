@@ -275,7 +275,7 @@ def test_what_is_no_record_is_refused(swept):
 
 @pytest.mark.parametrize("friction", [1.0, -0.1, float("nan")])
 def test_impossible_friction_is_refused(swept, friction):
-    with refused(ParameterError, "give one between 0 and 0.7 (coefficient 0.84)"):
+    with refused(ParameterError, f"friction is {friction!r}: give Coulomb's coefficient, from 0 to 0.84"):
         reconstruct(swept, friction=friction)
 
 

@@ -314,7 +314,7 @@ def test_samples_near_the_edge_are_at_the_edge(swept):
     record = in_contact(swept)
     words = np.stack([reconstruct(m, method="constrained").status.values for m in noisy_records(record, FAMILIAR, 20)])
     share = (words == "at the edge").mean(axis=0)
-    assert 0.03 < share.max() < 0.9
+    assert share.max() > 0.5
     ideal = reconstruct(record, method="constrained", load_cell=FAMILIAR)
     assert (share[ideal.edge_distance.values > 6.0] == 0.0).all()
     assert (share > 0.0).sum() < 0.3 * share.size

@@ -76,7 +76,7 @@ class ContactFit(NamedTuple):
     misfit: Floats
     phase: NDArray[np.int8]
     at_edge: NDArray[np.bool_]
-    """Whether the contact lies where tip and tangential contact meet, and more likely ones lie off both sheets."""
+    """Whether the contact lies where tip and tangential contact meet, the best of both lying beyond."""
     clearance: Floats
     """Distance from the edge, in standard deviations of the coordinate that leads to it."""
     rival: Floats

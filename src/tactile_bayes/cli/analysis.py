@@ -25,7 +25,10 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only th
 def infer(
     record: Annotated[Path, typer.Argument(help="Record, .csv or .nc.")],
     out: Out,
-    family: Annotated[str, typer.Option(help="What shape the contour has: parabola or circle.")] = "parabola",
+    family: Annotated[
+        str,
+        typer.Option(help="Shape: parabola, circle, ellipse, power-law, or one for each flank: parabola/power-law."),
+    ] = "parabola",
     column: Annotated[
         list[str] | None,
         typer.Option(
@@ -207,7 +210,11 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
         console.print("No contact points: Step 2 needs all three load channels.")
     else:
         fates = Counter(run.contacts.status.values.tolist()).most_common()
-        console.print("Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates), highlight=False)
+        words = "Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates)
+        chance = run.contacts.attrs.get("misfit_probability")
+        if chance is not None and chance == chance:
+            words += f"; noise explains their misfit with probability {chance:.2g}"
+        console.print(words, highlight=False, soft_wrap=True)
     console.print()
     for what, path in {**files, **run.files}.items():
         console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)

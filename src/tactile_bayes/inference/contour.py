@@ -21,7 +21,6 @@ from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLik
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.inference.start import best_optimum, gather
 from tactile_bayes.load_cell import LoadCell, rough_noise
-from tactile_bayes.path import Reach
 from tactile_bayes.reconstruction import loaded_samples, reconstruct
 from tactile_bayes.record import (
     CHANNELS,
@@ -90,8 +89,9 @@ def infer_contour(
     ----------
     measured : xr.Dataset
         A record; SI or dimensionless, channels may be missing.
-    family : {"parabola", "circle"}
-        What shape the contour is known to have.
+    family : str
+        What shape the contour is known to have: parabola, circle, ellipse, power-law, or one for each flank, like
+        "parabola/power-law", on the left and on the right of a common vertex.
     load_cell : LoadCell, optional
         The sensor, in the record's units; by default the data sheet that the record carries. Its noise is taken as
         known up to the factor `noise_scale`, which is inferred. Without any, or if it states none for all channels,
@@ -130,10 +130,13 @@ def infer_contour(
     Notes
     -----
     The default priors follow from pivot and rod length L alone, never from what was measured. Vertex: within a rod
-    length of the pivot sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r: log-normal
-    around L/2, both with standard deviation 1 of the logarithm. noise_scale: log-normal around 1, standard deviation
-    0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Contours out of reach are
-    excluded on top.
+    length of the pivot sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r and the
+    ellipse's semi-axes a (sideways) and b: log-normal around L/2, all with standard deviation 1 of the logarithm. The
+    power law is (y − q)/w = (|x − x_c|/w)ⁿ, so that w is where the contour is as high as it is wide: log-normal around
+    L, standard deviation 1 of the logarithm; n − 1: log-normal around 1, standard deviation 0.7 of the logarithm, n
+    from 1.1 to 50. noise_scale: log-normal around 1, standard deviation 0.5 of the logarithm. Unknown noises:
+    log-uniform from 1e-6 to 10, in EI/L and EI/L². Contours out of reach, and those that the rod would still cut after
+    snap-off, are excluded on top.
 
     Examples
     --------
@@ -258,8 +261,11 @@ class _Model:
         self.priors = priors
         self.friction = friction
         self.names = (*family.parameters, *noise.names)
-        self.positive = [self.names.index(name) for name in (*family.positive, *noise.names)]
-        self.likelihood = RecordLikelihood(measured, noise.cell, friction)
+        bounds = [family.bounds.get(name, (-np.inf, np.inf)) for name in family.parameters]
+        self.low, self.high = np.array([*bounds, *[(0.0, np.inf)] * len(noise.names)]).T
+        self.likelihood = RecordLikelihood(
+            measured, noise.cell, friction, is_always_clear=family.is_always_clear and not friction
+        )
         self.deviation = self._rough_noise()
         largest = np.abs(self.likelihood.measured[:, self.present]).max(axis=0)
         quiet = np.any(self.deviation[self.present] < _QUIET * largest)
@@ -282,7 +288,8 @@ class _Model:
 
     def log_prior(self, points: Floats) -> Floats:
         logs = [self.priors[name].logpdf(points[:, i]) for i, name in enumerate(self.names)]
-        return np.where((points[:, self.positive] > 0.0).all(axis=1), np.sum(logs, axis=0), -np.inf)
+        possible = ((points > self.low) & (points < self.high)).all(axis=1)
+        return np.where(possible, np.sum(logs, axis=0), -np.inf)
 
     def log_probability(self, points: Floats) -> Floats:
         """Up to the prior's normalisation over contours within reach; −inf outside its support or reach."""
@@ -301,8 +308,7 @@ class _Model:
             drawn += count
             points = points[np.isfinite(self.log_prior(points))]
             if len(points):
-                reach = self.likelihood.paths(self.contours(points)).reach.reshape(-1, len(points))
-                found.append(points[(reach == Reach.TOUCHES).all(axis=0)])
+                found.append(points[self.likelihood.usable(self.contours(points))])
         points = np.concatenate(found)
         if not len(points):
             raise ReachError(

@@ -14,6 +14,7 @@ from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Paths, Reach, trace
+from tactile_bayes.reach import clear_angle
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
@@ -51,12 +52,21 @@ class RecordLikelihood:
         Coulomb's coefficient μ.
     order : int
         Number of Chebyshev nodes on each smooth stretch of a path; more for a load cell that is nearly free of noise.
+    is_always_clear : bool
+        Whether a rod that has snapped off is past every contour that will be asked for, so that it need not be looked
+        at. After snap-off no load is predicted, which would be wrong for others: they are excluded.
     """
 
     def __init__(
-        self, measured: xr.Dataset, load_cell: LoadCell, friction: float = 0.0, order: int = FAST_ORDER
+        self,
+        measured: xr.Dataset,
+        load_cell: LoadCell,
+        friction: float = 0.0,
+        order: int = FAST_ORDER,
+        is_always_clear: bool = True,
     ) -> None:
         self.order = order
+        self.is_always_clear = is_always_clear
         self.rod = rod_of(measured)
         self.friction_angle = float(np.arctan(friction))
         record = to_dimensionless(measured)
@@ -99,14 +109,25 @@ class RecordLikelihood:
         seen = SeenContour(contours.take(index), base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
         return trace(seen, friction_angle=self.friction_angle, order=self.order, exact_events=exact_events)
 
+    def usable(self, contours: Contour) -> NDArray[np.bool_]:
+        """Contours that every stroke can reach, and that the rod is past after snap-off, shape (n,)."""
+        return self._usable(self.paths(contours), contours.shape[0])
+
+    def _usable(self, paths: Paths, count: int) -> NDArray[np.bool_]:
+        usable = paths.reach == Reach.TOUCHES
+        if not self.is_always_clear:
+            with np.errstate(invalid="ignore"):
+                usable = usable & (paths.snap_angle > clear_angle(paths.seen))
+        return np.asarray(usable.reshape(-1, count).all(axis=0))
+
     def predict(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
-        """Noise-free loads, shape (n, samples, 3), and which contours every stroke can reach, shape (n,).
+        """Noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
 
         Forces are in the record's frame.
         """
         count = contours.shape[0]
         paths = self.paths(contours)
-        reached = (paths.reach == Reach.TOUCHES).reshape(-1, count).all(axis=0)
+        reached = self._usable(paths, count)
         loads = paths.observables(np.repeat(self._angles, count, axis=0))
         predicted = np.zeros((count, *self.measured.shape))
         for k, stroke in enumerate(self.strokes):

@@ -16,7 +16,16 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
 
-__all__ = ["posterior_draws", "provenance", "read_result", "sample_stats", "seed_words", "to_arviz", "write_result"]
+__all__ = [
+    "contact_draws",
+    "posterior_draws",
+    "provenance",
+    "read_result",
+    "sample_stats",
+    "seed_words",
+    "to_arviz",
+    "write_result",
+]
 
 
 def sample_stats(draws: Draws) -> xr.Dataset:
@@ -74,6 +83,15 @@ def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
     return result["posterior"].to_dataset()
 
 
+def contact_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
+    """The posterior group of a result of `infer_contacts`."""
+    is_xarray = isinstance(result, xr.DataTree | xr.Dataset)
+    draws = posterior_draws(result) if is_xarray else xr.Dataset()
+    if not {"chain", "draw", "sample"} <= set(draws.dims) or "contact_x" not in draws:
+        raise InferenceError("this is no result of infer_contacts: give what it returned, or its group 'posterior'")
+    return draws
+
+
 def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
     """Write a posterior to a NetCDF file, whole or not at all.
 
@@ -93,6 +111,11 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
     ...     read_result(path)["posterior"].sizes["draw"]
     100
     """
+    if Path(path).suffix != ".nc":
+        raise InferenceError(f"{path}: a result is written as NetCDF, give a name that ends in .nc")
+    if not isinstance(result, xr.DataTree):
+        raise InferenceError("this is no result: give the tree that infer_contour or infer_contacts has returned")
+    posterior_draws(result)
     with write_atomically(path) as temporary:
         result.to_netcdf(temporary, engine="h5netcdf")
 

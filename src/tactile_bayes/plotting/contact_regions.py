@@ -40,7 +40,8 @@ def contact_ellipses(
     probability : float
         Of each ellipse.
     samples : sequence of int, optional
-        Which samples; by default a dozen of those whose status is "ok", evenly spread.
+        Which samples, of which those without a contact are left out; by default a dozen of those whose status is "ok",
+        evenly spread.
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
@@ -58,6 +59,12 @@ def contact_ellipses(
     from matplotlib.patches import Ellipse
 
     _refuse_probability(probability)
+    if not (isinstance(contacts, xr.Dataset) and "contact_x_sd" in contacts):
+        raise ParameterError(
+            "this is no result of reconstruct: give what it returned; contact_regions draws posteriors"
+        )
+    if samples is not None and not np.isin(samples, np.arange(contacts.sizes["sample"])).all():
+        raise ParameterError(f"samples are numbered from 0 to {contacts.sizes['sample'] - 1}: give some of these")
     spread_x, spread_y = contacts["contact_x_sd"].values, contacts["contact_y_sd"].values
     has = np.isfinite(spread_x) & np.isfinite(spread_y)
     chosen = _spread(np.flatnonzero(has & (contacts["status"].values == "ok")), samples)
@@ -99,7 +106,8 @@ def contact_regions(
     probability : float
         Of each region.
     samples : sequence of int, optional
-        Which samples, by the coordinate "sample"; by default a dozen of those with a contact, evenly spread.
+        Which samples, by the coordinate "sample", of which those without a contact are left out; by default a dozen of
+        those with one, evenly spread. A region has the colour of its likelier phase.
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
@@ -114,11 +122,11 @@ def contact_regions(
     ParameterError
         If no sample has a contact, or the probability is not in (0, 1).
     """
-    from tactile_bayes.inference.result import posterior_draws
+    from tactile_bayes.inference.result import contact_draws
     from tactile_bayes.uncertainty.contact_region import contact_region
 
     _refuse_probability(probability)
-    draws = posterior_draws(posterior)
+    draws = contact_draws(posterior)
     x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))
     tangential = draws["tangential"].mean(("chain", "draw")).values
     has = np.isfinite(x) & np.isfinite(y)

@@ -27,6 +27,9 @@ __all__ = ["constrained_estimate", "refuse_without_noise"]
 
 Floats = NDArray[np.float64]
 
+_CLEARANCE = 2.0
+"""Standard deviations from the edge between the phases below which a contact may well be of the other one."""
+
 _MISFIT = 25.0
 """Sum of squares, of one degree of freedom, that noise exceeds in less than one of a million samples."""
 
@@ -69,7 +72,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
             bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
             bent |= np.abs(rod.place[2]) > 0.49 * np.pi
         bent |= bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
-        kinds = (~found, fit.misfit > _MISFIT, fit.at_edge, fit.rival < _RIVAL, bent)
+        kinds = (~found, fit.misfit > _MISFIT, fit.clearance < _CLEARANCE, fit.rival < _RIVAL, bent)
         status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
     return Estimate(place, covariance, phase, status, misfit, distance)
 

@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from tactile_bayes.elastica import PHASE_NAMES
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction.constrained import constrained_estimate
@@ -77,12 +77,14 @@ def reconstruct(
         makes the misfit smaller, and data beyond the corner have none, which makes it larger. In simulations 3 to 6 %
         of misfits there exceed 3.84, instead of 5 %, and their mean is 0.8 to 1.1. The attributes misfit_sum,
         misfit_samples and misfit_probability (that noise gives such a sum, or a larger one) leave out what is nearer
-        than 3; the probability is NaN where samples share errors.
+        than 3; the probability is NaN where samples share errors. Near 0 it says that rod, friction or frame are wrong,
+        or the noise is larger than stated; near 1, that it is smaller.
 
         status is one of
 
         ok
-            A contact on the rod.
+            A contact on the rod, with standard deviations that hold if rod, noise and friction are what they are said
+            to be; a wrong one shows in the misfits, not in the status.
         no contact
             The sample is not loaded; the rest is NaN.
         cut off
@@ -97,8 +99,9 @@ def reconstruct(
             The curvature vanishes only beyond the rod's end, at the point that is returned; under noise this is what
             becomes of about half of the tip contacts. With method="raw" only.
         at the edge
-            Where tip and tangential contact meet; the data lie beyond both. Standard deviations do not hold: they are
-            too large across the contour, and too small along it. With method="constrained" only.
+            Within 2 standard deviations of the change between tip and tangential contact: the contact may well be of
+            the other phase, and standard deviations do not hold. `infer_contacts` weighs both. With
+            method="constrained" only.
         either phase
             Tip and tangential contact are both likely, at different places, the one returned at most 20 times more than
             the other. `infer_contacts` weighs them. With method="constrained" only.
@@ -130,6 +133,10 @@ def reconstruct(
     """
     if method not in _METHODS:
         raise ParameterError(f"method is {method!r}: choose 'raw' or 'constrained'")
+    if not 0.0 <= friction <= np.tan(MAX_FRICTION_ANGLE):
+        raise ParameterError(
+            f"friction is {friction!r}: give Coulomb's coefficient, from 0 to {np.tan(MAX_FRICTION_ANGLE):.2f}"
+        )
     measured = with_rod(validate(measured), rod)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     samples = samples_of(measured, cell)

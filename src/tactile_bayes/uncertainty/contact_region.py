@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.inference.result import contact_draws
 
 __all__ = ["ContactRegion", "contact_region"]
 
@@ -36,6 +36,9 @@ class ContactRegion:
     _to_white: Floats
     _centre: Floats
     _bandwidth: float
+
+    def __repr__(self) -> str:
+        return f"ContactRegion(probability={self.probability:g}, {len(self.draws)} draws)"
 
     def density(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Density at places, in the region's own measure: to be compared with `level`."""
@@ -76,12 +79,18 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     probability : float
         In (0, 1).
 
+    Returns
+    -------
+    ContactRegion
+        Says of places whether it contains them, and the probability of the smallest region that does
+        (`least_probability`); `grid` is for drawing.
+
     Raises
     ------
     ParameterError
         If the probability is not in (0, 1), or there is no such sample.
     InferenceError
-        If the sample has no contact.
+        If this is no result of `infer_contacts`, or the sample has no contact.
 
     Examples
     --------
@@ -93,7 +102,7 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     """
     if not 0.0 < probability < 1.0:
         raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.9")
-    draws = posterior_draws(posterior)
+    draws = contact_draws(posterior)
     if sample not in draws["sample"].values:
         low, high = draws["sample"].values.min(), draws["sample"].values.max()
         raise ParameterError(f"there is no sample {sample!r}: the posterior has {low} to {high}")

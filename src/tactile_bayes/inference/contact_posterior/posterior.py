@@ -28,13 +28,16 @@ from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAS
 from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
-from tactile_bayes.reconstruction import samples_of
+from tactile_bayes.reconstruction import reconstruct, samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.rod import Rod
 
 __all__ = ["infer_contacts"]
 
 Floats = NDArray[np.float64]
+
+_UNLIKELY = 1e-4
+"""Probability of a misfit below which the loads are not those of the rod."""
 
 _PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
@@ -66,11 +69,15 @@ def infer_contacts(
         A record with all three load channels.
     load_cell : LoadCell, optional
         The sensor, in the record's units; by default the data sheet that the record carries. Its likelihood is used in
-        full: outliers and steps, too. What samples share, unknown bias and drift, counts as noise of each. A sample
+        full: outliers and steps, too. What samples share, unknown bias and drift, counts as noise of each (and cannot
+        be combined with outliers). A sample
         with a reading at the end of its range is left out: the load was larger, by an amount that one sample cannot
         tell.
     prior : {"flat", "polar"} or callable
-        Density over contact point and slope angle, within the rod's reach and |slope_angle| < π/2; see Notes.
+        Over contact point and slope angle, within the rod's reach and |slope_angle| < π/2; see Notes. A function takes
+        arrays contact_x, contact_y (on the object's surface, in the world's axes and the record's unit) and slope_angle
+        [rad], and returns the logarithm of a density, an array of their shape, −inf where there is no contact; it need
+        not be normalised. Flat is lambda x, y, slope: 0 * x.
     seed : int or numpy.random.SeedSequence
         The same seed, the same draws of the same samples; a sample more, or less, changes those of others, too.
     rod : Rod, optional
@@ -95,7 +102,10 @@ def infer_contacts(
         not exact, all in the record's units, and tangential (1 in tangential contact, 0 in tip contact). Draws of
         different samples are independent. Group `sample_stats`, by sample: tangential_probability, log_evidence (of the
         dimensionless sample under the prior as it stands; NaN with emcee), pareto_k, effective_draws (of the weights),
-        r_hat and ess (of emcee), engine and converged. Groups `observed_data` and `constant_data`: the record.
+        r_hat and ess (of emcee), engine (0 none, 1 importance sampling, 2 emcee) and converged (0 also without a
+        contact). Groups `observed_data` and `constant_data`: the record. Attributes: a `message` in words, and
+        misfit_probability, as `reconstruct` with method="constrained" states it: near 0 where the loads are not those
+        of the rod, and all of this does not hold.
 
     Raises
     ------
@@ -114,6 +124,10 @@ def infer_contacts(
     flat in distance from the pivot, direction and slope. It is not harmless near first contact: contacts with loads
     near zero lie within a thin shell at the end of the rod's reach, a flat prior gives that shell little room, and the
     posterior of a weak contact leans to larger loads, that is inwards. Give your own density there if you know more.
+
+    tangential_probability is what the sample says under that prior, sample by sample. It is no frequency along a sweep:
+    where a rod dwells in tip contact, as it does along parabolas, most of the samples that leave the phase open are in
+    tip contact, whatever their probabilities. The regions of contact points hold all the same.
 
     The densities are those of coordinates on the two branches (force and direction of the tip; force and arc length)
     times the volume in (contact_x, contact_y, slope_angle) that they span. With an exact drive angle the posterior is
@@ -150,6 +164,15 @@ def infer_contacts(
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = _attributes(measured, cell, seed, prior, friction, draws, method, settings, found)
     return tree
+
+
+def _chance_of_misfit(measured: xr.Dataset, cell: LoadCell, friction: float) -> float:
+    """How probable noise makes the misfit of all samples, as `reconstruct` says; NaN where it cannot."""
+    if cell.degrees_of_freedom <= 2.0:
+        return float("nan")
+    return float(
+        reconstruct(measured, method="constrained", load_cell=cell, friction=friction).attrs["misfit_probability"]
+    )
 
 
 def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -> None:
@@ -263,6 +286,9 @@ def _attributes(
             else "emcee ran out of steps"
         )
         message += f"; not converged: {failed} ({why}), see sample_stats"
+    chance = _chance_of_misfit(measured, cell, friction)
+    if chance < _UNLIKELY:
+        message += f"; THE LOADS DO NOT FIT (probability {chance:.1g}): are rod, friction, frame and noise right?"
     approximations = list(cell.approximations)
     if cell.drift is not None or any(cell.bias_uncertainty):
         approximations.append("unknown bias and drift, which samples share, count as noise of each sample")
@@ -281,6 +307,7 @@ def _attributes(
         "method": method,
         "dependence": "samples are independent of one another",
         "converged": int(failed == 0),
+        "misfit_probability": chance,
         "message": message,
         "units": measured.attrs["units"],
         "approximations": "; ".join(approximations),
