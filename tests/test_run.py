@@ -152,5 +152,7 @@ def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_
 
 
 def test_an_unknown_family_is_refused(measured, tmp_path):
-    with pytest.raises(ParameterError, match="there is no family 'ellipse': choose 'parabola' or 'circle'"):
-        analyse(measured, tmp_path, family="ellipse")
+    with pytest.raises(
+        ParameterError, match="there is no family 'blob': choose parabola, circle, ellipse, power-law, or one"
+    ):
+        analyse(measured, tmp_path, family="blob")
