@@ -55,8 +55,8 @@ class Estimate(NamedTuple):
 
     place: Floats
     """Contact point, slope angle and arc length, shape (n, 4)."""
-    covariance: Floats
-    """Of the place, shape (n, 4, 4)."""
+    covariance: Floats | None
+    """Of the place, shape (n, 4, 4); None where nothing is known of errors."""
     phase: NDArray[np.int8]
     status: NDArray[np.int8]
     """Code in `STATUSES`."""

@@ -48,9 +48,11 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
         tip = np.abs(1.0 - contact.contact_arclength) < lift
     status = np.where(samples.loaded, np.where(samples.cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
     status[found], status[beyond] = OK, BEYOND_TIP
-    covariance = np.full((delta.size, 4, 4), np.nan)
+    covariance = None
     where = np.flatnonzero(found)
-    if samples.has_noise and where.size:
+    if samples.has_noise:
+        covariance = np.full((delta.size, 4, 4), np.nan)
+    if covariance is not None and where.size:
         part, delta = reading.take(where), delta[where]
         covariance[where], deviations = _covariance(part, contact, where, delta)
         aside = [

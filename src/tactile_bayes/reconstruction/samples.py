@@ -70,27 +70,32 @@ def samples_of(measured: xr.Dataset, cell: LoadCell) -> Samples:
         loads = np.stack([corrected[name].values for name in CHANNELS], axis=-1) / units
         loads[~loaded] = 0.0
         cell = cell.dimensionless(rod)
-        inverse = np.linalg.inv(cell.gain_matrix)
-        covariance = inverse @ cell.covariance(loads) @ inverse.T
+        has_noise = bool(np.any(cell.unrest) or cell.relative_noise or cell.drive_angle_deviation)
+        covariance = np.zeros((1, 3, 3))
+        if has_noise:
+            inverse = np.linalg.inv(cell.gain_matrix)
+            covariance = inverse @ cell.covariance(loads) @ inverse.T
         leaning = np.zeros(loads.shape)
         if frame_of(measured) == "turning":
             loads[:, 1], loads[:, 2] = turned(loads[:, 1], loads[:, 2], -angle)
+            leaning[:, 1], leaning[:, 2] = -loads[:, 2], loads[:, 1]
+        if has_noise and frame_of(measured) == "turning":
             turn = np.zeros((angle.size, 3, 3))
             turn[:, 0, 0] = 1.0
             turn[:, 1, 1] = turn[:, 2, 2] = np.cos(angle)
             turn[:, 2, 1] = np.sin(angle)
             turn[:, 1, 2] = -turn[:, 2, 1]
             covariance = turn @ covariance @ np.swapaxes(turn, 1, 2)
-            leaning[:, 1], leaning[:, 2] = -loads[:, 2], loads[:, 1]
     signs = np.where(side[:, None] < 0.0, _MIRROR, 1.0)
+    if has_noise:
+        covariance = signs[:, :, None] * covariance * signs[:, None, :]
     reading = Reading(
         np.where(side < 0.0, np.pi - angle, angle),
         signs * loads,
         np.full(angle.size, cell.drive_angle_deviation),
         side[:, None] * signs * leaning,
-        signs[:, :, None] * covariance * signs[:, None, :],
+        np.broadcast_to(covariance, (angle.size, 3, 3)),
     )
-    has_noise = bool(np.any(cell.unrest) or cell.relative_noise or cell.drive_angle_deviation)
     return Samples(rod, reading, side, loaded, cut_off, has_noise)
 
 

@@ -150,11 +150,16 @@ def reconstruct(
 def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> dict[str, tuple[str, object, object]]:
     """Columns of the result, in the world's axes and the record's units."""
     rod, side = samples.rod, samples.side
-    place, covariance = _in_world(estimate, side, 0.5 * rod.diameter / rod.length_unit)
-    spread = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    tangent, normal = spread_across(covariance, place[:, 2])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        correlation = covariance[:, 0, 1] / (spread[:, 0] * spread[:, 1])
+    radius = 0.5 * rod.diameter / rod.length_unit
+    place = _in_world(estimate.place, side, radius)
+    nothing = np.full(side.size, np.nan)
+    spread, tangent, normal, correlation = [nothing] * 4, nothing, nothing, nothing
+    if estimate.covariance is not None:
+        covariance = _covariance_in_world(estimate.place, estimate.covariance, side, radius)
+        spread = list(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T)
+        tangent, normal = spread_across(covariance, place[:, 2])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            correlation = covariance[:, 0, 1] / (spread[0] * spread[1])
     length = rod.length_unit
     columns = {
         "contact_x": measured.base_x.values + place[:, 0] * length,
@@ -176,7 +181,7 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     for k, name in enumerate(("contact_x", "contact_y", "slope_angle", "contact_arclength")):
         unit, scale = ("rad", 1.0) if name == "slope_angle" else (unit_of_length, length)
         variables[f"{name}_sd"] = column(
-            spread[:, k] * scale, unit, f"standard deviation of the {COLUMNS[name].long_name}"
+            spread[k] * scale, unit, f"standard deviation of the {COLUMNS[name].long_name}"
         )
     variables["contact_xy_correlation"] = column(correlation, "1", "correlation of contact_x and contact_y")
     variables["tangent_sd"] = column(tangent * length, unit_of_length, "standard deviation along the contour")
@@ -189,19 +194,23 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     return variables
 
 
-def _in_world(estimate: Estimate, side: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Place and covariance on the object's surface, backward contacts mirrored back."""
-    place, covariance = estimate.place.copy(), estimate.covariance
+def _in_world(place: Floats, side: Floats, radius: float) -> Floats:
+    """Places on the object's surface, backward contacts mirrored back."""
+    x, y, alpha, arclength = place.T
     if radius:
-        sin, cos = np.sin(place[:, 2]), np.cos(place[:, 2])
-        place[:, 0] -= radius * sin
-        place[:, 1] += radius * cos
+        x, y = x - radius * np.sin(alpha), y + radius * np.cos(alpha)
+    return np.stack([side * x, y, side * alpha, arclength], axis=-1)
+
+
+def _covariance_in_world(place: Floats, covariance: Floats, side: Floats, radius: float) -> Floats:
+    """The same of their covariance."""
+    if radius:
         shift = np.broadcast_to(np.eye(4), covariance.shape).copy()
-        shift[:, 0, 2], shift[:, 1, 2] = -radius * cos, -radius * sin
+        shift[:, 0, 2], shift[:, 1, 2] = -radius * np.cos(place[:, 2]), -radius * np.sin(place[:, 2])
         covariance = shift @ covariance @ np.swapaxes(shift, 1, 2)
     signs = np.ones((side.size, 4))
     signs[:, 0] = signs[:, 2] = side
-    return signs * place, signs[:, :, None] * covariance * signs[:, None, :]
+    return np.asarray(signs[:, :, None] * covariance * signs[:, None, :])
 
 
 def _check(estimate: Estimate, samples: Samples, cell: LoadCell) -> dict[str, float | int]:
