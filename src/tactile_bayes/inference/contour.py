@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours import Contour
@@ -18,6 +16,7 @@ from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
 from tactile_bayes.inference.families import Family, Prior, family_named
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.noise import Noise, noise_of
 from tactile_bayes.inference.result import provenance, sample_stats
 from tactile_bayes.inference.start import best_optimum, gather
 from tactile_bayes.load_cell import LoadCell, rough_noise
@@ -48,22 +47,6 @@ _MOST_TRIALS = 50
 
 _QUIET = 3e-4
 """Noise over the largest load below which the fast interpolation of loads would be felt."""
-
-
-class _Noise(NamedTuple):
-    """What is inferred about the load cell's noise."""
-
-    cell: LoadCell
-    """In the record's units; the scale's factor applies to it."""
-    names: tuple[str, ...]
-    channels: tuple[tuple[str, ...], ...]
-    """The channels that each parameter scales."""
-    priors: dict[str, Prior]
-
-    @property
-    def inferred(self) -> tuple[str, ...]:
-        """Entries of the cell that are not known beforehand, or stated elsewhere."""
-        return ("frame", *self.names)
 
 
 def infer_contour(
@@ -152,7 +135,7 @@ def infer_contour(
     measured = with_rod(validate(measured), rod)
     settings = settings or SamplerSettings()
     chosen = family_named(family)
-    noise = _noise(measured, load_cell)
+    noise = noise_of(measured, load_cell)
     chosen_priors = {**_contour_priors(measured, chosen), **noise.priors}
     for name, prior in (priors or {}).items():
         if name not in chosen_priors:
@@ -209,7 +192,7 @@ def default_priors(
     ['a', 'q', 'x_c', 'moment_noise', 'force_noise']
     """
     measured = validate(measured)
-    return {**_contour_priors(measured, family_named(family)), **_noise(measured, load_cell).priors}
+    return {**_contour_priors(measured, family_named(family)), **noise_of(measured, load_cell).priors}
 
 
 def contours_of(draws: xr.Dataset, family: str) -> Contour:
@@ -221,24 +204,6 @@ def contours_of(draws: xr.Dataset, family: str) -> Contour:
 def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
     base = float(measured.base_x.mean()), float(measured.base_y.mean())
     return family.default_priors(base, rod_of(measured).length)
-
-
-def _noise(measured: xr.Dataset, load_cell: LoadCell | None) -> _Noise:
-    cell = load_cell or LoadCell.from_record(measured)
-    present = present_channels(measured)
-    if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
-        return _Noise(cell, ("noise_scale",), (CHANNELS,), {"noise_scale": stats.lognorm(s=0.5)})
-    if cell is not None and cell.relative_noise:
-        raise ParameterError("the load cell has relative_noise alone: state its force_noise and moment_noise as well")
-    rod = rod_of(measured)
-    sources = {"moment_noise": (("holding_moment",), rod.moment_unit), "force_noise": (CHANNELS[1:], rod.force_unit)}
-    sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}
-    return _Noise(
-        replace(cell or LoadCell(), force_noise=1.0, moment_noise=1.0),
-        tuple(sources),
-        tuple(channels for channels, _ in sources.values()),
-        {name: stats.loguniform(1e-6 * unit, 10.0 * unit) for name, (_, unit) in sources.items()},
-    )
 
 
 def _in_words(prior: Prior) -> str:
@@ -253,7 +218,7 @@ class _Model:
     """Prior times likelihood, as a function of arrays of parameters."""
 
     def __init__(
-        self, measured: xr.Dataset, family: Family, noise: _Noise, priors: Mapping[str, Prior], friction: float
+        self, measured: xr.Dataset, family: Family, noise: Noise, priors: Mapping[str, Prior], friction: float
     ) -> None:
         self.measured = measured
         self.family = family
