@@ -22,7 +22,6 @@ __all__ = [
     "ARCLENGTH",
     "DRIVE_ANGLE",
     "FORCE",
-    "LOADS",
     "PLACE",
     "PSI1",
     "Touching",
@@ -37,8 +36,8 @@ Floats = NDArray[np.float64]
 FORCE, PSI1, ARCLENGTH, DRIVE_ANGLE = range(4)
 """The coordinates, in the order in which derivatives by them stand."""
 
-LOADS = ("holding_moment", "force_x", "force_y")
 PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
+"""What `Touching.place` holds, by the names of a record's columns."""
 
 
 class Touching(NamedTuple):

@@ -9,9 +9,7 @@ from tactile_bayes.contact_fit import ContactFit, fit_contacts
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,
-    CUT_OFF,
     EITHER_PHASE,
-    NO_CONTACT,
     NO_FIT,
     NO_ZERO,
     NONLINEAR,
@@ -19,6 +17,7 @@ from tactile_bayes.reconstruction.estimate import (
     Estimate,
     bends_too_much,
     is_weak,
+    unanswered,
 )
 from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.touching import touching, touching_and_slopes
@@ -50,7 +49,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     place, covariance = np.full((count, 4), np.nan), np.full((count, 4, 4), np.nan)
     misfit, distance = np.full(count, np.nan), np.full(count, np.nan)
     phase = np.zeros(count, dtype=np.int8)
-    status = np.where(samples.loaded, np.where(samples.cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
+    status = unanswered(samples.loaded, samples.cut_off)
     with np.errstate(over="ignore"):
         usable = np.isfinite(samples.reading.loads**2).all(axis=1)
     where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)

@@ -22,6 +22,7 @@ __all__ = [
     "bends_too_much",
     "is_weak",
     "spread_across",
+    "unanswered",
 ]
 
 Floats = NDArray[np.float64]
@@ -64,6 +65,11 @@ class Estimate(NamedTuple):
     """Sum of squared deviations that is left, shape (n,)."""
     edge_distance: Floats | None = None
     """Distance from the change between tip and tangential contact, in standard deviations, shape (n,)."""
+
+
+def unanswered(loaded: NDArray[np.bool_], cut_off: NDArray[np.bool_]) -> NDArray[np.int8]:
+    """Status of samples for as long as no contact is found."""
+    return np.where(loaded, np.where(cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
 
 
 def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floats]:

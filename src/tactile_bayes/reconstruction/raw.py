@@ -9,14 +9,12 @@ from tactile_bayes.contact_fit import Reading
 from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, Contact, contact_from_wrench
 from tactile_bayes.reconstruction.estimate import (
     BEYOND_TIP,
-    CUT_OFF,
-    NO_CONTACT,
-    NO_ZERO,
     NONLINEAR,
     OK,
     Estimate,
     bends_too_much,
     is_weak,
+    unanswered,
 )
 from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.touching import place_by_wrench, touching_and_slopes
@@ -46,7 +44,7 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
         # In tangential contact the rod lies along the contour, in tip contact it ends there: which holds more nearly?
         lift = np.abs(np.sin(contact.tip_angle - contact.slope_angle))
         tip = np.abs(1.0 - contact.contact_arclength) < lift
-    status = np.where(samples.loaded, np.where(samples.cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
+    status = unanswered(samples.loaded, samples.cut_off)
     status[found], status[beyond] = OK, BEYOND_TIP
     covariance = None
     where = np.flatnonzero(found)

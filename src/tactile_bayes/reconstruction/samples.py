@@ -43,6 +43,15 @@ class Samples(NamedTuple):
     has_noise: bool
     """Whether anything is known of the errors."""
 
+    def take(self, where: NDArray[np.intp]) -> Samples:
+        """Some of the samples."""
+        return self._replace(
+            reading=self.reading.take(where),
+            side=self.side[where],
+            loaded=self.loaded[where],
+            cut_off=self.cut_off[where],
+        )
+
 
 def samples_of(measured: xr.Dataset, cell: LoadCell) -> Samples:
     """The samples of a valid record with all load channels.

@@ -18,6 +18,7 @@ from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
 from tactile_bayes.record import COLUMNS, validate, with_rod
 from tactile_bayes.rod import Rod
+from tactile_bayes.touching import PLACE
 
 __all__ = ["reconstruct"]
 
@@ -178,7 +179,7 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     }
     variables["contact_phase"] = column(np.array(PHASE_NAMES).take(estimate.phase), "1", "phase of the contact")
     variables["status"] = column(np.array(STATUSES).take(estimate.status), "1", "what became of the sample")
-    for k, name in enumerate(("contact_x", "contact_y", "slope_angle", "contact_arclength")):
+    for k, name in enumerate(PLACE):
         unit, scale = ("rad", 1.0) if name == "slope_angle" else (unit_of_length, length)
         variables[f"{name}_sd"] = column(
             spread[k] * scale, unit, f"standard deviation of the {COLUMNS[name].long_name}"

@@ -81,16 +81,7 @@ class ContactDensity:
 
     def take(self, where: NDArray[np.intp]) -> ContactDensity:
         """The density of some of the samples."""
-        samples = self.samples
-        some = Samples(
-            samples.rod,
-            samples.reading.take(where),
-            samples.side[where],
-            samples.loaded[where],
-            samples.cut_off[where],
-            samples.has_noise,
-        )
-        readings, base = self._readings.take(where), self.base[where]
+        some, readings, base = self.samples.take(where), self._readings.take(where), self.base[where]
         return ContactDensity(some, readings, base, turning=self._turning, delta=self.delta, prior=self._prior)
 
     def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
@@ -120,6 +111,11 @@ class ContactDensity:
                 density -= 0.5 * off**2 + np.log(np.sqrt(2.0 * np.pi) * reading.angle_deviation)
         density = np.where(possible.reshape(shape) & ~np.isnan(density), density, -np.inf)
         return Evaluated(density, rod.place.reshape(4, *shape))
+
+    def places(self, coordinates: Floats) -> Floats:
+        """Places of contacts by coordinates, shape (..., n, 4), as `in_world` has them."""
+        place = touching(coordinates.reshape(-1, 4), self.delta).place
+        return self.in_world(place.reshape(4, *coordinates.shape[:-1]))
 
     def in_world(self, place: Floats) -> Floats:
         """Places on the object's surface, in the record's unit and the axes of the world, shape (4, ..., n)."""

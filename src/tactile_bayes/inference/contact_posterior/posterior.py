@@ -31,6 +31,7 @@ from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.reconstruction import reconstruct, samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.rod import Rod
+from tactile_bayes.touching import PLACE
 
 __all__ = ["infer_contacts"]
 
@@ -39,7 +40,6 @@ Floats = NDArray[np.float64]
 _UNLIKELY = 1e-4
 """Probability of a misfit below which the loads are not those of the rod."""
 
-_PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
 
@@ -208,8 +208,7 @@ def _groups(
 ) -> dict[str, xr.Dataset]:
     size = measured.sizes["sample"]
     coordinates, _ = density.unfold(points)
-    found = density.at(*density.unfold(points))
-    place = density.in_world(found.place)
+    places = density.places(coordinates)
     units = measured.attrs["units"]
     dims = ("chain", "draw", "sample")
 
@@ -224,7 +223,7 @@ def _groups(
             everywhere(values),
             {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name},
         )
-        for name, values in zip(_PLACE, place, strict=True)
+        for name, values in zip(PLACE, places, strict=True)
     }
     if density.has_free_angle:
         side = density.samples.side
