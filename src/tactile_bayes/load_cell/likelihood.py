@@ -12,7 +12,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["approximations", "checked_noise_scale", "log_likelihood"]
+__all__ = ["approximations", "checked_noise_scale", "log_likelihood", "refuse_silent"]
 
 Floats = NDArray[np.float64]
 
@@ -304,13 +304,19 @@ def _present(sheet: DataSheet, readings: Floats) -> NDArray[np.intp]:
                 f"measured misses sample {int(np.argmax(absent[:, index]))} of {name}, but has others: remove the "
                 "sample, or set the whole channel to NaN"
             )
-        if sheet.noise[index] == 0:
-            source = "moment_noise" if name == "holding_moment" else "force_noise"
-            raise ParameterError(
-                f"{name} is measured, but the load cell has no noise on it: give LoadCell({source}=...) a positive "
-                "standard deviation"
-            )
+        refuse_silent(sheet, int(index))
     return present
+
+
+def refuse_silent(sheet: DataSheet, index: int) -> None:
+    """Refuse a channel that is measured without noise: no likelihood is one of it."""
+    if sheet.noise[index] == 0:
+        name = CHANNELS[index]
+        source = "moment_noise" if name == "holding_moment" else "force_noise"
+        raise ParameterError(
+            f"{name} is measured, but the load cell has no noise on it: give LoadCell({source}=...) a positive "
+            "standard deviation"
+        )
 
 
 def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: NDArray[np.intp]) -> None:

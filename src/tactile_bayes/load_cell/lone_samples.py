@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.data_sheet import DataSheet
-from tactile_bayes.load_cell.likelihood import log_likelihood
+from tactile_bayes.load_cell.likelihood import log_likelihood, refuse_silent
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["LoneSamples"]
@@ -44,13 +44,8 @@ class LoneSamples:
         self._readings = readings
         self._wandering = wandering_deviation(sheet, len(readings))
         self._wanders = bool(np.any(self._wandering))
-        for index, noise in enumerate(sheet.noise):
-            if noise == 0.0:
-                name = "moment_noise" if index == 0 else "force_noise"
-                raise ParameterError(
-                    f"{CHANNELS[index]} is measured, but the load cell has no noise on it: give LoadCell({name}=...) a "
-                    "positive standard deviation"
-                )
+        for index in range(len(CHANNELS)):
+            refuse_silent(sheet, index)
         if self._wanders:
             if math.isfinite(sheet.degrees_of_freedom):
                 raise ParameterError(
