@@ -107,6 +107,7 @@ def test_what_is_heavy_is_loaded_when_used(code):
 # --- Results --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_path):
     """As a stranger starts it, figures and all."""
     out, errors = start("infer", record, "--out", "run", "--max-steps", 50, "--quiet", cwd=tmp_path)
@@ -134,6 +135,7 @@ def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
     assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_a_file_without_header_is_told_its_rod_and_cell(record, bare, tmp_path):
     stated = call("infer", record, "--out", tmp_path / "1", "-q")

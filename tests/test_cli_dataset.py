@@ -279,7 +279,9 @@ STOPS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated"
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 @pytest.mark.parametrize("sent", STOPS)
-@pytest.mark.parametrize(("shard", "suppressed"), [(2, "ValueError"), (1, "KeyboardInterrupt")])
+@pytest.mark.parametrize(
+    ("shard", "suppressed"), [(2, "ValueError"), pytest.param(1, "KeyboardInterrupt", marks=pytest.mark.slow)]
+)
 def test_control_c_says_how_to_go_on_and_the_same_command_does(specification, tmp_path, shard, suppressed, sent):
     """At once, or after the shard if the interrupt was lost; so does a batch system's SIGTERM."""
     code, word = STOPS[sent]

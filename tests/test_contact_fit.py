@@ -172,7 +172,7 @@ def assert_nothing_is_better(case, starts):
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_other_contact_is_more_likely(kind):
     options, count = KINDS[kind]
-    assert_nothing_is_better(some_case(count, seed=5, **options), starts=1)
+    assert_nothing_is_better(some_case(count // 2, seed=5, **options), starts=1)
 
 
 @pytest.mark.slow
@@ -303,7 +303,13 @@ def test_samples_that_are_no_numbers_do_not_disturb_the_others():
     assert_same(*(ContactFit(*(column[~wrong] for column in one)) for one in (found, fit(case))), 1e-12)
 
 
-@pytest.mark.parametrize("push", [(3.0, 0.0, 0.0), (-3.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, 0.0, -4.0)])
+@pytest.mark.parametrize(
+    "push",
+    [
+        (3.0, 0.0, 0.0),
+        *(pytest.param(push, marks=pytest.mark.slow) for push in [(-3.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, 0.0, -4.0)]),
+    ],
+)
 def test_samples_far_off_any_contact_have_the_nearest(push):
     case = some_case(6, seed=15, noises=(0.02,))
     far = case._replace(reading=case.reading._replace(loads=case.reading.loads + push))

@@ -253,7 +253,7 @@ def most(alarms_of, rate):
     return int(binom.isf(1e-4, alarms_of, rate))
 
 
-@pytest.mark.parametrize("count", [10, 40])
+@pytest.mark.parametrize("count", [10, pytest.param(40, marks=pytest.mark.slow)])
 def test_false_alarms_of_the_bends_where_they_are_most_likely(count):
     """A contour's own curvature speaks against an alarm: the rate is greatest for a line."""
     rng, alarms, draws = np.random.default_rng(11), 0, 2000
@@ -264,6 +264,7 @@ def test_false_alarms_of_the_bends_where_they_are_most_likely(count):
     assert alarms <= most(draws, FALSE_ALARM)
 
 
+@pytest.mark.slow
 def test_bends_are_standard_normal_on_a_line_and_never_negative_on_a_convex_arc():
     rng, count, draws = np.random.default_rng(12), 30, 2000
     u, noise = np.sort(rng.uniform(-1, 1, count)), rng.uniform(0.5, 2.0, count)
@@ -288,7 +289,7 @@ def alarms(count, draws, arc, seed):
 
 
 @pytest.mark.parametrize("arc", [lambda x: 0.0 * x, lambda x: np.maximum(0.0, x) ** 3], ids=["line", "half a line"])
-@pytest.mark.parametrize("count", [8, 40])
+@pytest.mark.parametrize("count", [8, pytest.param(40, marks=pytest.mark.slow)])
 def test_false_alarms_with_the_scatter_estimated(count, arc):
     assert alarms(count, 150, arc, seed=13) <= most(150, FALSE_ALARM)
 

@@ -120,6 +120,7 @@ def test_progress_is_told(tmp_path):
 # ---- killed
 
 
+@pytest.mark.slow
 @on_linux
 @pytest.mark.parametrize(
     ("workers", "kills"),
@@ -195,6 +196,7 @@ def test_an_interrupt_leaves_what_is_finished(many, tmp_path, workers):
     assert hashes(out) == expected
 
 
+@pytest.mark.slow
 @on_linux
 def test_a_cluster_makes_the_same_though_a_worker_is_killed(many, tmp_path):
     """A scheduler and two workers, each a process of its own, on loopback."""
@@ -247,6 +249,7 @@ def test_no_scheduler_is_told(tmp_path, monkeypatch):
 # ---- folders
 
 
+@pytest.mark.slow
 def test_folders_with_blanks_and_relative_ones(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a spec.toml").write_text(toml_of(PLAIN), encoding="utf-8")

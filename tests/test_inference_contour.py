@@ -189,6 +189,7 @@ def test_a_record_is_predicted_in_its_own_frame():
     assert np.abs(predicted - in_frame(record, "fixed").force_x).max() > 30.0 * CELL.force_noise
 
 
+@pytest.mark.slow
 def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
     """Within 4 standard deviations of the truth: false alarm 6e-5 a number."""
     rod = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)

@@ -141,6 +141,7 @@ def test_walker_major_layout_gives_the_right_effective_sample_size():
     assert step_major > 0.5 * tau * ess
 
 
+@pytest.mark.slow
 def test_arviz_and_emcee_agree_on_a_real_run():
     """Over 100 autocorrelation times the two estimates agree within Sokal's error and emcee's bias of a few τ/n."""
     settings = SamplerSettings(walkers=16, block_steps=2000, max_steps=2000, min_ess=1e9)

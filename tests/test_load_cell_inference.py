@@ -41,6 +41,7 @@ def off_by(result):
     return {name: abs(float(draws[name].mean()) - value) / float(draws[name].std()) for name, value in TRUTH.items()}
 
 
+@pytest.mark.slow
 def test_known_errors_are_accounted_for():
     """Within 4 standard deviations, of which 80 effective draws have one right to 8 %."""
     measured, known = posterior_of(None)

@@ -115,6 +115,7 @@ def check_that_it_rises(scene):
     assert np.all(angles[:-1] <= end + 1e-12)
 
 
+@pytest.mark.slow
 @FEW
 @given(scenes())
 def test_down_to_the_snap_off(scene):

@@ -200,6 +200,7 @@ def test_the_misfit_is_chi_square_clear_of_the_edge(scenes, sensor):
     assert kstest(misfit[distance > 3.0], "chi2", (1,)).pvalue > 1e-4
 
 
+@pytest.mark.slow
 def test_the_probability_of_the_misfit_is_uniform_where_the_model_holds(swept):
     """At ordinary noise, of 100 records; at one in ten thousand."""
     ideal = in_contact(swept).isel(sample=slice(None, None, 3))

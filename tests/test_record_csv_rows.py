@@ -163,6 +163,7 @@ print(peak() - before, record.sizes["sample"])
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is counted otherwise there")
 def test_a_file_is_read_in_less_memory_than_four_times_its_size(tmp_path):
     """Few digits, so that a record is much larger than its share of the file. Larger files take relatively less."""

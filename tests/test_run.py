@@ -124,6 +124,7 @@ def test_another_rod_is_that_of_all_results(measured, tmp_path):
     np.testing.assert_array_equal(run.contacts.contact_x, expected.contact_x)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_units_do_not_matter(analysed, measured, tmp_path):
     """To the rounding of the conversion; priors and random numbers scale with the rod."""

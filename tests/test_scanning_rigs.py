@@ -243,6 +243,7 @@ def test_what_is_no_rod_is_refused(build, message):
         build()
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(
     st.floats(0.01, 10.0),
