@@ -54,6 +54,14 @@ FAMILIES = {
 }
 
 
+@pytest.mark.parametrize("n", [1.85, 1.9, 1.99])
+def test_a_vertex_that_is_almost_an_ordinary_one_is_right(n):
+    """There the rate of the parameter rises like a small power, which is as steep as a jump."""
+    power = PowerLaw(1.0, n, 0.5)
+    for contour in (power, Joined(power, power), Joined(power, Parabola(1.0, 0.5)), Joined(Parabola(1.0, 0.5), power)):
+        check(contour)
+
+
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 def test_every_family_is_right(family):
     @settings(max_examples=15, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))

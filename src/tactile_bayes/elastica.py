@@ -280,10 +280,12 @@ class QuickWrench(NamedTuple):
     force_y: Floats
 
 
-def quick_wrench(contact_x: Floats, contact_y: Floats, slope_angle: Floats, tip: NDArray[np.bool_]) -> QuickWrench:
-    """`wrench_from_contact` for frictionless forward contacts of known phase, from tables, to about 1e-9.
+def quick_wrench(
+    contact_x: Floats, contact_y: Floats, slope_angle: Floats, tip: NDArray[np.bool_], *, roughly: bool = False
+) -> QuickWrench:
+    """`wrench_from_contact` for frictionless forward contacts of known phase, from tables.
 
-    NaN where the rod cannot make the contact.
+    To about 1e-9, or `roughly`, to 3e-6. NaN where the rod cannot make the contact.
 
     Examples
     --------
@@ -299,19 +301,21 @@ def quick_wrench(contact_x: Floats, contact_y: Floats, slope_angle: Floats, tip:
     distance2 = x * x + y * y
     within = (across >= 0.0) & (along >= -1e-12)
     lies, ends = np.flatnonzero(within & ~tip), np.flatnonzero(within & tip & (distance2 <= 1.0))
-    lying = tangential_numbers(np.arctan2(across[lies], along[lies]))
+    lying = tangential_numbers(np.arctan2(across[lies], along[lies]), roughly=roughly)
     force[lies] = lying.force / distance2[lies]
     drive_angle[lies] = alpha[lies] + lying.turn
     tilt = np.maximum(np.arctan2(along[ends], across[ends]), 0.0)
-    ending = tip_numbers(np.sqrt(1.0 - distance2[ends]), tilt)
+    ending = tip_numbers(np.sqrt(1.0 - distance2[ends]), tilt, roughly=roughly)
     force[ends] = ending.force
     drive_angle[ends] = alpha[ends] + 0.5 * np.pi - ending.tilt + ending.turn
     columns = drive_angle, force * along, -force * sin, force * cos
     return QuickWrench(*(column.reshape(shape) for column in columns))
 
 
-def quick_tangential_arclength(contact_x: Floats, contact_y: Floats, slope_angle: Floats) -> Floats:
-    """`tangential_arclength` without friction, from a table, to about 1e-9.
+def quick_tangential_arclength(
+    contact_x: Floats, contact_y: Floats, slope_angle: Floats, *, roughly: bool = False
+) -> Floats:
+    """`tangential_arclength` without friction, from a table, to about 1e-9; `roughly`, to 1e-7.
 
     Examples
     --------
@@ -320,7 +324,7 @@ def quick_tangential_arclength(contact_x: Floats, contact_y: Floats, slope_angle
     """
     sin, cos = np.sin(slope_angle), np.cos(slope_angle)
     along, across = contact_x * cos + contact_y * sin, contact_y * cos - contact_x * sin
-    numbers = tangential_numbers(np.arctan2(np.maximum(across, 0.0), along))
+    numbers = tangential_numbers(np.arctan2(np.maximum(across, 0.0), along), roughly=roughly)
     return np.hypot(contact_x, contact_y) * numbers.stretch
 
 

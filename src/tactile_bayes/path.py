@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
+from tactile_bayes.accuracy import Accuracy
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, QuickWrench, Wrench, quick_wrench
-from tactile_bayes.reach import CLEARANCE, Reach, limits
+from tactile_bayes.reach import CLEARANCE, Reach, clear_angle, limits
 from tactile_bayes.roots import falling_root
 from tactile_bayes.segments import Segments, cut_path, first_of_lane, last_of_lane, polish_changes, resolved
 from tactile_bayes.snap_off import SnapOff, first_maximum, polish_fold
@@ -31,12 +32,12 @@ Index = NDArray[np.intp]
 
 CHANNELS = ("holding_moment", "force_x", "force_y")
 
-_RESOLVED, _ROUGHLY_RESOLVED = 1e-8, 1e-3
-"""Share of the change of the drive angle on a segment by which an interpolant may miss it."""
-
 _LOST, _ROUNDING = 1e-4, 1e-12
 """Shares, of what is left to the end of a segment and of all of it, by which a state may miss its drive angle for the
 interpolant to make up for it."""
+
+_BLOCK = 4096
+"""Samples interpolated at a time."""
 
 _NO_MOMENT = 1e-12
 """Holding moment [EI/L] that is none."""
@@ -54,6 +55,7 @@ class Paths:
 
     seen: SeenContour
     friction_angle: float
+    accuracy: Accuracy
     reach: NDArray[np.int8]
     distance: Floats
     """Least distance of the contour from the pivot, in rod lengths."""
@@ -72,7 +74,12 @@ class Paths:
     steadiness: Floats
     """Rate of the drive angle at the end of every segment over its mean rate, at most 1; 0 where it ends in a fold."""
     coefficients: Floats
-    """Of way along the segment, holding moment, force_x and force_y over the drive angle: (order, 4, segment)."""
+    """Of way along the segment, holding moment, force_x and force_y over the drive angle: (segment, 4, order)."""
+
+    def is_clear(self) -> NDArray[np.bool_]:
+        """Whether the straight rod is free of the object after snap-off, as far as that is known; shape (lanes,)."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.snap_angle > clear_angle(self.seen, self.accuracy))
 
     def observables(self, drive_angles: Floats) -> Floats:
         """Holding moment and forces at given drive angles; zero out of contact.
@@ -159,13 +166,24 @@ class Paths:
 
     def _interpolated(self, segment: Index, angle: Floats) -> Floats:
         """Way and loads at drive angles, shape (n, 4); `segment` grows."""
-        # Samples of a segment side by side, so that one product with its coefficients serves them all.
+        turn = self._turn(segment, angle)
         count = np.bincount(segment, minlength=self.segments.lane.size)
-        rank = np.arange(segment.size) - (np.cumsum(count) - count)[segment]
-        turn = np.zeros((count.size, int(count.max(initial=0))))
-        turn[segment, rank] = self._turn(segment, angle)
-        basis = chebyshev.polynomials(self.coefficients.shape[0], turn)
-        return np.asarray((basis @ np.moveaxis(self.coefficients, -1, 0))[segment, rank])
+        before = np.cumsum(count) - count
+        out = np.empty((segment.size, self.coefficients.shape[1]))
+        # Samples of a segment side by side, so that one product with its coefficients serves them all; segments with
+        # about as many samples side by side, and no more of them than fit into the processor's cache.
+        by_count = np.argsort(count, kind="stable")
+        some = by_count[np.searchsorted(count[by_count], 1) :]
+        while some.size:
+            most = max(1, _BLOCK // int(count[some[-1]]))
+            some, block = some[:-most], some[-most:]
+            rank = np.arange(count[block[-1]])
+            inside = rank < count[block, None]
+            sample = np.where(inside, before[block, None] + rank, before[block, None])
+            basis = chebyshev.basis(self.coefficients.shape[-1], turn[sample])
+            values = self.coefficients[block] @ basis.swapaxes(0, 1)
+            out[sample[inside]] = values.swapaxes(1, 2)[inside]
+        return out
 
     def _loaded(self, angles: Floats) -> tuple[Index, Index]:
         """Pairs of segment and sample such that the sample's angle, shape (lanes, k), lies in the segment."""
@@ -189,7 +207,7 @@ class Paths:
         chosen = self.segments.take(segment)
         begin, end, steady = self.begin_angle[segment], self.end_angle[segment], self.steadiness[segment]
         target = self._turn(segment, angle)
-        pace = chebyshev.evaluate(chebyshev.derivative(self.coefficients[:, 0, segment]), target)
+        pace = chebyshev.evaluate(chebyshev.derivative(self.coefficients[segment, 0].T), target)
 
         def short_of(i: Index, at: Floats) -> tuple[Floats, Floats]:
             some = chosen.take(i)
@@ -232,19 +250,19 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
         Whether phase changes and snap-off are computed to rounding, and states on the nodes exactly; else both are as
         good as the interpolation, which is what a likelihood needs and several times faster.
     """
-    bounds = limits(seen, friction_angle)
-    tolerance = _RESOLVED if exact_events else _ROUGHLY_RESOLVED
-    segments = cut_path(seen, bounds, friction_angle, order, tolerance)
+    accuracy = Accuracy.of(exact_events, order)
+    bounds = limits(seen, friction_angle, accuracy)
+    segments = cut_path(seen, bounds, friction_angle, order, accuracy)
     if exact_events:
         segments = polish_changes(seen, segments, friction_angle)
 
     # Over the way along the contour: drive angle and its first maximum.
     def sample(some: Segments, ways: Floats) -> Floats:
-        return _sample(seen, some, ways, friction_angle, exact_events)
+        return _sample(seen, some, ways, friction_angle, accuracy)
 
-    segments, series = resolved(segments, sample, order, tolerance)
+    segments, series = resolved(segments, sample, order, accuracy.resolved)
     angle = series[..., 0]
-    keep, stop, kind = first_maximum(segments, angle)
+    keep, stop, kind = first_maximum(segments, angle, accuracy)
     runs_out = bounds.runs_out[segments.lane[keep]] & (kind == SnapOff.THRUST)
     bounds.reach[segments.lane[keep][runs_out]] = Reach.RUNS_OUT
     there = bounds.reach[segments.lane[keep]] == Reach.TOUCHES
@@ -273,7 +291,8 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     way = _invert(angle, stop, wanted)
     segments = segments._replace(end=end_parameter)
     share = way / stop[:, None]
-    curves = np.concatenate([share[..., None], chebyshev.polynomials(order, way) @ loads.swapaxes(0, 1)], axis=-1)
+    loads_there = np.ascontiguousarray(np.moveaxis(loads, 0, -1)) @ chebyshev.basis(order, way).swapaxes(0, 1)
+    curves = chebyshev.coefficients(np.concatenate([share[:, None], loads_there], axis=1))
 
     def per_lane(values: Floats, of: NDArray[np.bool_]) -> Floats:
         out = np.full(seen.lanes, np.nan)
@@ -285,6 +304,7 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     return Paths(
         seen=seen,
         friction_angle=friction_angle,
+        accuracy=accuracy,
         reach=bounds.reach,
         distance=bounds.distance,
         first_angle=per_lane(begin_angle, first),
@@ -296,21 +316,21 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
         begin_angle=begin_angle,
         end_angle=end_angle,
         steadiness=steadiness,
-        coefficients=chebyshev.coefficients(np.moveaxis(curves, 1, -1)).swapaxes(1, 2),
+        coefficients=np.ascontiguousarray(np.moveaxis(curves, 0, -1)),
     )
 
 
-def _sample(seen: SeenContour, segments: Segments, ways: Floats, friction_angle: float, exactly: bool) -> Floats:
+def _sample(seen: SeenContour, segments: Segments, ways: Floats, friction_angle: float, accuracy: Accuracy) -> Floats:
     """Drive angle, holding moment and forces, shape (segments, 4, k), at ways, shape (segments, k)."""
     parameter, _ = segments.take(np.s_[:, None]).along(ways)
     lane, tip = segments.lane[:, None], segments.tip[:, None]
     wrench: Wrench | QuickWrench
-    if exactly or friction_angle:
+    if accuracy.exact or friction_angle:
         phase = np.where(tip, TIP, TANGENTIAL)
         wrench = exact_states(seen, lane, parameter, friction_angle, phase=phase).wrench
     else:
         locus = seen.locate(lane, parameter)
-        wrench = quick_wrench(locus.x, locus.y, locus.slope_angle, tip)
+        wrench = quick_wrench(locus.x, locus.y, locus.slope_angle, tip, roughly=accuracy.roughly)
     return np.stack([wrench.drive_angle, *(getattr(wrench, name) for name in CHANNELS)], axis=1)
 
 
@@ -319,11 +339,11 @@ def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
     order = coefficients.shape[0]
     slope = np.zeros_like(coefficients)
     slope[:-1] = chebyshev.derivative(coefficients)
-    both = np.stack([coefficients, slope]).T  # (function, order, 2)
+    both = np.ascontiguousarray(np.stack([coefficients, slope]).transpose(2, 0, 1))  # (function, 2, order)
     stop = stop[:, None]
     z = stop * chebyshev.nodes(wanted.shape[1])
     for _ in range(8):
-        value, rate = np.moveaxis(chebyshev.polynomials(order, z) @ both, -1, 0)
+        value, rate = (both @ chebyshev.basis(order, z).swapaxes(0, 1)).swapaxes(0, 1)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = (value - wanted) / rate
         z = np.clip(z - step, 0.0, stop)
@@ -335,7 +355,7 @@ def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:
     goal = wanted[which, k]
 
     def missing(i: Index, at: Floats) -> tuple[Floats, Floats]:
-        value, rate = np.einsum("np,npc->cn", chebyshev.polynomials(order, at), both[which[i]])
+        value, rate = np.einsum("pn,ncp->cn", chebyshev.basis(order, at), both[which[i]])
         return goal[i] - value, -rate
 
     z[which, k] = falling_root(missing, np.zeros(k.size), np.broadcast_to(stop, wanted.shape)[which, k])

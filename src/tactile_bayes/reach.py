@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.accuracy import Accuracy
 from tactile_bayes.contours.base import Locus
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.roots import falling_root
@@ -62,7 +63,7 @@ def seen_frame(locus: Locus) -> tuple[Floats, Floats]:
     return locus.x * cos + locus.y * sin, locus.y * cos - locus.x * sin
 
 
-def limits(seen: SeenContour, friction_angle: float) -> Limits:
+def limits(seen: SeenContour, friction_angle: float, accuracy: Accuracy) -> Limits:
     """Where the path of every lane can run, with friction angle δ [rad]."""
     lanes = np.arange(seen.lanes)
     lo, hi = seen.domain()
@@ -93,24 +94,28 @@ def limits(seen: SeenContour, friction_angle: float) -> Limits:
         return 1.0 - locus.x**2 - locus.y**2, -2.0 * along * locus.arclength_rate
 
     right_of_hi, left_of_lo = lever(lanes, hi)[0] <= 0.0, lever(lanes, lo)[0] >= 0.0
-    nearest = falling_root(lever, hi, lo)
+
+    def root(function: Callable[[Index, Floats], tuple[Floats, Floats]], positive: Floats, negative: Floats) -> Floats:
+        return falling_root(function, positive, negative, last_step=accuracy.last_step)
+
+    nearest = root(lever, hi, lo)
     nearest = np.where(right_of_hi, hi, np.where(left_of_lo, lo, nearest))
     locus = seen.locate(lanes, nearest)
     distance, below = np.hypot(locus.x, locus.y), seen_frame(locus)[1] > 0.0
 
-    tangent = falling_root(turned_less_than(0.0), hi, nearest)
+    tangent = root(turned_less_than(0.0), hi, nearest)
     at_hi, at_tangent = seen.locate(lanes, hi), seen.locate(lanes, tangent)
     tip_first = np.hypot(at_tangent.x, at_tangent.y) > 1.0
-    begin = np.where(tip_first, falling_root(within, nearest, tangent), tangent)
+    begin = np.where(tip_first, root(within, nearest, tangent), tangent)
 
     # A force that friction turns passes through the pivot only beyond the nearest point, if not out of reach.
     end = nearest
     if friction_angle:
         thrust = turned_less_than(0.5 * np.pi + friction_angle)
-        end = np.where(thrust(lanes, lo)[0] >= 0.0, lo, falling_root(thrust, nearest, lo))
+        end = np.where(thrust(lanes, lo)[0] >= 0.0, lo, root(thrust, nearest, lo))
         at_end = seen.locate(lanes, end)
         out = np.hypot(at_end.x, at_end.y) > 1.0
-        end = np.where(out, falling_root(within, nearest, end), end)
+        end = np.where(out, root(within, nearest, end), end)
 
     reach = np.full(seen.lanes, Reach.TOUCHES, dtype=np.int8)
     open_end = (seen_frame(at_hi)[1] > 0.0) & (np.hypot(at_hi.x, at_hi.y) <= 1.0)
@@ -122,11 +127,11 @@ def limits(seen: SeenContour, friction_angle: float) -> Limits:
     return Limits(reach, distance, begin, end, tip_first, end == lo)
 
 
-def clear_angle(seen: SeenContour) -> Floats:
+def clear_angle(seen: SeenContour, accuracy: Accuracy) -> Floats:
     """Drive angle of every lane from which on a straight rod is past the contour, as far as that is known.
 
     There the opposite sweep would first touch.
     """
     opposite = replace(seen, mirrored=~seen.mirrored)
-    locus = opposite.locate(np.arange(seen.lanes), limits(opposite, 0.0).begin)
+    locus = opposite.locate(np.arange(seen.lanes), limits(opposite, 0.0, accuracy).begin)
     return np.pi - np.arctan2(locus.y, locus.x)

@@ -7,14 +7,22 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["falling_root"]
+__all__ = ["ROUNDING", "falling_root"]
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+ROUNDING = 1e-14
+"""Step, as a share of the bracket, that is rounding."""
+
 
 def falling_root(
-    function: Callable[[Index, Floats], tuple[Floats, Floats]], lo: Floats, hi: Floats, start: Floats | None = None
+    function: Callable[[Index, Floats], tuple[Floats, Floats]],
+    lo: Floats,
+    hi: Floats,
+    start: Floats | None = None,
+    *,
+    last_step: float = ROUNDING,
 ) -> Floats:
     """Where functions that are positive at `lo` and not positive at `hi` change sign: Newton kept in its bracket.
 
@@ -26,31 +34,36 @@ def falling_root(
         `lo` may be greater than `hi`.
     start : ndarray, shape (n,), optional
         First guess, between them; by default the middle.
+    last_step : float
+        Step, as a share of the bracket, after which no further one is made. What is still missing then is of the order
+        of its square.
 
     Returns
     -------
     ndarray, shape (n,)
-        To 1e-14 of the bracket.
     """
-    lo, hi = lo.astype(float), hi.astype(float)
-    last_step = np.abs(hi - lo)
-    settled = 1e-14 * last_step
-    x = 0.5 * (lo + hi) if start is None else start.astype(float)
+    roots = 0.5 * (lo + hi) if start is None else start.astype(float)
+    x, before = roots, np.abs(hi - lo)
+    settled = last_step * before
     active = np.arange(lo.size)
-    for _ in range(100):
-        if not active.size:
-            break
-        value, slope = function(active, x[active])
-        positive = value > 0.0
-        lo[active] = np.where(positive, x[active], lo[active])
-        hi[active] = np.where(positive, hi[active], x[active])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = x[active] - value / slope
-        a, b = lo[active], hi[active]
-        # Steps that do not shrink by half go round in circles, for instance about a kink.
-        trusted = ((new - a) * (new - b) <= 0.0) & (np.abs(new - x[active]) <= 0.5 * last_step[active])
-        new = np.where(trusted, new, 0.5 * (a + b))
-        step = np.abs(new - x[active])
-        x[active], last_step[active] = new, step
-        active = active[(step > settled[active]) & (value != 0.0)]
-    return x
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(100):
+            if not active.size:
+                break
+            value, slope = function(active, x)
+            positive = value > 0.0
+            lo, hi = np.where(positive, x, lo), np.where(positive, hi, x)
+            new = x - value / slope
+            # Steps that do not shrink by half go round in circles, for instance about a kink.
+            trusted = ((new - lo) * (new - hi) <= 0.0) & (np.abs(new - x) <= 0.5 * before)
+            new = np.where(trusted, new, 0.5 * (lo + hi))
+            step = np.abs(new - x)
+            going = (step > settled) & (value != 0.0)
+            before = np.where(trusted, step, np.abs(hi - lo))
+            if going.all():
+                x = new
+                continue
+            roots[active] = new
+            active, x, before, lo, hi, settled = (a[going] for a in (active, new, before, lo, hi, settled))
+    roots[active] = x
+    return roots

@@ -13,7 +13,6 @@ from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.elastica import PHASE_NAMES
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.path import Reach, trace
-from tactile_bayes.reach import clear_angle
 from tactile_bayes.record import COLUMNS
 from tactile_bayes.rod import Rod
 from tactile_bayes.sweep_path import friction_angle_of
@@ -131,7 +130,7 @@ def scan_many(
     fates = np.array([_FATES[Reach(fate)] for fate in range(len(_FATES))])
     variables["status"] = ("contour", fates[paths.reach])
     with np.errstate(invalid="ignore"):
-        variables["clear"] = ("contour", paths.snap_angle > clear_angle(seen))
+        variables["clear"] = ("contour", paths.is_clear())
     variables["phases"] = ("contour", np.array(phases_of(paths), dtype=np.str_))
     for event, columns in sweep_events(paths, units).items():
         variables |= {f"{event}_{name}": labelled("contour", values, name) for name, values in columns.items()}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
+from tactile_bayes.accuracy import Accuracy
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.elastica import quick_tangential_arclength, tangential_arclength
 from tactile_bayes.reach import Limits, Reach
@@ -97,7 +98,7 @@ def resolved(
     return segments, series
 
 
-def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: int, tolerance: float) -> Segments:
+def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: int, accuracy: Accuracy) -> Segments:
     """Cut the paths that there are at knots, and where tangential contact takes exactly the rod's length."""
     lanes = np.flatnonzero(limits.reach == Reach.TOUCHES)
     begin, end = limits.begin, limits.end
@@ -113,20 +114,20 @@ def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: in
         locus = seen.locate(some.lane[:, None], some.take(np.s_[:, None]).along(ways)[0])
         if friction_angle:
             return tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0
-        return quick_tangential_arclength(locus.x, locus.y, locus.slope_angle) - 1.0
+        return quick_tangential_arclength(locus.x, locus.y, locus.slope_angle, roughly=accuracy.roughly) - 1.0
 
-    pieces, excess = resolved(pieces, excess_of, order, tolerance)
+    pieces, excess = resolved(pieces, excess_of, order, accuracy.resolved)
     grid = np.concatenate([[0.0], chebyshev.nodes(order), [1.0]])
     beyond = chebyshev.tabulate(excess, grid) > 0.0
     piece, cell = np.nonzero(beyond[:, :-1] != beyond[:, 1:])
     sign = np.where(beyond[piece, cell], 1.0, -1.0)
-    slope = chebyshev.derivative(excess)
-
-    def signed(i: Index, z: Floats) -> tuple[Floats, Floats]:
-        at = piece[i]
-        return sign[i] * chebyshev.evaluate(excess[:, at], z), sign[i] * chebyshev.evaluate(slope[:, at], z)
-
-    change = falling_root(signed, grid[cell], grid[cell + 1])
+    both = sign * chebyshev.with_slope(excess)[..., piece]
+    change = falling_root(
+        lambda i, z: chebyshev.value_and_slope(both[..., i], z),
+        grid[cell],
+        grid[cell + 1],
+        last_step=accuracy.last_step,
+    )
     owner = np.concatenate([np.arange(pieces.lane.size), piece])
     cut = np.concatenate([np.zeros(pieces.lane.size), change])
     order_of = np.lexsort((cut, owner))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
+from tactile_bayes.accuracy import Accuracy
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.roots import falling_root
 from tactile_bayes.segments import BRIEF, Segments, first_of_lane, last_of_lane, whole
@@ -31,7 +32,7 @@ class SnapOff(IntEnum):
     """The line of force has come to pass through the pivot: no holding moment is left."""
 
 
-def first_maximum(segments: Segments, angle: Floats) -> tuple[Index, Floats, NDArray[np.int8]]:
+def first_maximum(segments: Segments, angle: Floats, accuracy: Accuracy) -> tuple[Index, Floats, NDArray[np.int8]]:
     """Segments up to the first maximum of the drive angle, how far each is followed, and how the last one ends."""
     slope = chebyshev.derivative(angle)
     grid = np.linspace(0.0, 1.0, 2 * angle.shape[0] + 1)
@@ -45,15 +46,16 @@ def first_maximum(segments: Segments, angle: Floats) -> tuple[Index, Floats, NDA
     first = np.maximum.accumulate(np.where(first_of_lane(segments.lane), np.arange(before.size), 0))
     keep = np.flatnonzero((before == before[first]) & (fold | ~any_fall))
 
-    bend = chebyshev.derivative(slope)
     kept_fold = fold[keep]
     at = keep[kept_fold]
-
-    def rate(i: Index, z: Floats) -> tuple[Floats, Floats]:
-        return chebyshev.evaluate(slope[:, at[i]], z), chebyshev.evaluate(bend[:, at[i]], z)
-
+    both = chebyshev.with_slope(slope[:, at])
     stop = np.ones(keep.size)
-    stop[kept_fold] = falling_root(rate, grid[cell[at] - 1], grid[cell[at]])
+    stop[kept_fold] = falling_root(
+        lambda i, z: chebyshev.value_and_slope(both[..., i], z),
+        grid[cell[at] - 1],
+        grid[cell[at]],
+        last_step=accuracy.last_step,
+    )
     kind = np.full(keep.size, SnapOff.NEVER, dtype=np.int8)
     ends = last_of_lane(segments.lane[keep])
     kind[ends] = np.where(last_of_lane(segments.lane)[keep], SnapOff.THRUST, SnapOff.CORNER)[ends]

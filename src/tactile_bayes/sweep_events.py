@@ -8,7 +8,6 @@ import numpy as np
 
 from tactile_bayes.elastica import TANGENTIAL, TIP, Wrench, largest_curvature
 from tactile_bayes.path import Paths, SnapOff, States
-from tactile_bayes.reach import clear_angle
 from tactile_bayes.rod import Rod
 from tactile_bayes.sweep_path import Direction
 from tactile_bayes.world import in_world
@@ -94,7 +93,7 @@ def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]
     found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
-    clear = bool(paths.snap_angle[0] > clear_angle(paths.seen)[0])
+    clear = bool(paths.is_clear()[0])
     return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, _largest_strain(paths, rod))
 
 

@@ -22,6 +22,7 @@ __all__ = [
     "TangentialNumbers",
     "TipArcs",
     "TipNumbers",
+    "rough_tables",
     "tangential_arcs",
     "tangential_numbers",
     "tip_arcs",
@@ -40,6 +41,10 @@ _CHI_MAX = 3.2
 
 _TILT_MAX = 0.5 * np.pi + 0.02
 """Greatest ε1 = π/2 − ψ1 in the table of tip contacts; with friction it can be a little more."""
+
+
+_ROUGH = 16
+"""Number of coefficients in each direction of the rough tables."""
 
 
 class TangentialArcs(NamedTuple):
@@ -79,22 +84,36 @@ class TipNumbers(NamedTuple):
     """ε1 = π/2 − ψ1."""
 
 
-def tangential_numbers(angle: Floats) -> TangentialNumbers:
-    """Frictionless tangential contact straight from the table, to 1e-9: chords at `angle` ∈ [0, π/2] to the contour."""
-    table = _tangential_numbers_table()
-    basis = chebyshev.polynomials(table.shape[0], np.minimum(angle, 0.5 * np.pi) / (0.5 * np.pi))
-    force, turn, stretch = np.moveaxis(basis @ table, -1, 0)
+def tangential_numbers(angle: Floats, *, roughly: bool = False) -> TangentialNumbers:
+    """Frictionless tangential contact straight from the table: chords at `angle` ∈ [0, π/2] to the contour.
+
+    To 1e-9, or roughly, to 1e-7, from half the table.
+    """
+    table = _tangential_numbers_table()[:, : _ROUGH if roughly else None]
+    level = np.minimum(angle, 0.5 * np.pi) / (0.5 * np.pi)
+    force, turn, stretch = np.tensordot(table, chebyshev.basis(table.shape[1], level), 1)
     return TangentialNumbers(force * angle, turn * angle, stretch)
 
 
-def tip_numbers(lack: Floats, tilt: Floats) -> TipNumbers:
-    """Frictionless tip contact straight from the table, to 1e-9; arguments as for `tip_arcs`, one-dimensional."""
-    radius, table = _tip_numbers_table()
-    angle, share, by_angle, by_share = _polar(lack, tilt, radius, table.shape[0], table.shape[2])
-    values = np.einsum(
-        "nks,ns->kn", (by_angle @ table.reshape(table.shape[0], -1)).reshape(-1, 3, table.shape[2]), by_share
-    )
-    return TipNumbers(values[0] * angle, values[1] * angle, values[2] * share)
+def tip_numbers(lack: Floats, tilt: Floats, *, roughly: bool = False) -> TipNumbers:
+    """Frictionless tip contact straight from the table; arguments as for `tip_arcs`, one-dimensional.
+
+    To 1e-9, or roughly, to 3e-6, from a third of the table.
+    """
+    radius, table = _tip_numbers_table(*((_ROUGH, _ROUGH) if roughly else (28, 22)))
+    _, radii, angles = table.shape
+    angle = np.arctan2(lack, tilt)
+    by_angle = chebyshev.basis(angles, angle / (0.5 * np.pi))
+    share = np.minimum(np.hypot(lack, tilt) / (radius @ by_angle), 1.0)
+    rows = (table.reshape(-1, angles) @ by_angle).reshape(3, radii, -1)
+    force, turn, tilt1 = np.einsum("ksn,sn->kn", rows, chebyshev.basis(radii, share))
+    return TipNumbers(force * angle, turn * angle, tilt1 * share)
+
+
+def rough_tables() -> tuple[Floats, Floats, Floats]:
+    """The rough tables themselves: `TangentialNumbers` (3, angles), the greatest radius (angles,), and `TipNumbers`
+    (3, radii, angles), without what makes them vanish."""
+    return _tangential_numbers_table()[:, :_ROUGH], *_tip_numbers_table(_ROUGH, _ROUGH)
 
 
 def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:
@@ -204,11 +223,11 @@ def _tangential_table() -> Floats:
 
 @functools.cache
 def _tangential_numbers_table() -> Floats:
-    """Coefficients, shape (order, 3), of `TangentialNumbers` with what makes them vanish divided out."""
+    """Coefficients, shape (3, order), of `TangentialNumbers` with what makes them vanish divided out."""
     angle = chebyshev.nodes(28) * 0.5 * np.pi
     _, arc, _ = tangential_arcs(angle, np.full(angle.size, 0.5))
     chord = np.hypot(arc.length - arc.shortfall, arc.offset)
-    return chebyshev.coefficients(np.stack([chord**2 / angle, arc.turn / angle, arc.length / chord]))
+    return chebyshev.coefficients(np.stack([chord**2 / angle, arc.turn / angle, arc.length / chord])).T.copy()
 
 
 class _TipTable(NamedTuple):
@@ -253,12 +272,12 @@ def _tip_table() -> _TipTable:
 
 
 @functools.cache
-def _tip_numbers_table() -> tuple[Floats, Floats]:
-    """Coefficients of the greatest radius, and, shape (angles, 3, radii), of `TipNumbers` less their zeros."""
-    angle, radius, share, arcs = _tip_grid(28, 22)
+def _tip_numbers_table(angles: int, radii: int) -> tuple[Floats, Floats]:
+    """Coefficients of the greatest radius, and, shape (3, radii, angles), of `TipNumbers` less their zeros."""
+    angle, radius, share, arcs = _tip_grid(angles, radii)
     force, turn, tilt = (a.reshape(angle.size, share.size) for a in (arcs.arc.length**2, arcs.arc.turn, arcs.tilt))
     fits = [_fit(force / angle[:, None]), _fit(turn / angle[:, None]), _fit(tilt / share)]
-    return chebyshev.coefficients(radius), np.ascontiguousarray(np.stack(fits, axis=1))
+    return chebyshev.coefficients(radius), np.stack([fit.T for fit in fits])
 
 
 def _fit(values: Floats) -> Floats:

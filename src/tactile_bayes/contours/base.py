@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
 from tactile_bayes.roots import falling_root
 
@@ -20,6 +21,7 @@ __all__ = [
     "Locus",
     "Parameter",
     "Single",
+    "alike",
     "as_parameter",
     "common_shape",
     "finite",
@@ -119,6 +121,11 @@ class Contour(ABC):
         Wherever the radius of curvature jumps or the slope does there must be one; others do no harm.
         """
         return ()
+
+    @property
+    def halves(self) -> Halves | None:
+        """Both sides of a level vertex, if they have formulas that compiled code knows; any other contour has none."""
+        return None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -253,6 +260,12 @@ class Graph(Contour):
         x, g, slope, bend = np.broadcast_arrays(x, *self.derivatives(x))
         steepness = 1.0 + slope * slope
         return Locus(x, g, np.arctan(slope), np.sqrt(steepness), bend / steepness)
+
+
+def alike(*arrays: Floats) -> tuple[Floats, ...]:
+    """The arrays, broadcast to one shape: at once where they have it, since this is called in inner loops."""
+    shape = np.shape(arrays[0])
+    return arrays if all(np.shape(a) == shape for a in arrays) else np.broadcast_arrays(*arrays)
 
 
 def as_parameter(family: str, name: str, given: Any) -> Parameter:

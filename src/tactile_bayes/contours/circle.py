@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Floats, Locus, Parameter
+from tactile_bayes.contours.base import Floats, Locus, Parameter, alike
 from tactile_bayes.contours.oval import Oval
 
 __all__ = ["Circle"]
@@ -51,7 +51,7 @@ class Circle(Oval):
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = np.asarray(parameter, dtype=float)
         x, y = self.x_c + self.r * np.sin(alpha), self.q + 2.0 * self.r * np.sin(0.5 * alpha) ** 2
-        x, y, alpha, radius = np.broadcast_arrays(x, y, alpha, self.r + 0.0 * alpha)
+        x, y, alpha, radius = alike(x, y, alpha, self.r + 0.0 * alpha)
         return Locus(x, y, alpha, radius, np.ones_like(alpha))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:

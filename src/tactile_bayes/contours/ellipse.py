@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Floats, Locus, Parameter
+from tactile_bayes.contours.base import Floats, Locus, Parameter, alike
 from tactile_bayes.contours.oval import Oval
 
 __all__ = ["Ellipse"]
@@ -56,7 +56,7 @@ class Ellipse(Oval):
         a, b = self.a, self.b
         sin, cos = np.sin(t), np.cos(t)
         speed2 = (a * cos) ** 2 + (b * sin) ** 2
-        x, y, slope, speed, bend = np.broadcast_arrays(
+        x, y, slope, speed, bend = alike(
             self.x_c + a * sin,
             self.q + 2.0 * b * np.sin(0.5 * t) ** 2,
             np.arctan2(b * sin, a * cos),

@@ -19,6 +19,7 @@ from tactile_bayes.contours.base import (
     common_shape,
     refuse_unless,
 )
+from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
 
 __all__ = ["SAME_SLOPE", "Joined"]
@@ -107,6 +108,13 @@ class Joined(Contour):
     def domain(self) -> tuple[Floats, Floats]:
         before, after, edge = self._joint
         return self.left.domain[0] - before, self.right.domain[1] - after + edge
+
+    @property
+    def halves(self) -> Halves | None:
+        left, right = self.left.halves, self.right.halves
+        if self.x is not None or left is None or right is None:
+            return None
+        return Halves(left.left, right.right, left.x, left.y, has_knot=True)
 
     def end_name(self, side: Literal["left", "right"]) -> str:
         return (self.left if side == "left" else self.right).end_name(side)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.contours.base import Contour, Floats, Parameter, finite, refuse_unless
+from tactile_bayes.contours.halves import OVAL, Half, Halves
 
 __all__ = ["Oval"]
 
@@ -41,6 +42,11 @@ class Oval(Contour):
     def domain(self) -> tuple[Floats, Floats]:
         upright = np.full(self.shape, 0.5 * np.pi)
         return -upright, upright
+
+    @property
+    def halves(self) -> Halves:
+        half = Half(OVAL, *(np.asarray(axis) for axis in self.half_axes))
+        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=False)
 
     def end_name(self, side: Literal["left", "right"]) -> str:
         return "where it stands upright"

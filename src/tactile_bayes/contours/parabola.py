@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, alike, finite, refuse_unless
+from tactile_bayes.contours.halves import PARABOLA, Half, Halves
 
 __all__ = ["Parabola"]
 
@@ -56,13 +57,17 @@ class Parabola(Contour):
         steepest = np.full(self.shape, np.nextafter(0.5 * np.pi, 0.0))
         return -steepest, steepest
 
+    @property
+    def halves(self) -> Halves:
+        half = Half(PARABOLA, np.asarray(self.a), np.ones(()))
+        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=False)
+
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = np.asarray(parameter, dtype=float)
         t = np.tan(alpha)
-        radius = (1.0 + t * t) ** 1.5 / (2.0 * self.a)
-        x, y = self.x_c + t / (2.0 * self.a), self.q + t * t / (4.0 * self.a)
-        x, y, alpha, radius = np.broadcast_arrays(x, y, alpha, radius)
-        return Locus(x, y, alpha, radius, np.ones_like(alpha))
+        offset, square = t / (2.0 * self.a), 1.0 + t * t
+        x, y, radius = self.x_c + offset, self.q + 0.5 * t * offset, square * np.sqrt(square) / (2.0 * self.a)
+        return Locus(*alike(x, y, alpha, radius, np.ones(alpha.shape)))
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         alpha = np.asarray(slope_angle, dtype=float)

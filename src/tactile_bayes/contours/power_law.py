@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, alike, finite, refuse_unless
+from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
 
 __all__ = ["PowerLaw"]
 
@@ -76,6 +77,11 @@ class PowerLaw(Contour):
         return np.asarray(-np.inf), np.asarray(np.inf)
 
     @property
+    def halves(self) -> Halves:
+        half = Half(POWER_LAW, np.asarray(self.a), np.asarray(self.n))
+        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=True)
+
+    @property
     def knots(self) -> tuple[Floats, ...]:
         return (np.zeros(()),)
 
@@ -92,7 +98,7 @@ class PowerLaw(Contour):
         steep = size ** (of_slope - 1.0)
         slope = a * n * steep * p
         steepness = 1.0 + slope * slope
-        x, y, alpha, speed, bend = np.broadcast_arrays(
+        x, y, alpha, speed, bend = alike(
             self.x_c + flat * p,
             self.q + a * size**of_height,
             np.arctan(slope),

@@ -76,7 +76,9 @@ def mismatch(rate: Rate, of: Rate, stops: Floats) -> Mismatch | None:
         if finer.sum(axis=0)[tuple(lane)] > _SHRINKS * miss[at]:
             return Mismatch(float(stops[at]), float(stops[stretch + 1, *lane]), float(miss[at]), tuple(lane))
         left, right, size = (v[tuple(lane)] for v in _steepest(rate, *ends))
-        if jump is None and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(lane)]:
+        begin, end = (stop[tuple(lane)] for stop in ends)
+        inside = begin < left and right < end  # at a stop it may jump, or rise as steeply as a power of almost zero
+        if jump is None and inside and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(lane)]:
             jump = Mismatch(float(left), float(right), np.nan, tuple(lane))
     return jump
 

@@ -19,7 +19,6 @@ from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.strain import largest_strain
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.path import Paths, Reach, trace
-from tactile_bayes.reach import clear_angle
 from tactile_bayes.rod import LARGEST_STRAIN
 from tactile_bayes.sweeps import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
@@ -240,7 +239,7 @@ def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
     paths = trace(seen, friction_angle=float(np.arctan(spec.friction)), order=_ORDER)
     fate = paths.reach.reshape(sweeps, -1).max(axis=0)
     with np.errstate(invalid="ignore"):
-        clear = (paths.snap_angle > clear_angle(seen)).reshape(sweeps, -1).all(axis=0)
+        clear = paths.is_clear().reshape(sweeps, -1).all(axis=0)
     reasons = np.array([_REASONS[Reach(reach)] for reach in range(len(_REASONS))], dtype=object)[fate]
     why[built] = np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
     return why, _recorded(spec, paths, why[built] == _GOOD, _units(spec, values, lane_of, built))

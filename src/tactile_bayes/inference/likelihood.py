@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.halves import Halves
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Paths, Reach, trace
-from tactile_bayes.reach import clear_angle
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
+
+if TYPE_CHECKING:
+    from tactile_bayes.compiled.loads import Strokes
 
 __all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood"]
 
@@ -87,6 +91,8 @@ class RecordLikelihood:
         self.strokes = [
             _Stroke((float(x), float(y)), bool(b), np.flatnonzero(which == k)) for k, (x, y, b) in enumerate(kinds)
         ]
+        others = [[t.base == s.base and t.backward != s.backward for t in self.strokes] for s in self.strokes]
+        self._opposite = np.argmax(others, axis=1) if np.all(np.any(others, axis=1)) and not friction else None
         longest = max(stroke.samples.size for stroke in self.strokes)
         self._angles = np.full((len(self.strokes), longest), np.nan)
         for row, stroke in zip(self._angles, self.strokes, strict=True):
@@ -116,26 +122,64 @@ class RecordLikelihood:
     def _usable(self, paths: Paths, count: int) -> NDArray[np.bool_]:
         usable = paths.reach == Reach.TOUCHES
         if not self.is_always_clear:
-            with np.errstate(invalid="ignore"):
-                usable = usable & (paths.snap_angle > clear_angle(paths.seen))
+            usable = usable & self._is_clear(paths)
         return np.asarray(usable.reshape(-1, count).all(axis=0))
+
+    def _is_clear(self, paths: Paths) -> NDArray[np.bool_]:
+        """Where the sweep in the other direction is at hand its first contact says so."""
+        if self._opposite is None:
+            return paths.is_clear()
+        first = paths.first_angle.reshape(len(self.strokes), -1)[self._opposite]
+        with np.errstate(invalid="ignore"):
+            return np.asarray(paths.snap_angle > np.pi - first.ravel())
 
     def predict(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
         """Noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
 
         Forces are in the record's frame.
         """
+        halves = contours.halves
+        if halves is None or self.friction_angle or self.order > FAST_ORDER:
+            predicted, reached = self._by_arrays(contours)
+        else:
+            predicted, reached = self._by_compiled(halves)
+        if self._turn is not None:
+            predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], self._turn)
+        return predicted, reached
+
+    def _by_compiled(self, halves: Halves) -> tuple[Floats, NDArray[np.bool_]]:
+        """`predict`, in the pivot's frame, without friction and to `FAST_ORDER`."""
+        from tactile_bayes.compiled.loads import loads_of  # numba takes a second to load
+
+        rod = self.rod
+        return loads_of(
+            halves, self._compiled_strokes, rod.length, 0.5 * rod.diameter, is_always_clear=self.is_always_clear
+        )
+
+    @cached_property
+    def _compiled_strokes(self) -> Strokes:
+        from tactile_bayes.compiled.loads import Strokes
+
+        bases = np.array([stroke.base for stroke in self.strokes])
+        return Strokes(
+            base_x=bases[:, 0].copy(),
+            base_y=bases[:, 1].copy(),
+            backward=np.array([stroke.backward for stroke in self.strokes]),
+            first=np.cumsum([0, *(stroke.samples.size for stroke in self.strokes)]),
+            samples=np.concatenate([stroke.samples for stroke in self.strokes]),
+            angles=self._angles[~np.isnan(self._angles)],
+        )
+
+    def _by_arrays(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
+        """`predict`, in the pivot's frame, for any contour, with friction, and to any accuracy."""
         count = contours.shape[0]
         paths = self.paths(contours)
-        reached = self._usable(paths, count)
         loads = paths.observables(np.repeat(self._angles, count, axis=0))
         predicted = np.zeros((count, *self.measured.shape))
         for k, stroke in enumerate(self.strokes):
             sign = np.array([-1.0, -1.0, 1.0]) if stroke.backward else 1.0
             predicted[:, stroke.samples] = sign * loads[k * count : (k + 1) * count, : stroke.samples.size]
-        if self._turn is not None:
-            predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], self._turn)
-        return predicted, reached
+        return predicted, self._usable(paths, count)
 
     def log_likelihood(self, contours: Contour, noise_scale: Any = 1.0, *, pointwise: bool = False) -> Floats:
         """Log-likelihood of each contour, shape (n,), or of each sample under it, (n, samples); −inf out of reach.

@@ -1,0 +1,112 @@
+"""Loads of many contours in all the sweeps of a record."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.compiled.compiler import compiled, kept
+from tactile_bayes.compiled.lane import Lane, bearing, mirrored
+from tactile_bayes.compiled.limits import first_contact
+from tactile_bayes.compiled.path import Nodes, Work, follow, nodes, work
+from tactile_bayes.compiled.states import Tables, tables
+from tactile_bayes.contours.halves import OVAL, PARABOLA, Halves
+from tactile_bayes.reach import Reach
+
+__all__ = ["Strokes", "loads_of"]
+
+Floats = NDArray[np.float64]
+
+_TOUCHES = int(Reach.TOUCHES)
+
+
+class Strokes(NamedTuple):
+    """Samples that have a pivot and a direction in common lie side by side."""
+
+    base_x: Floats
+    base_y: Floats
+    backward: NDArray[np.bool_]
+    first: NDArray[np.intp]
+    """Where the samples of every stroke begin, and at last their number."""
+    samples: NDArray[np.intp]
+    """Their place in the record."""
+    angles: Floats
+    """Drive angles, as seen in forward sweeps."""
+
+
+def loads_of(
+    halves: Halves, strokes: Strokes, length: float, standoff: float, *, is_always_clear: bool
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Loads in EI/L and EI/L², zero out of contact, shape (n, samples, 3), and which contours are usable, shape (n,).
+
+    Usable are contours that every stroke reaches, and that the rod has passed once it has snapped off.
+
+    Parameters
+    ----------
+    halves : Halves
+        With parameters of shape (n,), in the same unit as bases, rod length and standoff.
+    """
+    known, on = _constants()
+    columns = (*halves.left[1:], *halves.right[1:], halves.x, halves.y)
+    contours = np.stack([np.broadcast_to(column, halves.x.shape) for column in columns], axis=1)
+    out = np.zeros((halves.x.size, strokes.samples.size, 3))
+    usable = np.ones(halves.x.size, dtype=bool)
+    kinds, room = (halves.left.kind, halves.right.kind), work(int(np.diff(strokes.first).max()))
+    rod = length, standoff
+    _fill(kinds, contours, halves.has_knot, strokes, rod, is_always_clear, known, on, room, out, usable)
+    return out, usable
+
+
+@functools.cache
+def _constants() -> tuple[Tables, Nodes]:
+    return tables(), nodes()
+
+
+@compiled
+def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tuple[float, float]:
+    if kind == PARABOLA:
+        return size * length, shape
+    if kind == OVAL:
+        return size / length, shape / length
+    return size * length ** (shape - 1.0), shape
+
+
+@kept
+def _fill(
+    kinds: tuple[int, int],
+    contours: Floats,
+    has_knot: bool,
+    strokes: Strokes,
+    rod: tuple[float, float],
+    is_always_clear: bool,
+    known: Tables,
+    on: Nodes,
+    room: Work,
+    out: Floats,
+    usable: NDArray[np.bool_],
+) -> None:
+    left, right = kinds
+    length, standoff = rod
+    for i in range(contours.shape[0]):
+        l_size, l_shape = _in_rod_lengths(left, contours[i, 0], contours[i, 1], length)
+        r_size, r_shape = _in_rod_lengths(right, contours[i, 2], contours[i, 3], length)
+        for k in range(strokes.base_x.size):
+            x, y = (contours[i, 4] - strokes.base_x[k]) / length, (contours[i, 5] - strokes.base_y[k]) / length
+            lane = Lane(left, l_size, l_shape, right, r_size, r_shape, x, y, standoff / length)
+            sign = 1.0
+            if strokes.backward[k]:
+                lane, sign = mirrored(lane), -1.0
+            of_stroke = slice(strokes.first[k], strokes.first[k + 1])
+            reach, snap = follow(
+                lane, has_knot, strokes.angles[of_stroke], strokes.samples[of_stroke], sign, known, on, room, out[i]
+            )
+            if reach != _TOUCHES:
+                usable[i] = False
+            elif not is_always_clear:
+                opposite = mirrored(lane)
+                if not snap > math.pi - bearing(opposite, first_contact(opposite)):
+                    usable[i] = False

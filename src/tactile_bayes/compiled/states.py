@@ -1,0 +1,107 @@
+"""Loads of a touching rod from the rough tables of `tactile_bayes.universal`."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.compiled.compiler import compiled
+from tactile_bayes.compiled.lane import Lane, place
+from tactile_bayes.universal import rough_tables
+
+__all__ = ["Tables", "combine", "excess", "series", "state", "tables"]
+
+Floats = NDArray[np.float64]
+
+
+class Tables(NamedTuple):
+    """Chebyshev coefficients: of force, turn and stretch in tangential contact, and of force, turn and tilt at the tip.
+
+    Those of the tip stand over angle and share of the greatest radius, which has its own series over the angle.
+    """
+
+    lying: Floats
+    radius: Floats
+    ending: Floats
+
+
+def tables() -> Tables:
+    return Tables(*(np.ascontiguousarray(table) for table in rough_tables()))
+
+
+@compiled
+def series(coefficients: Floats, z: float) -> float:
+    """A Chebyshev series on [0, 1], by Clenshaw's recurrence."""
+    twice = 4.0 * z - 2.0
+    now, before = 0.0, 0.0
+    for k in range(coefficients.size - 1, 0, -1):
+        now, before = coefficients[k] + twice * now - before, now
+    return coefficients[0] + 0.5 * twice * now - before
+
+
+@compiled
+def _polynomials(z: float, out: Floats) -> None:
+    twice = 4.0 * z - 2.0
+    out[0] = 1.0
+    out[1] = 0.5 * twice
+    for k in range(2, out.size):
+        out[k] = twice * out[k - 1] - out[k - 2]
+
+
+@compiled
+def excess(lane: Lane, p: float, lying: Floats) -> float:
+    """Arc length over the rod's that tangential contact would take, less one."""
+    x, y, sin, cos, _, _ = place(lane, p)
+    angle = math.atan2(max(y * cos - x * sin, 0.0), x * cos + y * sin)
+    return math.sqrt(x * x + y * y) * series(lying[2], min(angle / (0.5 * math.pi), 1.0)) - 1.0
+
+
+@compiled
+def combine(rows: Floats, weights: Floats, out: Floats) -> None:
+    """Σ weights[i] · rows[i], an inner loop that has no order to keep."""
+    out[:] = 0.0
+    for i in range(weights.size):
+        weight = weights[i]
+        for j in range(out.size):
+            out[j] += weight * rows[i, j]
+
+
+@compiled
+def _twice(coefficients: Floats, by_share: Floats, by_angle: Floats, row: Floats) -> float:
+    """A series in both directions."""
+    combine(coefficients, by_share, row)
+    total = 0.0
+    for a in range(row.size):
+        total += row[a] * by_angle[a]
+    return total
+
+
+@compiled
+def state(
+    lane: Lane, p: float, tip: bool, known: Tables, by_angle: Floats, by_share: Floats, row: Floats
+) -> tuple[float, float, float, float]:
+    """Drive angle, holding moment and forces of a contact; NaN where the rod cannot make it."""
+    x, y, sin, cos, _, _ = place(lane, p)
+    slope = math.atan2(sin, cos)
+    along, across = x * cos + y * sin, y * cos - x * sin
+    distance2 = x * x + y * y
+    if across < 0.0 or along < -1e-12 or (tip and distance2 > 1.0):
+        return math.nan, math.nan, math.nan, math.nan
+    if tip:
+        lack, tilt = math.sqrt(1.0 - distance2), max(math.atan2(along, across), 0.0)
+        angle = math.atan2(lack, tilt)
+        _polynomials(angle / (0.5 * math.pi), by_angle)
+        share = min(math.sqrt(lack * lack + tilt * tilt) / series(known.radius, angle / (0.5 * math.pi)), 1.0)
+        _polynomials(share, by_share)
+        force = _twice(known.ending[0], by_share, by_angle, row) * angle
+        turn = _twice(known.ending[1], by_share, by_angle, row) * angle
+        drive_angle = slope + 0.5 * math.pi - _twice(known.ending[2], by_share, by_angle, row) * share + turn
+    else:
+        angle = math.atan2(across, along)
+        level = min(angle / (0.5 * math.pi), 1.0)
+        force = series(known.lying[0], level) * angle / distance2
+        drive_angle = slope + series(known.lying[1], level) * angle
+    return drive_angle, force * along, -force * sin, force * cos
