@@ -9,10 +9,21 @@ import pytest
 import xarray as xr
 from scipy import stats
 
-from helpers.contour_posteriors import BRIEF, CELL, DEVIATIONS, MODEST, TRUTH, measured, posterior, swept, without
+from helpers.contour_posteriors import (
+    BRIEF,
+    CELL,
+    DEVIATIONS,
+    MODEST,
+    TRUTH,
+    infer_as_stated,
+    measured,
+    posterior,
+    swept,
+    without,
+)
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.contour import contours_of, default_priors, infer_contour
+from tactile_bayes.inference.contour import contours_of, default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
@@ -156,7 +167,7 @@ def coarse(contour=None, cell=CELL, seed=3, **options):
 
 def test_the_same_seed_gives_the_same_draws():
     record, brief = coarse(), replace(BRIEF, block_steps=8, max_steps=8)
-    first, again, other = (infer_contour(record, seed=seed, settings=brief) for seed in (1, 1, 2))
+    first, again, other = (infer_as_stated(record, seed=seed, settings=brief) for seed in (1, 1, 2))
     for group in ("posterior", "prior", "posterior_predictive", "events"):
         xr.testing.assert_identical(first[group].to_dataset(), again[group].to_dataset())
     assert not np.any(first["posterior"].a.values == other["posterior"].a.values)
@@ -169,8 +180,8 @@ def test_units_do_not_matter():
     rod = Rod(length=0.25, flexural_rigidity=2.4e-3)
     plain = coarse(Circle(1.0, 0.4, 0.05))
     in_si = to_si(plain, rod)
-    expected = infer_contour(plain, family="circle", seed=1, settings=BRIEF)["posterior"].to_dataset()
-    found = infer_contour(in_si, family="circle", seed=1, settings=BRIEF)["posterior"].to_dataset()
+    expected = infer_as_stated(plain, family="circle", seed=1, settings=BRIEF)["posterior"].to_dataset()
+    found = infer_as_stated(in_si, family="circle", seed=1, settings=BRIEF)["posterior"].to_dataset()
     units = {"r": (rod.length, "m"), "q": (rod.length, "m"), "x_c": (rod.length, "m")}
     for name in expected.data_vars:
         factor, unit = units.get(name, (1.0, "1"))
@@ -182,7 +193,7 @@ def test_units_do_not_matter():
 def test_a_record_is_predicted_in_its_own_frame():
     """The other frame's forces are tens of standard deviations away."""
     record = in_frame(coarse(), "turning")
-    result = infer_contour(record, seed=1, settings=BRIEF)
+    result = infer_as_stated(record, seed=1, settings=BRIEF)
     assert result.attrs["load_cell_frame"] == "turning"
     predicted = result["posterior_predictive"].force_x.mean(("chain", "draw"))
     assert np.abs(predicted - record.force_x).max() < 6.0 * CELL.force_noise
@@ -196,7 +207,7 @@ def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
     cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
     record = coarse(Parabola(2.5, 0.1), cell, rod=rod)
     record = without(record, "load_cell_force_noise", "load_cell_moment_noise")
-    result = infer_contour(record, seed=1, settings=MODEST)
+    result = infer_as_stated(record, seed=1, settings=MODEST)
     assert result.attrs["converged"], result.attrs["message"]
     truth = {"a": 2.5, "q": 0.1, "x_c": 0.0, "moment_noise": 0.25e-3, "force_noise": 3e-3}
     assert list(result["posterior"].data_vars) == list(truth)
@@ -215,7 +226,7 @@ def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
 @pytest.mark.slow
 def test_missing_channels(missing):
     """Within 4 standard deviations of the truth: false alarm 6e-5 a number."""
-    result = infer_contour(without(coarse(), *missing), seed=1, settings=MODEST)
+    result = infer_as_stated(without(coarse(), *missing), seed=1, settings=MODEST)
     assert result.attrs["converged"], result.attrs["message"]
     for name, value in {**TRUTH, "noise_scale": 1.0}.items():
         draws = result["posterior"][name]
@@ -224,7 +235,7 @@ def test_missing_channels(missing):
 
 
 def test_moment_only_in_brief():
-    result = infer_contour(without(coarse(), "force_x", "force_y"), seed=1, settings=BRIEF)
+    result = infer_as_stated(without(coarse(), "force_x", "force_y"), seed=1, settings=BRIEF)
     assert list(result["posterior_predictive"].data_vars) == ["holding_moment"]
     assert float(abs(result["posterior"].a - 0.5).max()) < 0.05
     assert float(result["posterior"].noise_scale.max()) < 3.0
@@ -232,7 +243,7 @@ def test_moment_only_in_brief():
 
 def test_several_pivots():
     record = coarse(bases=((0.0, 0.0), (0.3, 0.1)))
-    result = infer_contour(record, seed=1, settings=BRIEF)
+    result = infer_as_stated(record, seed=1, settings=BRIEF)
     assert sorted(result["events"].stroke.values) == ["backward", "backward", "forward", "forward"]
     assert float(abs(result["posterior"].a - 0.5).max()) < 0.05
 
@@ -244,7 +255,7 @@ def test_no_walker_lives_on_noise(seed):
     The standard deviation of noise_scale is 1/√(2 n), n numbers; four times that would be a walker that holds out.
     """
     record = CELL.measure(swept(Parabola(0.5, 0.7)), seed=seed)
-    result = infer_contour(record, seed=seed, settings=MODEST)
+    result = infer_as_stated(record, seed=seed, settings=MODEST)
     numbers = 3 * record.sizes["sample"]
     assert float(result["posterior"].noise_scale.std()) < 4.0 / np.sqrt(2.0 * numbers)
 
@@ -253,7 +264,7 @@ def test_no_walker_lives_on_noise(seed):
 def test_very_small_noise():
     """1e-4 of EI/L: within 4 standard deviations of the truth, the noise too; false alarm 6e-5 a number."""
     cell = LoadCell(force_noise=1e-4, moment_noise=1e-4)
-    result = infer_contour(coarse(Circle(1.0, 0.3), cell), family="circle", seed=1, settings=MODEST)
+    result = infer_as_stated(coarse(Circle(1.0, 0.3), cell), family="circle", seed=1, settings=MODEST)
     assert result.attrs["converged"], result.attrs["message"]
     for name, value in {"r": 1.0, "q": 0.3, "x_c": 0.0, "noise_scale": 1.0}.items():
         draws = result["posterior"][name]
@@ -263,7 +274,7 @@ def test_very_small_noise():
 def test_priors_that_allow_the_impossible_are_cut_off():
     """Normal priors reach below zero, where there is neither a contour nor a noise."""
     priors = {"a": stats.norm(0.3, 0.3), "noise_scale": stats.norm(0.5, 0.5), "x_c": stats.cauchy(0.0, 0.1)}
-    result = infer_contour(coarse(), seed=1, priors=priors, settings=BRIEF)
+    result = infer_as_stated(coarse(), seed=1, priors=priors, settings=BRIEF)
     assert float(result["posterior"].a.min()) > 0.0
     assert float(result["prior"].a.min()) > 0.0
     assert float(result["prior"].noise_scale.min()) > 0.0
@@ -280,14 +291,14 @@ def test_priors_that_allow_the_impossible_are_cut_off():
 )
 def test_priors_that_exclude_the_truth_are_obeyed(name, prior):
     low, high = prior.support()
-    values = infer_contour(coarse(), seed=1, priors={name: prior}, settings=BRIEF)["posterior"][name].values
+    values = infer_as_stated(coarse(), seed=1, priors={name: prior}, settings=BRIEF)["posterior"][name].values
     assert low <= values.min()
     assert values.max() <= high
 
 
 def test_priors_of_which_little_is_within_reach(monkeypatch):
-    monkeypatch.setattr("tactile_bayes.inference.contour._MOST_TRIALS", 5)
-    result = infer_contour(coarse(), seed=1, priors={"q": stats.uniform(0.0, 150.0)}, settings=BRIEF)
+    monkeypatch.setattr("tactile_bayes.inference.contour_model._MOST_TRIALS", 5)
+    result = infer_as_stated(coarse(), seed=1, priors={"q": stats.uniform(0.0, 150.0)}, settings=BRIEF)
     assert 0 < result["prior"].sizes["draw"] < 1000
     assert result["prior"].attrs["share_within_reach"] < 0.01
 
@@ -295,18 +306,18 @@ def test_priors_of_which_little_is_within_reach(monkeypatch):
 def test_what_cannot_be_is_refused():
     record = coarse()
     with pytest.raises(ParameterError, match="no parameter 'b' to give a prior: there are a, q, x_c, noise_scale"):
-        infer_contour(record, seed=1, priors={"b": stats.norm()})
+        infer_as_stated(record, seed=1, priors={"b": stats.norm()})
     with pytest.raises(ParameterError, match=r"the prior of a is 0\.5: give a frozen distribution"):
-        infer_contour(record, seed=1, priors={"a": 0.5})
+        infer_as_stated(record, seed=1, priors={"a": 0.5})
     with pytest.raises(ParameterError, match="no family 'spline'"):
-        infer_contour(record, family="spline", seed=1)
+        infer_as_stated(record, family="spline", seed=1)
     with pytest.raises(ReachError, match="the rod can reach none in every sweep: are base, rod length and units right"):
-        infer_contour(record, seed=1, priors={"q": stats.uniform(2.0, 1.0)})
+        infer_as_stated(record, seed=1, priors={"q": stats.uniform(2.0, 1.0)})
     with pytest.raises(ParameterError, match="force_x is measured, but the load cell has no noise on it"):
-        infer_contour(record, seed=1, load_cell=LoadCell(moment_noise=0.02))
+        infer_as_stated(record, seed=1, load_cell=LoadCell(moment_noise=0.02))
     for seed in (-1, "x"):
         with pytest.raises(ParameterError, match=r"seed is .*: give a whole number from 0 up"):
-            infer_contour(record, seed=seed)
+            infer_as_stated(record, seed=seed)
 
 
 def test_a_record_without_load_is_refused():
@@ -314,12 +325,12 @@ def test_a_record_without_load_is_refused():
     for name in CHANNELS:
         record[name] = 0.01 * record[name] / abs(record[name]).max()
     with pytest.raises(InferenceError, match="no sample carries a load that noise does not explain"):
-        infer_contour(record, seed=1)
+        infer_as_stated(record, seed=1)
 
 
 def test_a_very_tight_prior_is_obeyed():
     """As if a were known: within 5 prior standard deviations, and the noise is not inflated."""
-    result = infer_contour(coarse(), seed=1, priors={"a": stats.norm(0.5, 1e-5)}, settings=BRIEF)
+    result = infer_as_stated(coarse(), seed=1, priors={"a": stats.norm(0.5, 1e-5)}, settings=BRIEF)
     assert float(abs(result["posterior"].a - 0.5).max()) < 1e-4
     assert float(result["posterior"].noise_scale.max()) < 2.0
 
@@ -347,7 +358,7 @@ def test_ranks_of_the_truth_are_uniform():
         contour = Parabola(truth["a"], truth["q"], truth["x_c"])
         record = scan(contour, drive_angles=np.radians(np.arange(-60.0, 244.0, 4.0))).record
         noisy = LoadCell(force_noise=0.05 * scale, moment_noise=0.02 * scale).measure(record, seed=rng)
-        result = infer_contour(noisy, seed=k, load_cell=CELL, priors=priors, settings=settings)
+        result = infer_as_stated(noisy, seed=k, load_cell=CELL, priors=priors, settings=settings)
         row[:] = [float((result["posterior"][name] < truth[name]).mean()) for name in NAMES]
     for name, column in zip(NAMES, ranks.T, strict=True):
         assert stats.kstest(column, "uniform").pvalue > 1e-3, name

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.contour import contours_of, infer_contour
+from helpers.contour_posteriors import infer_as_stated
+from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import family_named
 from tactile_bayes.inference.likelihood import RecordLikelihood
@@ -30,7 +31,7 @@ def test_posteriors_lie_about_the_truth(name):
     """Within 4.5 posterior standard deviations: false alarm 7e-6 a number, if the posterior is right."""
     family = family_named(name)
     record = scan(family.build(*TRUTHS[name]), drive_step=np.radians(3.0)).record
-    result = infer_contour(CELL.measure(record, seed=3), family=name, seed=1, settings=SETTINGS)
+    result = infer_as_stated(CELL.measure(record, seed=3), family=name, seed=1, settings=SETTINGS)
     assert result.attrs["converged"], result.attrs["message"]
     for parameter, value in zip(family.parameters, TRUTHS[name], strict=True):
         draws = result["posterior"][parameter]

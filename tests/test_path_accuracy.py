@@ -229,7 +229,7 @@ def shot_at(scene, paths, angle, states, k):
         rest = w.tip_angle[k] + 0.1 * off * (w.drive_angle[k] - w.tip_angle[k]) if tip else 1.0 - 0.2 * off
         rest = float(rest if tip else rest * w.contact_arclength[k])
         parameter = states.parameter[k] + off * (states.parameter[k] - paths.snap_parameter[0])
-        loads, found = shot(scene, angle, parameter, (1.0 + 0.2 * off) * force, rest, tip, paths.friction_angle)
+        loads, found = shot(scene, angle, parameter, (1.0 + 0.2 * off) * force, rest, tip, paths.friction_angle[0])
         if found > paths.snap_parameter[0]:
             return loads
     raise AssertionError("no shot hit an equilibrium on the path")

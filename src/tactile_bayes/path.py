@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes import chebyshev
 from tactile_bayes.accuracy import Accuracy
@@ -54,7 +54,8 @@ class Paths:
     """
 
     seen: SeenContour
-    friction_angle: float
+    friction_angle: Floats
+    suspension_compliance: Floats
     accuracy: Accuracy
     reach: NDArray[np.int8]
     distance: Floats
@@ -75,6 +76,10 @@ class Paths:
     """Rate of the drive angle at the end of every segment over its mean rate, at most 1; 0 where it ends in a fold."""
     coefficients: Floats
     """Of way along the segment, holding moment, force_x and force_y over the drive angle: (segment, 4, order)."""
+
+    def driven_angle(self, lane: Index, wrench: Wrench) -> Floats:
+        """What the drive stands at in a state: the rod's slope at the pivot and the turn of the suspension."""
+        return np.asarray(wrench.drive_angle + self.suspension_compliance[lane] * wrench.holding_moment)
 
     def is_clear(self) -> NDArray[np.bool_]:
         """Whether the straight rod is free of the object after snap-off, as far as that is known; shape (lanes,)."""
@@ -150,7 +155,7 @@ class Paths:
         parameter = self._polish(segment, way, wanted) if polish else self.segments.take(segment).along(way)[0]
         states = self.states_at(lane, parameter)
         # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
-        rest = interpolated - self._interpolated(segment, states.wrench.drive_angle)
+        rest = interpolated - self._interpolated(segment, self.driven_angle(lane, states.wrench))
         loads = {name: getattr(states.wrench, name) + gap for name, gap in zip(CHANNELS, rest[:, 1:].T, strict=True)}
         wrench = states.wrench._replace(**loads)
         reached = wrench.phase != NONE  # but for rounding, which may undo the very first contact
@@ -207,19 +212,21 @@ class Paths:
         chosen = self.segments.take(segment)
         begin, end, steady = self.begin_angle[segment], self.end_angle[segment], self.steadiness[segment]
         target = self._turn(segment, angle)
+        stiff = self.suspension_compliance[chosen.lane] == 0.0  # else the exact rate lacks that of the moment
         pace = chebyshev.evaluate(chebyshev.derivative(self.coefficients[segment, 0].T), target)
 
         def short_of(i: Index, at: Floats) -> tuple[Floats, Floats]:
             some = chosen.take(i)
             parameter, parameter_rate = some.along(at)
             state = self.states_at(some.lane, parameter)
-            reached = np.isfinite(state.wrench.drive_angle)  # but for rounding, which may undo the very first contact
-            turn = np.where(reached, self._turn(segment[i], state.wrench.drive_angle), 0.0)
+            driven = self.driven_angle(some.lane, state.wrench)
+            reached = np.isfinite(driven)  # but for rounding, which may undo the very first contact
+            turn = np.where(reached, self._turn(segment[i], driven), 0.0)
             with np.errstate(divide="ignore", invalid="ignore"):
                 rate = angle_rate(self.seen, some.lane, state) * parameter_rate / (end[i] - begin[i])
                 newton = (steady[i] + 2.0 * (1.0 - steady[i]) * (1.0 - turn)) / rate
                 # Much nearer to the end than the goal is, the rate may be zero or rounding: the interpolant's serves.
-                sound = (1.0 - turn > 0.5 * (1.0 - target[i])) & (newton > 0.0)
+                sound = (1.0 - turn > 0.5 * (1.0 - target[i])) & (newton > 0.0) & stiff[i]
                 return target[i] - turn, -1.0 / np.where(sound, newton, pace[i])
 
         every = np.arange(way.size)
@@ -236,14 +243,23 @@ class Paths:
         return chosen.along(way)[0]
 
 
-def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, exact_events: bool = True) -> Paths:
+def trace(
+    seen: SeenContour,
+    *,
+    friction_angle: ArrayLike = 0.0,
+    suspension_compliance: ArrayLike = 0.0,
+    order: int = 16,
+    exact_events: bool = True,
+) -> Paths:
     """Follow the equilibria of every lane from first contact to snap-off.
 
     Parameters
     ----------
     seen : SeenContour
-    friction_angle : float
+    friction_angle : float or array_like, shape (lanes,)
         δ = arctan μ [rad].
+    suspension_compliance : float or array_like, shape (lanes,)
+        Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)].
     order : int
         Number of Chebyshev nodes on a segment.
     exact_events : bool
@@ -251,6 +267,9 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
         good as the interpolation, which is what a likelihood needs and several times faster.
     """
     accuracy = Accuracy.of(exact_events, order)
+    friction_angle = np.broadcast_to(np.asarray(friction_angle, dtype=float), (seen.lanes,))
+    compliance = np.broadcast_to(np.asarray(suspension_compliance, dtype=float), (seen.lanes,))
+    stiff = not np.any(compliance)
     bounds = limits(seen, friction_angle, accuracy)
     segments = cut_path(seen, bounds, friction_angle, order, accuracy)
     if exact_events:
@@ -258,7 +277,7 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
 
     # Over the way along the contour: drive angle and its first maximum.
     def sample(some: Segments, ways: Floats) -> Floats:
-        return _sample(seen, some, ways, friction_angle, accuracy)
+        return _sample(seen, some, ways, friction_angle, compliance, accuracy)
 
     segments, series = resolved(segments, sample, order, accuracy.resolved)
     angle = series[..., 0]
@@ -269,7 +288,7 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     keep, stop, kind = keep[there], stop[there], kind[there]
     segments, angle, loads = segments.take(keep), angle[:, keep], series[:, keep, 1:]
     folds = kind == SnapOff.FOLD
-    if exact_events:
+    if exact_events and stiff:
         stop = np.where(folds, polish_fold(seen, segments, angle, stop, friction_angle), stop)
 
     # Over the drive angle: where on the way it takes the values that the nodes want.
@@ -278,7 +297,8 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     end_angle = chebyshev.evaluate(angle, stop)
     if exact_events:
         at_end = exact_states(seen, segments.lane, end_parameter, friction_angle).wrench
-        end_angle = np.where(np.isfinite(at_end.drive_angle), at_end.drive_angle, end_angle)
+        driven = at_end.drive_angle + compliance[segments.lane] * at_end.holding_moment
+        end_angle = np.where(np.isfinite(driven), driven, end_angle)
         # At a flat vertex the maximum and the end of all moment are one, and rounding must not choose between them.
         kind = np.where(folds & (np.abs(at_end.holding_moment) <= _NO_MOMENT), np.int8(SnapOff.THRUST), kind)
     locus = seen.locate(segments.lane, segments.begin)
@@ -304,6 +324,7 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     return Paths(
         seen=seen,
         friction_angle=friction_angle,
+        suspension_compliance=compliance,
         accuracy=accuracy,
         reach=bounds.reach,
         distance=bounds.distance,
@@ -320,18 +341,26 @@ def trace(seen: SeenContour, *, friction_angle: float = 0.0, order: int = 16, ex
     )
 
 
-def _sample(seen: SeenContour, segments: Segments, ways: Floats, friction_angle: float, accuracy: Accuracy) -> Floats:
+def _sample(
+    seen: SeenContour,
+    segments: Segments,
+    ways: Floats,
+    friction_angle: Floats,
+    compliance: Floats,
+    accuracy: Accuracy,
+) -> Floats:
     """Drive angle, holding moment and forces, shape (segments, 4, k), at ways, shape (segments, k)."""
     parameter, _ = segments.take(np.s_[:, None]).along(ways)
     lane, tip = segments.lane[:, None], segments.tip[:, None]
     wrench: Wrench | QuickWrench
-    if accuracy.exact or friction_angle:
+    if accuracy.exact or np.any(friction_angle):
         phase = np.where(tip, TIP, TANGENTIAL)
         wrench = exact_states(seen, lane, parameter, friction_angle, phase=phase).wrench
     else:
         locus = seen.locate(lane, parameter)
         wrench = quick_wrench(locus.x, locus.y, locus.slope_angle, tip, roughly=accuracy.roughly)
-    return np.stack([wrench.drive_angle, *(getattr(wrench, name) for name in CHANNELS)], axis=1)
+    drive_angle = wrench.drive_angle + compliance[lane] * wrench.holding_moment
+    return np.stack([drive_angle, *(getattr(wrench, name) for name in CHANNELS)], axis=1)
 
 
 def _invert(coefficients: Floats, stop: Floats, wanted: Floats) -> Floats:

@@ -63,8 +63,8 @@ def seen_frame(locus: Locus) -> tuple[Floats, Floats]:
     return locus.x * cos + locus.y * sin, locus.y * cos - locus.x * sin
 
 
-def limits(seen: SeenContour, friction_angle: float, accuracy: Accuracy) -> Limits:
-    """Where the path of every lane can run, with friction angle δ [rad]."""
+def limits(seen: SeenContour, friction_angle: Floats, accuracy: Accuracy) -> Limits:
+    """Where the path of every lane can run, with friction angles δ [rad], shape (lanes,)."""
     lanes = np.arange(seen.lanes)
     lo, hi = seen.domain()
 
@@ -73,7 +73,7 @@ def limits(seen: SeenContour, friction_angle: float, accuracy: Accuracy) -> Limi
         along, facing = seen_frame(locus)
         return along, locus.arclength_rate + facing * locus.slope_rate
 
-    def turned_less_than(limit: float) -> Callable[[Index, Floats], tuple[Floats, Floats]]:
+    def turned_less_than(limit: Floats) -> Callable[[Index, Floats], tuple[Floats, Floats]]:
         """How much less than `limit` the line from the pivot is turned from the contour's direction.
 
         The farther to the left the more it is turned, as long as the contour faces the pivot.
@@ -84,7 +84,7 @@ def limits(seen: SeenContour, friction_angle: float, accuracy: Accuracy) -> Limi
             _, facing = seen_frame(locus)
             bearing = np.arctan2(-locus.x, locus.y) + 0.5 * np.pi  # it jumps below the pivot, where no contour is
             rate = facing * locus.arclength_rate / (locus.x**2 + locus.y**2) + locus.slope_rate
-            return limit - (bearing - locus.slope_angle), rate
+            return limit[lane] - (bearing - locus.slope_angle), rate
 
         return remaining
 
@@ -103,14 +103,14 @@ def limits(seen: SeenContour, friction_angle: float, accuracy: Accuracy) -> Limi
     locus = seen.locate(lanes, nearest)
     distance, below = np.hypot(locus.x, locus.y), seen_frame(locus)[1] > 0.0
 
-    tangent = root(turned_less_than(0.0), hi, nearest)
+    tangent = root(turned_less_than(np.zeros(seen.lanes)), hi, nearest)
     at_hi, at_tangent = seen.locate(lanes, hi), seen.locate(lanes, tangent)
     tip_first = np.hypot(at_tangent.x, at_tangent.y) > 1.0
     begin = np.where(tip_first, root(within, nearest, tangent), tangent)
 
     # A force that friction turns passes through the pivot only beyond the nearest point, if not out of reach.
     end = nearest
-    if friction_angle:
+    if np.any(friction_angle):
         thrust = turned_less_than(0.5 * np.pi + friction_angle)
         end = np.where(thrust(lanes, lo)[0] >= 0.0, lo, root(thrust, nearest, lo))
         at_end = seen.locate(lanes, end)
@@ -133,5 +133,5 @@ def clear_angle(seen: SeenContour, accuracy: Accuracy) -> Floats:
     There the opposite sweep would first touch.
     """
     opposite = replace(seen, mirrored=~seen.mirrored)
-    locus = opposite.locate(np.arange(seen.lanes), limits(opposite, 0.0, accuracy).begin)
+    locus = opposite.locate(np.arange(seen.lanes), limits(opposite, np.zeros(seen.lanes), accuracy).begin)
     return np.pi - np.arctan2(locus.y, locus.x)

@@ -98,7 +98,7 @@ def resolved(
     return segments, series
 
 
-def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: int, accuracy: Accuracy) -> Segments:
+def cut_path(seen: SeenContour, limits: Limits, friction_angle: Floats, order: int, accuracy: Accuracy) -> Segments:
     """Cut the paths that there are at knots, and where tangential contact takes exactly the rod's length."""
     lanes = np.flatnonzero(limits.reach == Reach.TOUCHES)
     begin, end = limits.begin, limits.end
@@ -110,10 +110,12 @@ def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: in
     unknown = np.zeros(np.count_nonzero(some), dtype=bool)
     pieces = Segments(lane[some], start[some], stop[some], unknown, unknown)
 
+    rubs = bool(np.any(friction_angle))
+
     def excess_of(some: Segments, ways: Floats) -> Floats:
         locus = seen.locate(some.lane[:, None], some.take(np.s_[:, None]).along(ways)[0])
-        if friction_angle:
-            return tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0
+        if rubs:
+            return tangential_arclength(*locus[:3], friction_angle[some.lane, None]) - 1.0
         return quick_tangential_arclength(locus.x, locus.y, locus.slope_angle, roughly=accuracy.roughly) - 1.0
 
     pieces, excess = resolved(pieces, excess_of, order, accuracy.resolved)
@@ -140,7 +142,7 @@ def cut_path(seen: SeenContour, limits: Limits, friction_angle: float, order: in
     return Segments(lane, begin + cut * span, begin + following * span, tip, rooted)
 
 
-def polish_changes(seen: SeenContour, segments: Segments, friction_angle: float) -> Segments:
+def polish_changes(seen: SeenContour, segments: Segments, friction_angle: Floats) -> Segments:
     """Phase changes to rounding, by secants from the interpolant's answer."""
     inner = np.flatnonzero(~first_of_lane(segments.lane))
     inner = inner[segments.tip[inner] != segments.tip[inner - 1]]
@@ -149,7 +151,7 @@ def polish_changes(seen: SeenContour, segments: Segments, friction_angle: float)
 
     def excess(parameter: Floats) -> Floats:
         locus = seen.locate(lane, parameter)
-        return tangential_arclength(locus.x, locus.y, locus.slope_angle, friction_angle) - 1.0
+        return tangential_arclength(*locus[:3], friction_angle[lane]) - 1.0
 
     old, now = segments.begin[inner] + 1e-4 * room, segments.begin[inner]
     at_old, at_now = excess(old), excess(now)

@@ -63,7 +63,7 @@ def first_maximum(segments: Segments, angle: Floats, accuracy: Accuracy) -> tupl
     return keep, stop, kind
 
 
-def polish_fold(seen: SeenContour, segments: Segments, angle: Floats, stop: Floats, friction_angle: float) -> Floats:
+def polish_fold(seen: SeenContour, segments: Segments, angle: Floats, stop: Floats, friction_angle: Floats) -> Floats:
     """Ways at which the exact derivative of the drive angle vanishes: secants, the first by the interpolant."""
 
     def rate(way: Floats) -> Floats:

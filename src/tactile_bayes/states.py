@@ -33,12 +33,13 @@ def exact_states(
     seen: SeenContour,
     lane: Index,
     parameter: Floats,
-    friction_angle: float,
+    friction_angle: Floats,
     *,
     phase: NDArray[Any] | None = None,
 ) -> States:
+    """States at the contour's parameters; friction angles are those of all lanes."""
     locus = seen.locate(lane, parameter)
-    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle, phase=phase)
+    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle[lane], phase=phase)
     return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import xarray as xr
@@ -25,6 +25,10 @@ MODEST = SamplerSettings(ensembles=2, walkers=16, min_ess=160, max_r_hat=1.06)
 """Enough for means within a fraction of a standard deviation."""
 
 SOUND = SamplerSettings(ensembles=2, walkers=24, min_ess=400, max_r_hat=1.05)
+
+
+infer_as_stated = partial(infer_contour, nuisances=())
+"""Posteriors of a contour and noise alone: of few parameters, and quick."""
 
 
 def swept(contour, *, bases=((0.0, 0.0),), step=STEP, **options) -> xr.Dataset:
@@ -57,4 +61,4 @@ def measured() -> xr.Dataset:
 @cache
 def posterior() -> xr.DataTree:
     """The parabola's posterior of it."""
-    return infer_contour(measured(), load_cell=CELL, seed=1, settings=SOUND)
+    return infer_as_stated(measured(), load_cell=CELL, seed=1, settings=SOUND)

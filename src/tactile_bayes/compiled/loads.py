@@ -39,7 +39,7 @@ class Strokes(NamedTuple):
 
 
 def loads_of(
-    halves: Halves, strokes: Strokes, length: float, standoff: float, *, is_always_clear: bool
+    halves: Halves, strokes: Strokes, rod: tuple[float, float], rig: Floats, *, is_always_clear: bool
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Loads in EI/L and EI/L², zero out of contact, shape (n, samples, 3), and which contours are usable, shape (n,).
 
@@ -48,7 +48,11 @@ def loads_of(
     Parameters
     ----------
     halves : Halves
-        With parameters of shape (n,), in the same unit as bases, rod length and standoff.
+        With parameters of shape (n,), in the same unit as bases and rod.
+    rod : (float, float)
+        Its length, and half its diameter.
+    rig : ndarray, shape (n, 2)
+        What the encoder reads too much [rad], and the suspension's compliance [rad/(EI/L)].
     """
     known, on = _constants()
     columns = (*halves.left[1:], *halves.right[1:], halves.x, halves.y)
@@ -56,8 +60,7 @@ def loads_of(
     out = np.zeros((halves.x.size, strokes.samples.size, 3))
     usable = np.ones(halves.x.size, dtype=bool)
     kinds, room = (halves.left.kind, halves.right.kind), work(int(np.diff(strokes.first).max()))
-    rod = length, standoff
-    _fill(kinds, contours, halves.has_knot, strokes, rod, is_always_clear, known, on, room, out, usable)
+    _fill(kinds, contours, halves.has_knot, strokes, rod, rig, is_always_clear, known, on, room, out, usable)
     return out, usable
 
 
@@ -82,6 +85,7 @@ def _fill(
     has_knot: bool,
     strokes: Strokes,
     rod: tuple[float, float],
+    rig: Floats,
     is_always_clear: bool,
     known: Tables,
     on: Nodes,
@@ -101,9 +105,8 @@ def _fill(
             if strokes.backward[k]:
                 lane, sign = mirrored(lane), -1.0
             of_stroke = slice(strokes.first[k], strokes.first[k + 1])
-            reach, snap = follow(
-                lane, has_knot, strokes.angles[of_stroke], strokes.samples[of_stroke], sign, known, on, room, out[i]
-            )
+            angles, samples = strokes.angles[of_stroke], strokes.samples[of_stroke]
+            reach, snap = follow(lane, has_knot, angles, samples, sign, rig[i, 0], rig[i, 1], known, on, room, out[i])
             if reach != _TOUCHES:
                 usable[i] = False
             elif not is_always_clear:

@@ -150,7 +150,7 @@ def _cut(lane: Lane, begin: float, end: float, has_knot: bool, tip_first: bool, 
 
 
 @compiled
-def _sample(lane: Lane, stretch: Floats, known: Tables, on: Nodes, room: Work) -> None:
+def _sample(lane: Lane, stretch: Floats, compliance: float, known: Tables, on: Nodes, room: Work) -> None:
     """Series along the way of drive angle and loads."""
     span = stretch[1] - stretch[0]
     for k in range(_ORDER):
@@ -158,6 +158,7 @@ def _sample(lane: Lane, stretch: Floats, known: Tables, on: Nodes, room: Work) -
         p = stretch[0] + span * (way * way if stretch[3] else way)
         at = state(lane, p, stretch[2] > 0.0, known, room.by_angle, room.by_share, room.row)
         room.values[0, k], room.values[1, k], room.values[2, k], room.values[3, k] = at
+        room.values[0, k] += compliance * room.values[1, k]
     for c in range(4):
         combine(on.fit, room.values[c], room.series[c])
 
@@ -239,6 +240,7 @@ def _write(
     angles: Floats,
     rows: NDArray[np.intp],
     sign: float,
+    offset: float,
     span: tuple[float, float],
     steadiness: float,
     room: Work,
@@ -248,8 +250,9 @@ def _write(
     begin, end = span
     there, twice, count = room.there, room.twice, 0
     for j in range(angles.size):
-        if begin <= angles[j] <= end:
-            left = min(max((end - angles[j]) / (end - begin), 0.0), 1.0)
+        angle = angles[j] - sign * offset
+        if begin <= angle <= end:
+            left = min(max((end - angle) / (end - begin), 0.0), 1.0)
             root = math.sqrt(steadiness * steadiness + 4.0 * (1.0 - steadiness) * left)
             ahead = 2.0 * left / (steadiness + root) if left > 0.0 else 0.0
             there[count], twice[count] = rows[j], 2.0 - 4.0 * ahead
@@ -276,12 +279,17 @@ def follow(
     angles: Floats,
     rows: NDArray[np.intp],
     sign: float,
+    offset: float,
+    compliance: float,
     known: Tables,
     on: Nodes,
     room: Work,
     out: Floats,
 ) -> tuple[int, float]:
-    """`Reach` and snap-off's drive angle of a lane; loads at drive angles go into rows of `out`, zero beforehand."""
+    """`Reach` and snap-off's drive angle of a lane; loads at drive angles go into rows of `out`, zero beforehand.
+
+    The sign is −1 in backward sweeps; the offset is what the encoder reads too much, the compliance the suspension's.
+    """
     reach, begin, end, tip_first, runs_out = limits(lane)
     if reach != _TOUCHES:
         return reach, math.nan
@@ -295,7 +303,7 @@ def follow(
     grows_to_the_end = True
     while count:
         stretch = waiting[count - 1]
-        _sample(lane, stretch, known, on, room)
+        _sample(lane, stretch, compliance, known, on, room)
         if (
             stretch[4] < _HALVINGS
             and count < _MOST
@@ -324,7 +332,7 @@ def follow(
         if not folds:
             steadiness = min(max(series(room.slope, stop) * stop / (at_end - at_begin), 0.0), 1.0)
         _over_drive_angle(stop, at_begin, at_end, steadiness, on, room)
-        _write(angles, rows, sign, (at_begin, at_end), steadiness, room, out)
+        _write(angles, rows, sign, offset, (at_begin, at_end), steadiness, room, out)
         at_begin, is_first = at_end, False
         if folds:
             grows_to_the_end = False

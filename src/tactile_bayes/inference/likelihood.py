@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.encoder import EncoderErrors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.path import Paths, Reach, trace
 from tactile_bayes.reconstruction import contact_sides
@@ -22,7 +23,7 @@ from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, t
 if TYPE_CHECKING:
     from tactile_bayes.compiled.loads import Strokes
 
-__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood"]
+__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood", "Rig"]
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +38,19 @@ class _Stroke:
     base: tuple[float, float]
     backward: bool
     samples: NDArray[np.intp]
+
+
+class Rig(NamedTuple):
+    """What a rig may have otherwise than stated; numbers, or arrays of shape (n,) with one for every contour."""
+
+    drive_angle_offset: Any = 0.0
+    """What the encoder reads too much, beyond what the load cell's data sheet says [rad]."""
+    rigidity_scale: Any = 1.0
+    """Flexural rigidity over that stated."""
+    suspension_compliance: Any = 0.0
+    """Turn of the pivot's suspension per holding moment, in the unit of the record as stated [rad/(EI/L)]."""
+    friction: Any = 0.0
+    """Coulomb's coefficient."""
 
 
 class RecordLikelihood:
@@ -72,16 +86,16 @@ class RecordLikelihood:
         self.order = order
         self.is_always_clear = is_always_clear
         self.rod = rod_of(measured)
-        self.friction_angle = float(np.arctan(friction))
+        self.friction = friction
         record = to_dimensionless(measured)
         load_cell.refuse_other_frame(measured)
-        if load_cell.drive_angle_noise or load_cell.drive_angle_resolution:
-            raise ParameterError(
-                "the load cell's drive_angle_noise and drive_angle_resolution have no place in the likelihood of a "
-                "record yet: give a cell without them (infer --force-noise ... --moment-noise ...), with what they do "
-                "to the loads in force_noise and moment_noise"
-            )
         self.load_cell = load_cell.dimensionless(self.rod)
+        self.encoder = EncoderErrors(self.load_cell)
+        if self.encoder.count > 1 and (load_cell.drift or any(load_cell.bias_uncertainty)):
+            raise ParameterError(
+                "drive_angle_noise or drive_angle_resolution together with drift or bias_uncertainty have no closed "
+                "form: leave one of the two out (a bias can be inferred instead, as a nuisance parameter)"
+            )
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         angle = record.drive_angle.values - load_cell.drive_angle_offset
         self._turn = angle if frame_of(record) == "turning" else None
@@ -92,16 +106,18 @@ class RecordLikelihood:
             _Stroke((float(x), float(y)), bool(b), np.flatnonzero(which == k)) for k, (x, y, b) in enumerate(kinds)
         ]
         others = [[t.base == s.base and t.backward != s.backward for t in self.strokes] for s in self.strokes]
-        self._opposite = np.argmax(others, axis=1) if np.all(np.any(others, axis=1)) and not friction else None
+        self._opposite = np.argmax(others, axis=1) if np.all(np.any(others, axis=1)) else None
         longest = max(stroke.samples.size for stroke in self.strokes)
+        self._strokes: tuple[bytes, Strokes] | None = None
         self._angles = np.full((len(self.strokes), longest), np.nan)
         for row, stroke in zip(self._angles, self.strokes, strict=True):
             seen = angle[stroke.samples]
             row[: seen.size] = np.pi - seen if stroke.backward else seen
 
-    def paths(self, contours: Contour, *, exact_events: bool = False) -> Paths:
+    def paths(self, contours: Contour, rig: Rig | None = None, *, exact_events: bool = False) -> Paths:
         """Paths of every contour in every stroke; lane k·n + i is contour i in stroke k."""
         count = contours.shape[0]
+        rig = self._rig_of(rig, count)
         strokes = len(self.strokes)
         index = np.tile(np.arange(count), strokes)
         base_x, base_y, backward = (
@@ -113,11 +129,17 @@ class RecordLikelihood:
             )
         )
         seen = SeenContour(contours.take(index), base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
-        return trace(seen, friction_angle=self.friction_angle, order=self.order, exact_events=exact_events)
+        return trace(
+            seen,
+            friction_angle=np.tile(np.arctan(rig.friction), strokes),
+            suspension_compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, strokes),
+            order=self.order,
+            exact_events=exact_events,
+        )
 
-    def usable(self, contours: Contour) -> NDArray[np.bool_]:
+    def usable(self, contours: Contour, rig: Rig | None = None) -> NDArray[np.bool_]:
         """Contours that every stroke can reach, and that the rod is past after snap-off, shape (n,)."""
-        return self._usable(self.paths(contours), contours.shape[0])
+        return self._usable(self.paths(contours, rig), contours.shape[0])
 
     def _usable(self, paths: Paths, count: int) -> NDArray[np.bool_]:
         usable = paths.reach == Reach.TOUCHES
@@ -127,61 +149,100 @@ class RecordLikelihood:
 
     def _is_clear(self, paths: Paths) -> NDArray[np.bool_]:
         """Where the sweep in the other direction is at hand its first contact says so."""
-        if self._opposite is None:
+        if self._opposite is None or np.any(paths.friction_angle):
             return paths.is_clear()
         first = paths.first_angle.reshape(len(self.strokes), -1)[self._opposite]
         with np.errstate(invalid="ignore"):
             return np.asarray(paths.snap_angle > np.pi - first.ravel())
 
-    def predict(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
+    def predict(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, NDArray[np.bool_]]:
         """Noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
 
-        Forces are in the record's frame.
+        Forces are in the record's frame, loads in units of the rod as stated, drive angles as read.
         """
+        loads, reached = self._predict(contours, rig, np.zeros(1))
+        return loads[:, 0], reached
+
+    def predict_with_errors(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, NDArray[np.bool_]]:
+        """`predict` for every error that the encoder may have made, shape (n, errors, samples, 3)."""
+        return self._predict(contours, rig, self.encoder.errors)
+
+    def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        rig = self._rig_of(rig, contours.shape[0])
         halves = contours.halves
-        if halves is None or self.friction_angle or self.order > FAST_ORDER:
-            predicted, reached = self._by_arrays(contours)
+        if halves is None or np.any(rig.friction) or self.order > FAST_ORDER:
+            predicted, reached = self._by_arrays(contours, rig, errors)
         else:
-            predicted, reached = self._by_compiled(halves)
+            predicted, reached = self._by_compiled(halves, rig, errors)
         if self._turn is not None:
-            predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], self._turn)
+            turn = self._turn - rig.drive_angle_offset[:, None, None] - errors[:, None]
+            predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
+        if np.any(rig.rigidity_scale != 1.0):
+            predicted *= rig.rigidity_scale[:, None, None, None]
         return predicted, reached
 
-    def _by_compiled(self, halves: Halves) -> tuple[Floats, NDArray[np.bool_]]:
+    def _rig_of(self, rig: Rig | None, count: int) -> Rig:
+        """Of every contour, what is known of the rig where nothing is said of it."""
+        return Rig(*(np.broadcast_to(value, (count,)) for value in rig or Rig(friction=self.friction)))
+
+    def _by_compiled(self, halves: Halves, rig: Rig, errors: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """`predict`, in the pivot's frame, without friction and to `FAST_ORDER`."""
         from tactile_bayes.compiled.loads import loads_of  # numba takes a second to load
 
-        rod = self.rod
-        return loads_of(
-            halves, self._compiled_strokes, rod.length, 0.5 * rod.diameter, is_always_clear=self.is_always_clear
+        rod = self.rod.length, 0.5 * self.rod.diameter
+        offset_and_compliance = np.stack(
+            [rig.drive_angle_offset, rig.suspension_compliance * rig.rigidity_scale], axis=1
         )
+        loads, usable = loads_of(
+            halves, self._strokes_with(errors), rod, offset_and_compliance, is_always_clear=self.is_always_clear
+        )
+        return loads.reshape(len(loads), errors.size, *self.measured.shape), usable
 
-    @cached_property
-    def _compiled_strokes(self) -> Strokes:
+    def _strokes_with(self, errors: Floats) -> Strokes:
+        """Every sample once for each error, one error after the other."""
         from tactile_bayes.compiled.loads import Strokes
 
-        bases = np.array([stroke.base for stroke in self.strokes])
-        return Strokes(
-            base_x=bases[:, 0].copy(),
-            base_y=bases[:, 1].copy(),
-            backward=np.array([stroke.backward for stroke in self.strokes]),
-            first=np.cumsum([0, *(stroke.samples.size for stroke in self.strokes)]),
-            samples=np.concatenate([stroke.samples for stroke in self.strokes]),
-            angles=self._angles[~np.isnan(self._angles)],
-        )
+        key = errors.tobytes()
+        if self._strokes is None or self._strokes[0] != key:
+            bases = np.array([stroke.base for stroke in self.strokes])
+            samples, angles = [], []
+            for row, stroke in zip(self._angles, self.strokes, strict=True):
+                shifts = errors if stroke.backward else -errors
+                angles.append((row[: stroke.samples.size] + shifts[:, None]).ravel())
+                samples.append((stroke.samples + len(self.measured) * np.arange(errors.size)[:, None]).ravel())
+            strokes = Strokes(
+                base_x=bases[:, 0].copy(),
+                base_y=bases[:, 1].copy(),
+                backward=np.array([stroke.backward for stroke in self.strokes]),
+                first=np.cumsum([0, *(part.size for part in samples)]),
+                samples=np.concatenate(samples),
+                angles=np.concatenate(angles),
+            )
+            self._strokes = key, strokes
+        return self._strokes[1]
 
-    def _by_arrays(self, contours: Contour) -> tuple[Floats, NDArray[np.bool_]]:
+    def _by_arrays(
+        self, contours: Contour, rig: Rig | None = None, errors: Floats | None = None
+    ) -> tuple[Floats, NDArray[np.bool_]]:
         """`predict`, in the pivot's frame, for any contour, with friction, and to any accuracy."""
-        count = contours.shape[0]
-        paths = self.paths(contours)
-        loads = paths.observables(np.repeat(self._angles, count, axis=0))
-        predicted = np.zeros((count, *self.measured.shape))
+        count, errors = contours.shape[0], np.zeros(1) if errors is None else errors
+        rig = self._rig_of(rig, count)
+        paths = self.paths(contours, rig)
+        signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
+        offset = (signs[:, None] * rig.drive_angle_offset).reshape(-1, 1)
+        angles = self._angles[:, None] - signs[:, None, None] * errors[:, None]  # (stroke, error, sample)
+        longest = angles.shape[-1]
+        loads = paths.observables(np.repeat(angles.reshape(len(angles), -1), count, axis=0) - offset)
+        predicted = np.zeros((count, errors.size, *self.measured.shape))
         for k, stroke in enumerate(self.strokes):
             sign = np.array([-1.0, -1.0, 1.0]) if stroke.backward else 1.0
-            predicted[:, stroke.samples] = sign * loads[k * count : (k + 1) * count, : stroke.samples.size]
+            own = loads[k * count : (k + 1) * count].reshape(count, errors.size, longest, -1)
+            predicted[:, :, stroke.samples] = sign * own[:, :, : stroke.samples.size]
         return predicted, self._usable(paths, count)
 
-    def log_likelihood(self, contours: Contour, noise_scale: Any = 1.0, *, pointwise: bool = False) -> Floats:
+    def log_likelihood(
+        self, contours: Contour, noise_scale: Any = 1.0, rig: Rig | None = None, *, pointwise: bool = False
+    ) -> Floats:
         """Log-likelihood of each contour, shape (n,), or of each sample under it, (n, samples); −inf out of reach.
 
         Parameters
@@ -190,20 +251,32 @@ class RecordLikelihood:
             With parameters of shape (n,).
         noise_scale : array_like, broadcastable to shape (n, 3)
             Factor on the load cell's standard deviations, by channel.
+        rig : Rig, optional
+            What is not as stated.
         pointwise : bool
             Whether samples are kept apart.
         """
-        values = self.score(*self.predict(contours), noise_scale, pointwise=pointwise)
-        if np.any(np.isnan(values)):
-            raise ParameterError(f"the likelihood is not a number for {contours}: please report this contour")
-        return values
+        return self.score(*self.predict_with_errors(contours, rig), noise_scale, pointwise=pointwise)
 
     def score(
         self, predicted: Floats, reached: NDArray[np.bool_], noise_scale: Any = 1.0, *, pointwise: bool = False
     ) -> Floats:
-        """`log_likelihood` of contours whose loads `predict` has given already."""
-        values = self.load_cell.log_likelihood(self.measured, predicted, noise_scale=noise_scale, pointwise=pointwise)
+        """`log_likelihood` of contours whose loads `predict_with_errors` has given already."""
+        alone = self.encoder.count == 1
+        scale = np.asarray(noise_scale, dtype=float)
+        if scale.ndim > 1 and not alone:
+            scale = scale[:, None]
+        values = self.load_cell.log_likelihood(
+            self.measured, predicted[:, 0] if alone else predicted, noise_scale=scale, pointwise=pointwise or not alone
+        )
+        if not alone:
+            values = logsumexp(values + self.encoder.log_weights[:, None], axis=1)
+            values = values if pointwise else values.sum(axis=-1)
         values[~reached] = -np.inf
+        if np.any(np.isnan(values)):
+            raise ParameterError(
+                f"the likelihood of {np.count_nonzero(np.isnan(values))} contours is not a number: please report this"
+            )
         return values
 
 

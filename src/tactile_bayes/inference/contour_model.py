@@ -1,0 +1,133 @@
+"""Prior times likelihood of a contour, and of what else is not known, given a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.errors import ReachError
+from tactile_bayes.inference.families import Family, Prior
+from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood, Rig
+from tactile_bayes.inference.noise import Noise
+from tactile_bayes.inference.nuisances import Nuisances
+from tactile_bayes.load_cell import rough_noise
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["ContourModel"]
+
+Floats = NDArray[np.float64]
+
+_MOST_TRIALS = 50
+"""Draws from the prior for each that is wanted within reach, before fewer will do."""
+
+_QUIET = 3e-4
+"""Noise over the largest load below which the fast interpolation of loads would be felt."""
+
+
+class ContourModel:
+    """Prior times likelihood, as a function of arrays of parameters."""
+
+    def __init__(
+        self,
+        measured: xr.Dataset,
+        family: Family,
+        nuisances: Nuisances,
+        noise: Noise,
+        priors: Mapping[str, Prior],
+    ) -> None:
+        """Points have the parameters of the contour first, then those of the rig, then those of the noise."""
+        self.measured = measured
+        self.family = family
+        self.nuisances = nuisances
+        self.noise = noise
+        self.priors = priors
+        self.located = (*family.parameters, *nuisances.names)
+        self.names = (*self.located, *noise.names)
+        anything = (-np.inf, np.inf)
+        bounds = [family.bounds.get(name, anything) for name in family.parameters]
+        bounds += [nuisances.bounds(name) for name in nuisances.names]
+        self.low, self.high = np.array([*bounds, *[(0.0, np.inf)] * len(noise.names)]).T
+        rubs = bool(nuisances.friction) or "friction" in nuisances.names
+        self.likelihood = RecordLikelihood(
+            measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
+        )
+        self.deviation = self._rough_noise()
+        largest = np.abs(self.likelihood.measured[:, self.present]).max(axis=0)
+        quiet = np.any(self.deviation[self.present] < _QUIET * largest)
+        self.likelihood.order = FINE_ORDER if quiet else FAST_ORDER
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Which channels were measured, shape (3,)."""
+        return ~np.isnan(self.likelihood.measured).all(axis=0)
+
+    def contours(self, points: Floats) -> Contour:
+        return self.family.build(*points[:, : len(self.family.parameters)].T)
+
+    def values(self, points: Floats) -> dict[str, Floats]:
+        """Columns of points, shape (n, parameters), by name; those of the noise may be missing."""
+        return dict(zip(self.names, points.T, strict=False))
+
+    def rig(self, points: Floats) -> Rig:
+        return self.nuisances.rig(self.values(points))
+
+    def loads(self, points: Floats) -> Floats:
+        """What the load cell senses at the drive angles read, shape (n, samples, 3)."""
+        loads, _ = self.likelihood.predict(self.contours(points), self.rig(points))
+        return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell)
+
+    def loads_with_errors(self, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """`loads` for every error of the encoder, shape (n, errors, samples, 3), and which points are usable, (n,)."""
+        loads, reached = self.likelihood.predict_with_errors(self.contours(points), self.rig(points))
+        return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell), reached
+
+    def noise_scale(self, points: Floats) -> Floats:
+        """Factors on the load cell's standard deviations, shape (n, 3)."""
+        scale = np.ones((points.shape[0], len(CHANNELS)))
+        for name, channels in zip(self.noise.names, self.noise.channels, strict=True):
+            scale[:, [CHANNELS.index(c) for c in channels]] = points[:, [self.names.index(name)]]
+        return scale
+
+    def log_prior(self, points: Floats) -> Floats:
+        logs = [self.priors[name].logpdf(points[:, i]) for i, name in enumerate(self.names)]
+        possible = ((points > self.low) & (points < self.high)).all(axis=1)
+        return np.where(possible, np.sum(logs, axis=0), -np.inf)
+
+    def log_probability(self, points: Floats) -> Floats:
+        """Up to the prior's normalisation over contours within reach; −inf outside its support or reach."""
+        values = self.log_prior(points)
+        inside = np.flatnonzero(np.isfinite(values))
+        if inside.size:
+            chosen = points[inside]
+            values[inside] += self.likelihood.score(*self.loads_with_errors(chosen), self.noise_scale(chosen))
+        return values
+
+    def draw_prior(self, rng: np.random.Generator, count: int) -> tuple[Floats, float]:
+        """Draws within reach, fewer where they are very rare, and the share of all draws that they are."""
+        found, drawn = [np.empty((0, len(self.names)))], 0
+        while sum(map(len, found)) < count and drawn < _MOST_TRIALS * count:
+            points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
+            drawn += count
+            points = points[np.isfinite(self.log_prior(points))]
+            if len(points):
+                found.append(points[self.likelihood.usable(self.contours(points), self.rig(points))])
+        points = np.concatenate(found)
+        if not len(points):
+            raise ReachError(
+                f"of {drawn} contours from the prior the rod can reach none in every sweep: are base, rod length and "
+                "units right, and the priors in the record's units?"
+            )
+        return points[:count], len(points) / drawn
+
+    def _rough_noise(self) -> Floats:
+        """Standard deviation of each channel from the median bend between neighbouring samples, shape (3,)."""
+        measured = self.likelihood.measured
+        deviation = np.ones(len(CHANNELS))
+        for i in np.flatnonzero(self.present):
+            level = rough_noise(measured[:, i]) if len(measured) > 2 else float(self.likelihood.load_cell.noise[i])
+            deviation[i] = max(level, 1e-4 * float(np.max(np.abs(measured[:, i]))), 1e-12)
+        return deviation

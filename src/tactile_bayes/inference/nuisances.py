@@ -1,0 +1,182 @@
+"""What is not as stated about a rig, and inferred beside a contour."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.likelihood import Rig
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, present_channels, rod_of
+from tactile_bayes.rod import Rod
+
+__all__ = ["STANDARD", "Nuisances", "nuisances_of"]
+
+Floats = NDArray[np.float64]
+
+STANDARD = ("rigidity_scale", "drive_angle_offset", "bias")
+"""What is inferred unless something else is asked for."""
+
+_SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
+_GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "gain")}
+
+_RIGIDITY, _OFFSET, _BIAS, _GAIN, _FRICTION, _COMPLIANCE = 0.05, np.radians(1.0), 0.1, 0.02, 0.3, 0.05
+"""Standard deviations (scales of half normals) of the priors: of ratios; rad; EI/L and EI/L²; and rad per EI/L."""
+
+
+class _Kind(NamedTuple):
+    """One nuisance parameter."""
+
+    stated: float
+    """Its value if the rig is as stated."""
+    low: float
+    high: float
+    power_of_moment: int = 0
+    """Of the unit of moments in its unit; for a bias of a force that of forces stands in for it."""
+
+
+_KINDS = {
+    "rigidity_scale": _Kind(1.0, 0.0, np.inf),
+    "drive_angle_offset": _Kind(0.0, -np.pi, np.pi),
+    "suspension_compliance": _Kind(0.0, 0.0, np.inf, power_of_moment=-1),
+    "friction": _Kind(0.0, 0.0, float(np.tan(MAX_FRICTION_ANGLE))),
+    **{name: _Kind(0.0, -np.inf, np.inf, power_of_moment=1) for name in _GROUPS["bias"]},
+    **{name: _Kind(1.0, 0.0, np.inf) for name in _GROUPS["gain"]},
+}
+_RIG = ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Parameters of a rig that are inferred beside those of a contour.
+
+    Parameters
+    ----------
+    names : tuple of str
+    priors : mapping
+        By name, in the record's units.
+    rod : Rod
+        As stated.
+    friction : float
+        Coulomb's coefficient where it is not inferred.
+    """
+
+    names: tuple[str, ...]
+    priors: Mapping[str, Prior]
+    rod: Rod
+    friction: float
+    units: Mapping[str, float] = field(init=False)
+    """Of each name, in the record's units, what is one inside."""
+
+    def __post_init__(self) -> None:
+        moment, force = self.rod.moment_unit, self.rod.force_unit
+        units = {n: (force if n.startswith("force") else moment) ** k.power_of_moment for n, k in _KINDS.items()}
+        object.__setattr__(self, "units", units)
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Between which values it lies, whatever a prior says."""
+        return _KINDS[name].low, _KINDS[name].high
+
+    def unit(self, name: str) -> str:
+        """Of an SI record, in words."""
+        if name in _GROUPS["bias"]:
+            return "N m" if name == "moment_bias" else "N"
+        return {"drive_angle_offset": "rad", "suspension_compliance": "rad/(N m)"}.get(name, "1")
+
+    def rig(self, values: Mapping[str, Floats]) -> Rig:
+        """The rig of every point, from values by name, each of shape (n,)."""
+        known = {"friction": self.friction} if "friction" not in self.names else {}
+        return Rig(**known, **{name: values[name] / self.units[name] for name in _RIG if name in self.names})
+
+    def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
+        """Loads, shape (n, ..., 3), with errors of calibration, and with what the cell will read as a bias."""
+        gains = [values.get(name) for name in _GROUPS["gain"]]
+        for channel, gain in enumerate(gains):
+            if gain is not None:
+                loads[..., channel] *= gain.reshape(-1, *(1,) * (loads.ndim - 2))
+        if set(self.names).isdisjoint(_GROUPS["bias"]):
+            return loads
+        biases = np.zeros((loads.shape[0], len(CHANNELS)))
+        for channel, name in enumerate(_GROUPS["bias"]):
+            if name in self.names:
+                biases[:, channel] = values[name] / self.units[name]
+        shift = np.linalg.solve(np.asarray(cell.gain, dtype=float), biases.T).T
+        loads += shift.reshape(len(shift), *(1,) * (loads.ndim - 2), -1)
+        return loads
+
+
+def nuisances_of(
+    measured: xr.Dataset, chosen: Sequence[str], priors: Mapping[str, Prior], cell: LoadCell, friction: float
+) -> Nuisances:
+    """Nuisance parameters that are asked for by name, or by having a prior; with default priors for the others.
+
+    A bias that the load cell states an uncertainty of is not among them: the likelihood integrates it out already.
+
+    Raises
+    ------
+    ParameterError
+        If a name is none of a nuisance parameter, or cannot be identified.
+    """
+    if isinstance(chosen, str):
+        raise ParameterError(f"nuisances is {chosen!r}: give a list of names, like [{chosen!r}]")
+    present = [_SHORT[name] for name in present_channels(measured)]
+    uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
+    names: list[str] = []
+    for name in (*chosen, *(name for name in priors if name in _KINDS)):
+        if name in ("base", "base_x", "base_y"):
+            raise ParameterError(
+                f"{name} cannot be inferred: if pivot and object are shifted together nothing measured changes. "
+                "Results are relative to the pivot as stated; add what is not known of its place to them"
+            )
+        if name not in _KINDS and name not in _GROUPS:
+            raise ParameterError(
+                f"there is no nuisance parameter {name!r}: choose from {', '.join([*_GROUPS, *_KINDS])}"
+            )
+        members = [n for n in _GROUPS[name] if n.rpartition("_")[0] in present] if name in _GROUPS else [name]
+        for member in members:
+            if member.rpartition("_")[0] not in present and member in (*_GROUPS["bias"], *_GROUPS["gain"]):
+                raise ParameterError(f"{member} cannot be inferred: the record has no such channel")
+            if uncertain.get(member, 0.0) > 0.0:
+                if name in _GROUPS:
+                    continue
+                raise ParameterError(
+                    f"{member} is in the load cell's bias_uncertainty already, and integrated out: leave one of the two"
+                )
+            names.append(member)
+    names = list(dict.fromkeys(names))
+    if "friction" in names and friction:
+        raise ParameterError(f"friction is {friction!r} and to be inferred as well: leave one of the two")
+    every_gain = [f"{name}_gain" for name in present]
+    if "rigidity_scale" in names and set(every_gain) <= set(names):
+        raise ParameterError(
+            f"rigidity_scale and {', '.join(every_gain)} cannot all be inferred: a stiffer rod and larger gains "
+            "measure the same; leave one of them"
+        )
+    rod = rod_of(measured)
+    nuisances = Nuisances(tuple(names), {}, rod, friction)
+    defaults = {name: _default_prior(name, nuisances.units[name]) for name in names}
+    return Nuisances(tuple(names), defaults, rod, friction)
+
+
+def _default_prior(name: str, unit: float) -> Prior:
+    match name:
+        case "rigidity_scale":
+            return stats.lognorm(s=_RIGIDITY)
+        case "drive_angle_offset":
+            return stats.norm(0.0, _OFFSET)
+        case "friction":
+            return stats.halfnorm(scale=_FRICTION)
+        case "suspension_compliance":
+            return stats.halfnorm(scale=_COMPLIANCE * unit)
+        case _ if name in _GROUPS["gain"]:
+            return stats.norm(1.0, _GAIN)
+    return stats.norm(0.0, _BIAS * unit)
