@@ -362,3 +362,16 @@ def test_ranks_of_the_truth_are_uniform():
         row[:] = [float((result["posterior"][name] < truth[name]).mean()) for name in NAMES]
     for name, column in zip(NAMES, ranks.T, strict=True):
         assert stats.kstest(column, "uniform").pvalue > 1e-3, name
+
+
+def test_samples_without_load_tell_where_contact_begins_and_ends():
+    """Left out, the posterior is wider, and still right."""
+    whole = posterior()["posterior"]
+    result = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=MODEST, events=False)
+    assert result["observed_data"].sizes["sample"] < measured().sizes["sample"]
+    assert result.attrs["events"] == 0
+    assert result.attrs["data_sha256"] == posterior().attrs["data_sha256"]
+    for name, value in TRUTH.items():
+        draws = result["posterior"][name]
+        assert abs(draws.mean() - value) < 4.5 * draws.std(), name
+        assert draws.std() > 0.8 * whole[name].std()

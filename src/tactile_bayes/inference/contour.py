@@ -37,6 +37,7 @@ def infer_contour(
     rod: Rod | None = None,
     friction: float = 0.0,
     nuisances: Sequence[str] = STANDARD,
+    events: bool = True,
     settings: SamplerSettings | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> xr.DataTree:
@@ -74,6 +75,9 @@ def infer_contour(
         (Coulomb's coefficient; several times slower), "suspension_compliance" (turn of the pivot per holding moment).
         By default the first three; an empty list takes all as stated. The pivot's place cannot be inferred, since a
         shift of pivot and object together changes nothing that is measured: results are relative to the pivot.
+    events : bool
+        Whether the samples without load count, which tell where contact begins and ends. Without them only those count
+        whose load noise does not explain: what a method knows that looks at contacts alone.
     settings : SamplerSettings, optional
         When to stop, and how much to spend at most.
     progress : callable, optional
@@ -137,11 +141,15 @@ def infer_contour(
             raise ParameterError(
                 f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
             )
-    if not loaded_samples(measured, noise.cell if noise.names == ("noise_scale",) else None).any():
+    data_sha256 = record_hash(measured)
+    loaded = loaded_samples(measured, noise.cell if noise.names == ("noise_scale",) else None)
+    if not loaded.any():
         raise InferenceError(
             "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
             "in the record's units?"
         )
+    if not events:
+        measured = measured.isel(sample=np.flatnonzero(loaded))
     chosen_priors.update(priors or {})
     model = ContourModel(measured, chosen, rig, noise, chosen_priors)
     seeds = spawn(seed, 4)
@@ -157,10 +165,11 @@ def infer_contour(
         draws,
         seed=seed,
         settings=settings,
-        data_sha256=record_hash(measured),
+        data_sha256=data_sha256,
         family=family,
         friction=friction,
         nuisances=json.dumps(rig.names),
+        events=int(events),
         priors=json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
         units=measured.attrs["units"],
         load_cell_frame=frame_of(measured),
