@@ -88,3 +88,9 @@ def test_bracket_of_no_width_nothing_and_inputs_left_alone():
     np.testing.assert_array_equal(hi, [1.0, -2.0])
     np.testing.assert_allclose(found, [1.0, 0.0], rtol=0, atol=4e-14)
     assert falling_root(shifted_cubes(np.zeros(0)), np.zeros(0), np.zeros(0)).shape == (0,)
+
+
+def test_a_root_where_the_slope_vanishes_too_is_kept():
+    """There Newton's step is no number."""
+    root = falling_root(lambda i, x: (-(x**3), -3.0 * x**2), np.array([-1.0]), np.array([2.0]), start=np.array([0.0]))
+    assert root[0] == 0.0

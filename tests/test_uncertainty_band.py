@@ -10,6 +10,7 @@ from helpers.contour_posteriors import posterior
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.uncertainty.band import contour_band, contour_heights
+from tactile_bayes.uncertainty.quantiles import quantile_band
 
 X = np.linspace(-0.8, 0.8, 41)
 
@@ -62,6 +63,16 @@ def test_a_simultaneous_band_holds_whole_contours(which):
     assert share(pointwise) < 0.9
 
 
+def test_where_all_contours_meet_a_simultaneous_band_is_not_widened_by_rounding():
+    """The widening factor is that of the other places, and no more."""
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=(400, 1)) * [1.0, 2.0, 3.0] + rng.normal(size=(400, 3))
+    lower, _, upper = quantile_band(values, 0.9, True)
+    rounding = np.where(rng.uniform(size=(400, 1)) < 0.04, 1e-16, 0.0)
+    with_point = quantile_band(np.concatenate([values, rounding], axis=1), 0.9, True)
+    np.testing.assert_array_equal(with_point[:, :3][[0, 2]], [lower, upper])
+
+
 def test_at_a_single_point_both_bands_are_nearly_the_same():
     pointwise, whole = (contour_band(made(), [0.3], 0.9, simultaneous=s) for s in (False, True))
     width = float((pointwise.upper - pointwise.lower)[0])
@@ -83,6 +94,8 @@ def test_beyond_the_end_of_some_circles_the_band_is_not_known():
         np.testing.assert_array_equal(band.share_reaching, [1.0, 1.0, 0.5, 0.25, 0.0])
         for name in ("lower", "median", "upper"):
             assert np.isfinite(band[name]).values.tolist() == [True, True, False, False, False]
+        reasons = ["ok"] * 2 + ["some contours end before"] * 2 + ["all contours end before"]
+        assert band.status.values.tolist() == reasons
     band = contour_band(tree("circle", r=r, q=0.0 * r, x_c=0.0 * r), [2.0])
     assert np.isnan(band["median"].values).all()
 

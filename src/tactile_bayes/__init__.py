@@ -34,6 +34,7 @@ _HOMES = {
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
     "make_record": "record",
+    "normal_band": "uncertainty.normal_band",
     "predictive_interval": "uncertainty.predictive",
     "read_record": "record",
     "read_result": "inference.result",
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
     from tactile_bayes.uncertainty.band import contour_band as contour_band
     from tactile_bayes.uncertainty.contact_region import contact_region as contact_region
     from tactile_bayes.uncertainty.gap import gap as gap
+    from tactile_bayes.uncertainty.normal_band import normal_band as normal_band
     from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval
 
 

@@ -56,7 +56,7 @@ def falling_root(
             new = x - value / slope
             # Steps that do not shrink by half go round in circles, for instance about a kink.
             trusted = ((new - lo) * (new - hi) <= 0.0) & (np.abs(new - x) <= 0.5 * before)
-            new = np.where(trusted, new, 0.5 * (lo + hi))
+            new = np.where(trusted, new, np.where(value == 0.0, x, 0.5 * (lo + hi)))
             step = np.abs(new - x)
             going = (step > settled) & (value != 0.0)
             before = np.where(trusted, step, np.abs(hi - lo))

@@ -8,6 +8,7 @@ made; its settings are left alone, and nothing is shown.
 from tactile_bayes.plotting.axes import PALETTE
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
 from tactile_bayes.plotting.contour_map import band_detail, contour
+from tactile_bayes.plotting.gap_map import gap
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.records import observables, predictive
 from tactile_bayes.plotting.rod_map import rods
@@ -19,6 +20,7 @@ __all__ = [
     "contact_ellipses",
     "contact_regions",
     "contour",
+    "gap",
     "observables",
     "pairs",
     "predictive",

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.uncertainty.quantiles import quantile_band
 
-__all__ = ["contour_band", "contour_heights"]
+__all__ = ["contour_band", "contour_heights", "contours_drawn", "length_unit", "places"]
 
 Floats = NDArray[np.float64]
 
@@ -37,13 +41,17 @@ def contour_band(
     Returns
     -------
     xr.Dataset
-        Over "x": lower, upper, median [length], and share_reaching, the share of contours that extend to x; where it is
-        below 1 the rest is NaN.
+        Over "x": lower, upper, median [length]; share_reaching, the share of contours that extend to x, and status in
+        words: "ok", or why the band is NaN.
 
     Raises
     ------
     ParameterError
         If the probability is not in (0, 1), or x is not a list of finite numbers.
+
+    See Also
+    --------
+    normal_band : the same across the contour, which is what a steep flank wants.
 
     Examples
     --------
@@ -54,32 +62,19 @@ def contour_band(
     >>> contour_band(tree, [0.0, 1.0])["median"].values
     array([0.3, 0.8])
     """
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
-    at = np.atleast_1d(np.asarray(x, dtype=float))
-    if at.ndim != 1 or not np.all(np.isfinite(at)):
-        raise ParameterError("x must be a list of finite numbers")
+    at = places(x)
     heights = contour_heights(posterior, at)
     share = np.isfinite(heights).mean(axis=0)
-    known = share == 1.0
-    tail = 0.5 * (1.0 - probability)
-    lower, median, upper = np.full((3, at.size), np.nan)
-    if known.any():
-        lower[known], median[known], upper[known] = np.quantile(heights[:, known], [tail, 0.5, 1.0 - tail], axis=0)
-        if simultaneous:
-            off = heights[:, known] - median[known]
-            reach = np.where(off > 0.0, upper[known] - median[known], median[known] - lower[known])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                most = np.nan_to_num(np.abs(off) / reach, nan=0.0).max(axis=1)
-            factor = max(1.0, float(np.quantile(most, probability)))
-            lower, upper = median - factor * (median - lower), median + factor * (upper - median)
-    unit = {"units": "1" if posterior.attrs["units"] == "dimensionless" else "m"}
+    lower, median, upper = quantile_band(heights, probability, simultaneous)
+    status = np.select([share == 1.0, share > 0.0], ["ok", "some contours end before"], "all contours end before")
+    unit = length_unit(posterior)
     return xr.Dataset(
         {
             "lower": ("x", lower, unit),
             "median": ("x", median, unit),
             "upper": ("x", upper, unit),
             "share_reaching": ("x", share, {"units": "1"}),
+            "status": ("x", status),
         },
         coords={"x": ("x", at, unit)},
         attrs={"probability": probability, "simultaneous": int(simultaneous)},
@@ -88,7 +83,32 @@ def contour_band(
 
 def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Floats:
     """Heights at x of up to `most` contours, evenly picked from the posterior's draws; shape (contours, x)."""
+    contours = contours_drawn(posterior, most)
+    every = np.arange(contours.shape[0])[:, None]
+    return np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
+
+
+def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
+    """Up to `most` contours, evenly picked from the posterior's draws."""
     contours = contours_of(posterior_draws(posterior), posterior.attrs["family"])
     count = contours.shape[0]
-    index = np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
-    return np.broadcast_to(contours.take(index[:, None]).height(x), (index.size, x.size))
+    return contours.take(np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp)))
+
+
+def places(x: ArrayLike) -> Floats:
+    """Values of x as a list of numbers.
+
+    Raises
+    ------
+    ParameterError
+        If they are not, or not finite.
+    """
+    at = np.atleast_1d(np.asarray(x, dtype=float))
+    if at.ndim != 1 or not np.all(np.isfinite(at)):
+        raise ParameterError("x must be a list of finite numbers")
+    return at
+
+
+def length_unit(posterior: xr.DataTree) -> dict[str, Any]:
+    """Attributes of lengths in the record's unit."""
+    return {"units": "1" if posterior.attrs["units"] == "dimensionless" else "m"}

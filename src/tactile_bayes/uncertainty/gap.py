@@ -2,30 +2,63 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.uncertainty.band import contour_band, length_unit
+from tactile_bayes.uncertainty.certificate import triangle
+from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["gap"]
 
+Floats = NDArray[np.float64]
 
-def gap(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
-    """Where the gap begins and ends, and how wide it is.
+_PLACES = 101
+"""Values of x across the gap."""
+
+
+def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr.DataTree | None = None) -> xr.Dataset:
+    """Where the gap begins and ends, how far convexity alone confines the contour there, and how far the posterior.
+
+    No prior enters the certificate but through the ends: between them a convex contour lies in the triangle of their
+    chord and their tangents. Each contour of the posterior has a triangle of its own, which gives intervals.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`, of a record with sweeps in both directions.
     probability : float
-        Of the central intervals.
+        Of the central intervals and of the band.
+    without_events : xr.DataTree, optional
+        What `infer_contour` makes of the same record if it is not told where contact began and ended; its band is then
+        there for comparison.
 
     Returns
     -------
     xr.Dataset
-        Over "bound" ("lower", "median", "upper"): left (the backward sweep's last contact), right (the forward sweep's)
-        and width = right − left, negative where the two overlap [length]. With several pivots the gap is what all
-        sweeps together leave open.
+        Over "bound" ("lower", "median", "upper"):
+
+        - left (the backward sweep's last contact), right (the forward sweep's) and width = right − left, negative where
+          the two overlap [length];
+        - left_y, right_y [length] and left_slope_angle, right_slope_angle [rad], of the same contacts;
+        - snap_off_drive_angle [rad], over "stroke" too;
+        - vertex_x, vertex_y, the contour's lowest point [length];
+        - apex_x, apex_y of the triangle, triangle_height, its distance from the chord, and triangle_width, its largest
+          extent in y [length], all of the contours that leave a gap.
+
+        Over "x", evenly from the median of left to that of right: band_lower, band_median, band_upper, as
+        `contour_band` gives them; triangle_lower and triangle_upper, between which the triangles are with that
+        probability, at each x; and band_without_events_lower, _median, _upper if asked for [length].
+
+        Numbers: band_width, the largest upper − lower of the band, and band_width_without_events, to be compared with
+        triangle_width [length]; share_open, the share of contours that leave a gap; status, in words: "ok", or why
+        something is NaN. Attribute gaps: how many gaps there are.
 
     Raises
     ------
@@ -34,25 +67,119 @@ def gap(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
     ParameterError
         If the probability is not in (0, 1).
 
+    Notes
+    -----
+    With several pivots a gap is what no sweep has touched, arcs from first contact to snap-off being merged; its ends
+    may then be first contacts, and several gaps may remain. The widest is described: medians decide which arcs lie on
+    its left and which on its right, and each contour's gap is between the rightmost end of the former and the leftmost
+    of the latter. If none remains, it is where the arcs overlap least.
+
+    Where a contour's own arcs reach beyond the gap's ends, its height is known by contact: there, triangle_lower and
+    triangle_upper count it as a triangle of no width. The band is therefore between them, up to the noise of the draws.
+
     Examples
     --------
-    >>> x = xr.DataArray([[[0.2, -0.1]]], dims=("chain", "draw", "stroke"), coords={"stroke": ["forward", "backward"]})
-    >>> tree = xr.DataTree.from_dict({"events": xr.Dataset({"snap_off_contact_x": x})})
-    >>> round(gap(tree).width.sel(bound="median").item(), 6)
-    0.3
+    >>> draws = {"a": 0.5, "q": 0.3, "x_c": 0.0}
+    >>> ends = {"first_contact_x": [0.9, -0.9], "snap_off_contact_x": [0.2, -0.1], "snap_off_drive_angle": [3.2, -0.1]}
+    >>> posterior = xr.Dataset({k: (("chain", "draw"), [[v]]) for k, v in draws.items()})
+    >>> events = xr.Dataset({k: (("chain", "draw", "stroke"), [[v]]) for k, v in ends.items()})
+    >>> events = events.assign_coords(stroke=["forward", "backward"])
+    >>> tree = xr.DataTree.from_dict({"posterior": posterior, "events": events})
+    >>> tree.attrs = {"family": "parabola", "units": "dimensionless"}
+    >>> found = gap(tree).sel(bound="median")
+    >>> round(found.width.item(), 6), round(found.triangle_width.item(), 6), found.status.item()
+    (0.3, 0.0225, 'ok')
     """
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
-    last = posterior["events"].to_dataset()["snap_off_contact_x"]
-    strokes = last.stroke.values
-    missing = [name for name in ("forward", "backward") if name not in strokes]
+    levels = central_levels(probability)
+    events = posterior["events"].to_dataset().transpose("chain", "draw", "stroke", ...)
+    missing = [name for name in ("forward", "backward") if name not in events.stroke.values]
     if missing:
         raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
-    right = last[..., strokes == "forward"].min("stroke")
-    left = last[..., strokes == "backward"].max("stroke")
-    levels = [0.5 * (1.0 - probability), 0.5, 0.5 * (1.0 + probability)]
-    bounds = {
-        name: (("bound",), np.quantile(values, levels), last.attrs)
-        for name, values in (("left", left), ("right", right), ("width", right - left))
+    left_x, right_x, gaps = _ends(events)
+    draws = posterior_draws(posterior).sel(chain=events["chain"], draw=events["draw"])
+    contours = contours_of(draws, posterior.attrs["family"])
+    left, right = (contours.locate(contours.parameter_of_x(x)) for x in (left_x, right_x))
+    certificate = triangle(left, right)
+    vertex_x, vertex_y = contours.point(0.0)
+    length, angle = length_unit(posterior), {"units": "rad"}
+
+    def bounds(values: Floats) -> Floats:
+        return np.quantile(values, levels, axis=0)
+
+    is_open = right_x > left_x
+    some = is_open if is_open.any() else np.full_like(is_open, True)  # NaN of all, if none leaves a gap
+    variables: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {
+        "left": (("bound",), bounds(left_x), length),
+        "right": (("bound",), bounds(right_x), length),
+        "width": (("bound",), bounds(right_x - left_x), length),
+        "left_y": (("bound",), bounds(left.y), length),
+        "right_y": (("bound",), bounds(right.y), length),
+        "left_slope_angle": (("bound",), bounds(left.slope_angle), angle),
+        "right_slope_angle": (("bound",), bounds(right.slope_angle), angle),
+        "vertex_x": (("bound",), bounds(np.broadcast_to(vertex_x, left_x.shape)), length),
+        "vertex_y": (("bound",), bounds(np.broadcast_to(vertex_y, left_x.shape)), length),
+        "apex_x": (("bound",), bounds(certificate.apex_x[some]), length),
+        "apex_y": (("bound",), bounds(certificate.apex_y[some]), length),
+        "triangle_height": (("bound",), bounds(certificate.height[some]), length),
+        "triangle_width": (("bound",), bounds(certificate.width[some]), length),
+        "snap_off_drive_angle": (("bound", "stroke"), bounds(_rows(events["snap_off_drive_angle"])), angle),
     }
-    return xr.Dataset(bounds, coords={"bound": ["lower", "median", "upper"]}, attrs={"probability": probability})
+    begin, end = (float(np.median(x)) for x in (left_x, right_x))
+    x = np.linspace(begin, end, _PLACES)
+    heights = np.broadcast_to(contours.take(np.arange(left_x.size)[:, None]).height(x), (left_x.size, _PLACES))
+    lower, upper = (np.where(np.isnan(edge), heights, edge) for edge in certificate.between(x))
+    known = end > begin
+    blank = 0.0 if known else np.nan
+    variables |= {
+        "triangle_lower": (("x",), np.quantile(lower, levels[0], axis=0) + blank, length),
+        "triangle_upper": (("x",), np.quantile(upper, levels[2], axis=0) + blank, length),
+    }
+    cut_short = False
+    trees = {"band": posterior} | ({} if without_events is None else {"band_without_events": without_events})
+    for name, tree in trees.items():
+        band = contour_band(tree, x, probability)
+        for edge in ("lower", "median", "upper"):
+            variables[f"{name}_{edge}"] = (("x",), band[edge].values + blank, length)
+        width = float(np.max(band["upper"].values - band["lower"].values))
+        variables[name.replace("band", "band_width")] = ((), width + blank, length)
+        cut_short |= bool(np.isnan(width))
+    share = float(is_open.mean())
+    return xr.Dataset(
+        {
+            **variables,
+            "share_open": ((), share, {"units": "1"}),
+            "status": ((), _status(share, known, cut_short)),
+        },
+        coords={"bound": ["lower", "median", "upper"], "x": ("x", x, length), "stroke": events.stroke.values},
+        attrs={"probability": probability, "gaps": gaps},
+    )
+
+
+def _ends(events: xr.Dataset) -> tuple[Floats, Floats, int]:
+    """Left and right end of the gap of each contour, and how many gaps there are."""
+    ends = np.stack([_rows(events["first_contact_x"]), _rows(events["snap_off_contact_x"])])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    typical_low, typical_high = np.median(low, axis=0), np.median(high, axis=0)
+    order = np.argsort(typical_low + typical_high)
+    reached = np.maximum.accumulate(typical_high[order])[:-1]
+    next_ = np.minimum.accumulate(typical_low[order][::-1])[::-1][1:]
+    cut = int(np.argmax(next_ - reached)) + 1
+    left, right = high[:, order[:cut]].max(axis=1), low[:, order[cut:]].min(axis=1)
+    return left, right, int(np.count_nonzero(next_ > reached))
+
+
+def _rows(values: xr.DataArray) -> Floats:
+    """Values of all draws, shape (draws, strokes)."""
+    return np.asarray(values.values, dtype=float).reshape(-1, values.sizes["stroke"])
+
+
+def _status(share_open: float, known: bool, cut_short: bool) -> str:
+    if share_open == 0.0:
+        return "the sweeps overlap: no gap is left"
+    if not known:
+        return "the sweeps overlap in most contours: the triangle is that of the others, and there is no band"
+    if cut_short:
+        return "some contours end inside the gap: there is no width of their band"
+    if share_open < 1.0:
+        return "the sweeps overlap in some contours: the triangle is that of the others"
+    return "ok"

@@ -1,0 +1,86 @@
+"""What convexity alone says of a contour between two contacts: the triangle of chord and tangents."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contours.base import Locus
+
+__all__ = ["Triangle", "triangle"]
+
+Floats = NDArray[np.float64]
+
+
+class Triangle(NamedTuple):
+    """Where a convex contour can be between two of its points, if its tangents there are known.
+
+    It lies below the chord, and above both tangents.
+    """
+
+    left: Locus
+    right: Locus
+    apex_x: Floats
+    apex_y: Floats
+    height: Floats
+    """Distance of the apex from the chord: how far the contour can be from it."""
+    width: Floats
+    """The same measured upright: the largest extent in y."""
+
+    def between(self, x: Floats) -> tuple[Floats, Floats]:
+        """Lowest and highest y that the contour can have at x, shape (triangles, x); NaN outside of the ends."""
+        left, right = self.left, self.right
+        after, before = x - left.x[:, None], x - right.x[:, None]
+        inside = (after >= 0.0) & (before <= 0.0) & np.isfinite(self.height)[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            chord = left.y[:, None] + after * ((right.y - left.y) / (right.x - left.x))[:, None]
+        from_left = left.y[:, None] + after * np.tan(left.slope_angle)[:, None]
+        from_right = right.y[:, None] + before * np.tan(right.slope_angle)[:, None]
+        lower = np.minimum(np.maximum(from_left, from_right), chord)
+        return np.where(inside, lower, np.nan), np.where(inside, chord, np.nan)
+
+
+def triangle(left: Locus, right: Locus) -> Triangle:
+    """The triangle between two contacts of each of n contours; NaN where the left one is not on the left.
+
+    With the chord of length ℓ and its angles A and B to the tangents, the height is ℓ sin A sin B / sin(A + B).
+
+    Parameters
+    ----------
+    left, right : Locus
+        The contacts, arrays of shape (n,).
+
+    Returns
+    -------
+    Triangle
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import Parabola
+    >>> parabola = Parabola(0.5, q=0.3)
+    >>> ends = (parabola.locate(parabola.parameter_of_x([x])) for x in (-0.2, 0.4))
+    >>> found = triangle(*ends)
+    >>> found.apex_x.round(12), found.width.round(12)  # midway; half of a (x₂ − x₁)²
+    (array([0.1]), array([0.09]))
+    """
+    across, up = right.x - left.x, right.y - left.y
+    length, chord = np.hypot(across, up), np.arctan2(up, across)
+    # Of a contour that is all but straight between the ends, rounding may bend it the wrong way.
+    at_left = np.maximum(chord - left.slope_angle, 0.0)
+    at_right = np.maximum(right.slope_angle - chord, 0.0)
+    bent = at_left + at_right > 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = np.where(bent, length * np.sin(at_right) / np.sin(at_left + at_right), 0.5 * length)
+    open_ = across > 0.0
+    along = np.where(open_, along, np.nan)
+    height = along * np.sin(at_left)
+    return Triangle(
+        left,
+        right,
+        left.x + along * np.cos(left.slope_angle),
+        left.y + along * np.sin(left.slope_angle),
+        height,
+        height / np.cos(chord),
+    )

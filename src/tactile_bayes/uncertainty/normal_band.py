@@ -1,0 +1,178 @@
+"""Uncertainty bands across a contour, along its normals."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.roots import falling_root
+from tactile_bayes.uncertainty.band import contours_drawn, length_unit, places
+from tactile_bayes.uncertainty.quantiles import central_levels, quantile_band
+
+__all__ = ["normal_band", "normal_offsets"]
+
+Floats = NDArray[np.float64]
+
+_BLOCK = 100_000
+"""Normals of contours that are searched at once."""
+
+_FARTHEST = 2.0**60
+"""Where the search on an endless contour is given up."""
+
+_SLOWEST = float(np.finfo(float).tiny)
+"""Rate that stands for none: a root at a vertex where the contour's parameter stands still is then left as it is."""
+
+_MISSED = 1e-9
+"""Distance from a normal, as a share of all lengths in play, beyond which a point is not on it."""
+
+
+def normal_band(
+    posterior: xr.DataTree,
+    x: ArrayLike,
+    probability: float = 0.95,
+    simultaneous: bool = False,
+    *,
+    reference: Contour | None = None,
+) -> xr.Dataset:
+    """Band in which the contour lies with a given probability, measured along the normals of a reference contour.
+
+    On a steep flank this says how well the contour is known where a band in y says how steep it is.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    x : array_like, shape (n,)
+        Where the normals start on the reference, in the record's unit of length.
+    probability : float
+        In (0, 1).
+    simultaneous : bool
+        As in `contour_band`: whether the probability holds at every normal by itself, or for all of them at once.
+    reference : Contour, optional
+        By default the most central draw: the one whose heights at these x are nearest to their medians, summed up. A
+        pointwise median need not be convex, and the likeliest draw may lie on the rim of a narrow ridge.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "x": y and slope_angle of the reference; lower, median and upper, the signed distances of contours from it
+        [length], positive into the object; both edges as points, lower_x, lower_y, upper_x, upper_y; share_reaching,
+        the share of contours that the normal meets, and status in words: "ok", or why the band is NaN.
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not in (0, 1), x is not a list of finite numbers, or the reference is no single contour.
+
+    Examples
+    --------
+    >>> values = {"r": np.array([[0.5, 0.6, 0.7]]), "q": np.array([[0.5, 0.4, 0.3]]), "x_c": np.zeros((1, 3))}
+    >>> tree = xr.DataTree.from_dict({"posterior": xr.Dataset({k: (("chain", "draw"), v) for k, v in values.items()})})
+    >>> tree.attrs = {"family": "circle", "units": "dimensionless"}
+    >>> normal_band(tree, [0.0, 0.3, 0.55], 0.5)["upper"].values.round(12)  # circles about one centre
+    array([0.05, 0.05, 0.05])
+    """
+    central_levels(probability)
+    at = places(x)
+    contours = contours_drawn(posterior)
+    if reference is None:
+        reference = _most_central(contours, at)
+    if not isinstance(reference, Contour) or reference.shape != ():
+        raise ParameterError(f"reference is {reference!r}: give one contour, or none for the most central draw")
+    locus = reference.locate(reference.parameter_of_x(at))
+    offsets = normal_offsets(contours, locus.x, locus.y, locus.slope_angle)
+    share = np.isfinite(offsets).mean(axis=0)
+    lower, median, upper = quantile_band(offsets, probability, simultaneous)
+    sin, cos = np.sin(locus.slope_angle), np.cos(locus.slope_angle)
+    unit = length_unit(posterior)
+    lengths = {
+        "y": locus.y,
+        "lower": lower,
+        "median": median,
+        "upper": upper,
+        "lower_x": locus.x - lower * sin,
+        "lower_y": locus.y + lower * cos,
+        "upper_x": locus.x - upper * sin,
+        "upper_y": locus.y + upper * cos,
+    }
+    status = np.select(
+        [np.isnan(locus.y), share == 1.0, share > 0.0],
+        ["the reference ends before", "ok", "some contours end before the normal"],
+        "all contours end before the normal",
+    )
+    return xr.Dataset(
+        {
+            **{name: ("x", values, unit) for name, values in lengths.items()},
+            "slope_angle": ("x", locus.slope_angle, {"units": "rad"}),
+            "share_reaching": ("x", share, {"units": "1"}),
+            "status": ("x", status),
+        },
+        coords={"x": ("x", at, unit)},
+        attrs={"probability": probability, "simultaneous": int(simultaneous)},
+    )
+
+
+def normal_offsets(contours: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
+    """Signed distances of n contours from k points along the normals there; shape (n, k).
+
+    They are positive on the left of the slope's direction. NaN where a normal does not meet a contour, or a point is.
+    """
+    count = contours.shape[0]
+    contours = contours.broadcast_to((count,))
+    step = max(1, _BLOCK // max(1, x.size))
+    offsets = np.full((count, x.size), np.nan)
+    given = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(slope_angle))
+    for begin in range(0, count, step):
+        row = np.arange(begin, min(begin + step, count))
+        many = contours.take(np.repeat(row, given.size))
+        place = [np.tile(values[given], row.size) for values in (x, y, slope_angle)]
+        offsets[row[:, None], given] = _offsets(many, *place).reshape(row.size, given.size)
+    return offsets
+
+
+def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
+    """Signed distance of each contour from its own point along the normal there.
+
+    Where the contour turns away from the normal's foot by less than a right angle, the way along the foot's tangent
+    grows along the contour: it has one root at most, where the normal enters the object.
+    """
+    sin, cos = np.sin(slope_angle), np.cos(slope_angle)
+    every = np.arange(x.size)
+
+    def short_of(i: NDArray[np.intp], parameter: Floats) -> tuple[Floats, Floats]:
+        locus = many.take(i).locate(parameter)
+        turn = locus.slope_angle - slope_angle[i]
+        along = (locus.x - x[i]) * cos[i] + (locus.y - y[i]) * sin[i]
+        along = np.where(np.abs(turn) > 0.5 * np.pi, np.copysign(np.inf, turn), along)
+        rate = np.maximum(locus.arclength_rate * np.cos(turn), _SLOWEST)
+        return -along, -rate
+
+    lo, hi = (np.broadcast_to(end, x.shape).astype(float) for end in many.domain)
+    near = many.parameter_of_x(x)
+    near = np.clip(np.where(np.isfinite(near), near, 0.0), lo, hi)
+    with np.errstate(over="ignore"):
+        for end, outward in ((lo, -1.0), (hi, 1.0)):
+            open_ended, way = np.flatnonzero(~np.isfinite(end)), 1.0
+            while open_ended.size and way < _FARTHEST:
+                end[open_ended] = near[open_ended] + outward * way
+                inside = outward * short_of(open_ended, end[open_ended])[0] > 0.0
+                open_ended, way = open_ended[inside], 2.0 * way
+        root = falling_root(short_of, lo, hi, near)
+        missed = np.abs(short_of(every, root)[0])
+    locus = many.locate(root)
+    met = missed <= _MISSED * (np.abs(x) + np.abs(y) + np.abs(locus.x) + np.abs(locus.y))
+    return np.where(met, (locus.y - y) * cos - (locus.x - x) * sin, np.nan)
+
+
+def _most_central(contours: Contour, x: Floats) -> Contour:
+    """The contour whose heights are nearest to the pointwise medians, of those that reach the most places."""
+    every = np.arange(contours.shape[0])[:, None]
+    heights = np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
+    reaching = np.isfinite(heights)
+    seen = reaching.any(axis=0)
+    away = np.nansum(np.abs(heights[:, seen] - np.nanmedian(heights[:, seen], axis=0)), axis=1)
+    best = np.lexsort((away, -np.count_nonzero(reaching, axis=1)))[0]
+    return contours.take(np.asarray(best))

@@ -1,0 +1,81 @@
+"""Intervals and bands: quantiles of what posterior draws say."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["central_levels", "quantile_band"]
+
+Floats = NDArray[np.float64]
+
+_ROUNDING = 1e-9
+"""Where a band is narrower than this share of its widest place, its draws differ by rounding."""
+
+
+def central_levels(probability: float) -> tuple[float, float, float]:
+    """Levels of the quantiles that are the central interval's lower end, the median, and its upper end.
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not in (0, 1).
+
+    Examples
+    --------
+    >>> central_levels(0.5)
+    (0.25, 0.5, 0.75)
+    """
+    if not 0.0 < probability < 1.0:
+        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    return 0.5 * (1.0 - probability), 0.5, 0.5 * (1.0 + probability)
+
+
+def quantile_band(values: Floats, probability: float, simultaneous: bool = False) -> Floats:
+    """Lower edge, median and upper edge of draws along a line.
+
+    Parameters
+    ----------
+    values : ndarray, shape (draws, places)
+        NaN where a draw has none.
+    probability : float
+        In (0, 1).
+    simultaneous : bool
+        Whether the band is to hold that share of draws as a whole: the pointwise one is then widened about the median,
+        everywhere by the same factor.
+
+    Returns
+    -------
+    ndarray, shape (3, places)
+        NaN where some draw has no value.
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not in (0, 1).
+
+    Examples
+    --------
+    >>> quantile_band(np.linspace([0.0, 0.0], [1.0, 2.0], 101), 0.9).round(12)
+    array([[0.05, 0.1 ],
+           [0.5 , 1.  ],
+           [0.95, 1.9 ]])
+    """
+    levels = central_levels(probability)
+    band = np.full((3, values.shape[1]), np.nan)
+    known = np.isfinite(values).all(axis=0)
+    if not known.any():
+        return band
+    lower, median, upper = np.quantile(values[:, known], levels, axis=0)
+    if simultaneous:
+        off = values[:, known] - median
+        reach = np.where(off > 0.0, upper - median, median - lower)
+        widest = float(np.max(upper - lower))
+        if widest > 0.0:
+            most = (np.abs(off) / np.maximum(reach, _ROUNDING * widest)).max(axis=1)
+            factor = max(1.0, float(np.quantile(most, probability, method="inverted_cdf")))
+            lower, upper = median - factor * (median - lower), median + factor * (upper - median)
+    band[:, known] = lower, median, upper
+    return band

@@ -1,0 +1,89 @@
+"""The figure of the gap: what it draws, and what it says."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+
+mpl.use("Agg")
+
+from matplotlib import pyplot as plt
+
+from tactile_bayes.contours import Parabola
+from tactile_bayes.plotting.gap_map import gap as draw
+from tactile_bayes.uncertainty.gap import gap
+
+TRUTH = Parabola(5.0, q=0.03)
+
+
+@pytest.fixture(autouse=True)
+def _settings_are_left_alone():
+    before = dict(mpl.rcParams)
+    yield
+    plt.close("all")
+    assert dict(mpl.rcParams) == before
+
+
+def posterior(left, right, share=0.01):
+    """Draws about the true contour; the gap is from `left` to `right`, in metres."""
+    rng = np.random.default_rng(1)
+    dims, size = ("chain", "draw", "stroke"), (2, 200)
+    parameters = {"a": 5.0, "q": 0.03, "x_c": 0.0}
+    noise = {"a": share * 5.0, "q": share * 1e-3, "x_c": share * 0.01}
+    ends = {"snap_off_contact_x": (right, left), "first_contact_x": (0.09, -0.09), "snap_off_drive_angle": (3.2, -0.1)}
+    out = xr.DataTree.from_dict(
+        {
+            "posterior": xr.Dataset({k: (dims[:2], rng.normal(v, noise[k], size)) for k, v in parameters.items()}),
+            "events": xr.Dataset(
+                {k: (dims, rng.normal(v, 1e-4, (*size, 2))) for k, v in ends.items()},
+                coords={"stroke": ["forward", "backward"]},
+            ),
+        }
+    )
+    out.attrs = {"family": "parabola", "units": "SI"}
+    return out
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_widths_are_side_by_side():
+    made = posterior(-0.006, 0.01)
+    found = gap(made, 0.9, without_events=posterior(-0.006, 0.01, share=0.05))
+    ax = draw(found, truth=TRUTH)
+    labels = texts(ax)
+    width = float(found.triangle_width.sel(bound="median"))
+    assert f"triangle of chord and tangents, {1e6 * width:.3g} µm wide" in labels
+    assert f"90 % band, {1e6 * float(found.band_width):.3g} µm wide" in labels
+    assert f"90 % band without events, {1e6 * float(found.band_width_without_events):.3g} µm wide" in labels
+    assert {"chord", "end tangents", "end contacts", "median", "true contour"} < set(labels)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ − chord [µm]")
+
+
+def test_the_triangle_is_measured_from_the_chord():
+    found = gap(posterior(-0.006, 0.01)).sel(bound="median")
+    ax = draw(gap(posterior(-0.006, 0.01)))
+    (triangle,) = ax.patches
+    corners = triangle.get_xy()[:3]
+    np.testing.assert_allclose(corners[[0, 2]], [[found.left, 0.0], [found.right, 0.0]], atol=1e-15)
+    chord = float(found.left_y) + float(found.right_y - found.left_y) * float(
+        (found.apex_x - found.left) / (found.right - found.left)
+    )
+    np.testing.assert_allclose(corners[1], [found.apex_x, found.apex_y - chord], rtol=1e-12)
+    low, high = ax.get_ylim()
+    assert low < corners[1, 1] < 0.0 < high
+    assert not any("without events" in label for label in texts(ax))
+
+
+def test_axes_given_are_those_that_return():
+    _, ax = plt.subplots()
+    assert draw(gap(posterior(-0.006, 0.01)), ax=ax) is ax
+
+
+def test_where_no_gap_is_left_the_axes_say_so():
+    ax = draw(gap(posterior(0.006, -0.01)))
+    assert [text.get_text() for text in ax.texts] == ["the sweeps overlap: no gap is left"]
+    assert not ax.axison

@@ -1,0 +1,151 @@
+"""Bands across contours, against circles about one centre, heights, and geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from tactile_bayes.contours import Circle, Parabola, PowerLaw
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.families import FAMILIES, FLANKS
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.normal_band import normal_band, normal_offsets
+
+X = np.linspace(-0.4, 0.4, 33)
+
+
+def tree(family, *, units="dimensionless", **values):
+    draws = {name: (("chain", "draw"), np.atleast_2d(v)) for name, v in values.items()}
+    out = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
+    out.attrs = {"family": family, "units": units}
+    return out
+
+
+def spread(family, size=200, share=0.02):
+    """Draws with standard deviations of a share of their values."""
+    rng = np.random.default_rng(1)
+    typical = {"a": 0.6, "b": 0.7, "r": 0.6, "w": 1.0, "n": 3.0, "q": 0.3, "x_c": 0.0}
+    names = {name: typical[name.rsplit("_")[-1] if name != "x_c" else name] for name in FAMILIES[family].parameters}
+    return tree(family, **{k: v + share * (v or 0.5) * rng.normal(size=(2, size // 2)) for k, v in names.items()})
+
+
+def concentric(r, centre=1.0):
+    return tree("circle", r=r, q=centre - r, x_c=np.zeros_like(r))
+
+
+def test_circles_about_one_centre_are_apart_by_their_radii():
+    r = np.array([0.5, 0.6, 0.7, 0.8])
+    x = np.array([-0.5, -0.45, 0.0, 0.3, 0.49])
+    reference = Circle(0.5, q=0.5)
+    band = normal_band(concentric(r), x, 0.5, reference=reference)
+    expected = np.quantile(0.5 - r, [0.25, 0.5, 0.75])
+    found = np.array([band[name] for name in ("lower", "median", "upper")])
+    np.testing.assert_allclose(found, np.broadcast_to(expected[:, None], (3, 5)), atol=1e-14)
+    for edge, r_edge in (("lower", 0.5 - expected[0]), ("upper", 0.5 - expected[2])):
+        np.testing.assert_allclose(np.hypot(band[f"{edge}_x"], band[f"{edge}_y"] - 1.0), r_edge, rtol=1e-14)
+    np.testing.assert_allclose(band.y, reference.height(x), rtol=1e-14)
+    assert band.status.values.tolist() == ["ok"] * 5
+
+
+@pytest.mark.parametrize("family", [*FLANKS, "parabola/power-law", "circle/power-law"])
+def test_the_points_found_are_on_the_contours_and_on_the_normals(family):
+    contours = FAMILIES[family].build(
+        *(spread(family)["posterior"][name].values.ravel() for name in FAMILIES[family].parameters)
+    )
+    reference = contours.take(np.asarray(3))
+    locus = reference.locate(reference.parameter_of_x(X))
+    offsets = normal_offsets(contours, locus.x, locus.y, locus.slope_angle)
+    assert np.isfinite(offsets).all()
+    np.testing.assert_allclose(offsets[3], 0.0, atol=1e-13)
+    x = locus.x - offsets * np.sin(locus.slope_angle)
+    y = locus.y + offsets * np.cos(locus.slope_angle)
+    np.testing.assert_allclose(contours.take(np.arange(200)[:, None]).height(x), y, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("family", ["parabola", "circle", "ellipse"])
+def test_to_first_order_it_is_the_vertical_band_seen_across(family):
+    """Second order: relative to the width, of the order of the deviations themselves."""
+    posterior = spread(family, share=1e-5)
+    vertical, across = contour_band(posterior, X), normal_band(posterior, X)
+    width = (vertical.upper - vertical.lower) * np.cos(across.slope_angle)
+    np.testing.assert_allclose(across.upper - across.lower, width, rtol=1e-3)
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.9])
+def test_a_simultaneous_band_holds_whole_contours(probability):
+    posterior, reference = spread("parabola", 1000), Parabola(0.6, q=0.3)
+    locus = reference.locate(reference.parameter_of_x(X))
+    draws = posterior["posterior"]
+    contours = Parabola(*(draws[name].values.ravel() for name in ("a", "q", "x_c")))
+    offsets = normal_offsets(contours, locus.x, locus.y, locus.slope_angle)
+
+    def share(simultaneous):
+        band = normal_band(posterior, X, probability, simultaneous, reference=reference)
+        inside = (offsets >= band.lower.values - 1e-12) & (offsets <= band.upper.values + 1e-12)
+        return inside.all(axis=1).mean()
+
+    assert share(True) == pytest.approx(probability, abs=1.5e-3)
+    assert share(False) < probability
+
+
+def test_the_normal_enters_the_object_where_it_meets_the_contour():
+    """On a steep flank the line goes on to the other flank, which is not meant."""
+    steep, wide = Parabola(20.0, q=0.0), Parabola(np.array([19.0]), q=0.0)
+    locus = steep.locate(steep.parameter_of_x(np.array([-0.3, 0.3])))
+    offsets = normal_offsets(wide, locus.x, locus.y, locus.slope_angle)
+    assert np.all((offsets < 0.0) & (offsets > -0.02))
+
+
+def test_an_endless_contour_is_met_far_away():
+    flat, high = Parabola(0.5, q=0.0), PowerLaw(np.array([1.0, 1.0]), 1.5, q=np.array([1000.0, -1000.0]))
+    locus = flat.locate(np.array([0.0]))
+    np.testing.assert_allclose(normal_offsets(high, locus.x, locus.y, locus.slope_angle), [[1000.0], [-1000.0]])
+
+
+def test_where_contours_end_the_band_is_not_known():
+    r = np.array([0.5, 0.6, 0.7])
+    posterior = tree("circle", r=r, q=np.full(3, 0.3), x_c=np.zeros(3))
+    flat = Parabola(1e-3, q=0.3)
+    for simultaneous in (False, True):
+        band = normal_band(posterior, [0.0, 0.55, 0.65, 0.8], 0.9, simultaneous, reference=flat)
+        np.testing.assert_allclose(band.share_reaching, [1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0])
+        some = "some contours end before the normal"
+        assert band.status.values.tolist() == ["ok", some, some, "all contours end before the normal"]
+        assert np.isfinite(band.upper).values.tolist() == [True, False, False, False]
+    band = normal_band(posterior, [0.0, 0.65], reference=Circle(0.6, q=0.3))
+    assert band.status.values.tolist() == ["ok", "the reference ends before"]
+    assert np.isnan(band.upper_x).values.tolist() == [False, True]
+
+
+def test_a_normal_may_pass_below_a_contour():
+    """It leads to the left, and climbs more slowly than the contour."""
+    far = Parabola(np.array([1.0]), q=10.0)
+    assert np.isnan(normal_offsets(far, np.array([-1.0]), np.array([0.0]), np.array([1.5]))).all()
+
+
+def test_the_reference_is_the_most_central_draw():
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.9])
+    band = normal_band(tree("parabola", a=np.full(5, 0.5), q=q, x_c=np.zeros(5)), [0.0, 0.5])
+    np.testing.assert_allclose(band.y, [0.3, 0.425], rtol=1e-14)
+    r = np.array([0.5, 0.5, 0.5, 0.8])
+    band = normal_band(tree("circle", r=r, q=1.0 - r, x_c=0.0 * r), [0.0, 0.6])
+    assert band.y[0] == pytest.approx(0.2)  # it alone reaches both places
+
+
+def test_units_and_attributes():
+    band = normal_band(tree("parabola", units="SI", a=[2.5], q=[0.1], x_c=[0.0]), X, 0.9, True)
+    assert {band[name].attrs["units"] for name in ("x", "y", "lower", "upper_x")} == {"m"}
+    assert band.slope_angle.attrs["units"] == "rad"
+    assert band.attrs == {"probability": 0.9, "simultaneous": 1}
+
+
+def test_wrong_arguments_are_refused():
+    posterior = spread("parabola")
+    with pytest.raises(ParameterError, match="give a number between 0 and 1"):
+        normal_band(posterior, X, 1.0)
+    with pytest.raises(ParameterError, match="x must be a list of finite numbers"):
+        normal_band(posterior, [np.nan])
+    for reference in (Parabola([0.5, 0.6], q=0.3), "truth"):
+        with pytest.raises(ParameterError, match="give one contour"):
+            normal_band(posterior, X, reference=reference)
