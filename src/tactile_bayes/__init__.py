@@ -25,10 +25,12 @@ _HOMES = {
     "RandomWalk": "load_cell",
     "Rod": "rod",
     "SamplerSettings": "inference.ensembles",
+    "contact_moments": "uncertainty.contact_moments",
     "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
     "equilibria": "scanning",
     "gap": "uncertainty.gap",
+    "implied_contacts": "uncertainty.implied_contacts",
     "in_frame": "record",
     "infer_contacts": "inference.contact_posterior",
     "infer_contour": "inference.contour",
@@ -76,8 +78,10 @@ if TYPE_CHECKING:
     from tactile_bayes.scanning import scan as scan
     from tactile_bayes.scanning_many import scan_many as scan_many
     from tactile_bayes.uncertainty.band import contour_band as contour_band
+    from tactile_bayes.uncertainty.contact_moments import contact_moments as contact_moments
     from tactile_bayes.uncertainty.contact_region import contact_region as contact_region
     from tactile_bayes.uncertainty.gap import gap as gap
+    from tactile_bayes.uncertainty.implied_contacts import implied_contacts as implied_contacts
     from tactile_bayes.uncertainty.normal_band import normal_band as normal_band
     from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 
 import numpy as np
 import xarray as xr
@@ -39,6 +41,7 @@ def infer_contour(
     nuisances: Sequence[str] = STANDARD,
     events: bool = True,
     settings: SamplerSettings | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> xr.DataTree:
     """Posterior of a contour's parameters from a whole record, by independent emcee ensembles.
@@ -80,6 +83,11 @@ def infer_contour(
         whose load noise does not explain: what a method knows that looks at contacts alone.
     settings : SamplerSettings, optional
         When to stop, and how much to spend at most.
+    checkpoint : path-like, optional
+        Folder of its own, made if it is not there, in which every block of steps is kept as soon as it is done. A run
+        that was stopped, however it was, goes on from there when it is called again, and gives the draws of one that
+        was not; it is refused, saying what differs, if record, model, seed or settings are others. Only what ends a run
+        may change: max_steps, max_seconds, min_ess and max_r_hat of the settings.
     progress : callable, optional
         Is given a `Progress` after each look at the diagnostics.
 
@@ -99,7 +107,8 @@ def infer_contour(
         If the family is unknown, a prior does not belong to a parameter, the seed is no whole number from 0 up, or the
         load cell has noise on some channels, and none on another.
     InferenceError
-        If no sample carries any load, or no contour of the family is found that the rod can reach.
+        If no sample carries any load, no contour of the family is found that the rod can reach, or the checkpoint is of
+        another run, damaged or in use.
 
     Notes
     -----
@@ -152,31 +161,36 @@ def infer_contour(
         measured = measured.isel(sample=np.flatnonzero(loaded))
     chosen_priors.update(priors or {})
     model = ContourModel(measured, chosen, rig, noise, chosen_priors)
+    about = {
+        "data_sha256": data_sha256,
+        "family": family,
+        "friction": friction,
+        "nuisances": json.dumps(rig.names),
+        "events": int(events),
+        "priors": json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
+        "units": measured.attrs["units"],
+        "load_cell_frame": frame_of(measured),
+        **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
+        "approximations": "; ".join(noise.cell.approximations),
+        **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name not in noise.inferred},
+    }
     seeds = spawn(seed, 4)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         start = scattered_start(model, seeds[0], settings)
         draws = sample(
-            model.log_probability, start, names=model.names, seed=seeds[1], settings=settings, progress=progress
+            model.log_probability,
+            start,
+            names=model.names,
+            seed=seeds[1],
+            settings=settings,
+            progress=progress,
+            checkpoint=checkpoint,
+            identity=None if checkpoint is None else _identity(about),
         )
         groups = groups_of(model, draws, np.random.default_rng(seeds[2]))
         groups["prior"] = prior_draws(model, np.random.default_rng(seeds[3]))
     tree = xr.DataTree.from_dict(groups)
-    tree.attrs = provenance(
-        draws,
-        seed=seed,
-        settings=settings,
-        data_sha256=data_sha256,
-        family=family,
-        friction=friction,
-        nuisances=json.dumps(rig.names),
-        events=int(events),
-        priors=json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
-        units=measured.attrs["units"],
-        load_cell_frame=frame_of(measured),
-        **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
-        approximations="; ".join(noise.cell.approximations),
-        **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name not in noise.inferred},
-    )
+    tree.attrs = provenance(draws, seed=seed, settings=settings, **about)
     return tree
 
 
@@ -210,6 +224,11 @@ def contours_of(draws: xr.Dataset, family: str) -> Contour:
 def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
     base = float(measured.base_x.mean()), float(measured.base_y.mean())
     return family.default_priors(base, rod_of(measured).length)
+
+
+def _identity(about: Mapping[str, object]) -> dict[str, str]:
+    """What a run that goes on must have in common with the one that was stopped."""
+    return {name: str(value) for name, value in about.items()} | {"version of tactile-bayes": version("tactile-bayes")}
 
 
 def _in_words(prior: Prior) -> str:

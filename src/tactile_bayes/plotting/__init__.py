@@ -12,6 +12,7 @@ from tactile_bayes.plotting.gap_map import gap
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.records import observables, predictive
 from tactile_bayes.plotting.rod_map import rods
+from tactile_bayes.plotting.tightening import tightening
 from tactile_bayes.plotting.touch_map import touched
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "pairs",
     "predictive",
     "rods",
+    "tightening",
     "touched",
     "trace",
 ]

@@ -15,10 +15,11 @@ from tactile_bayes.plotting.maps import finish_map, outline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.patches import Ellipse
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["contact_ellipses", "contact_regions"]
+__all__ = ["contact_ellipses", "contact_regions", "ellipse_of", "radius_of", "refuse_probability"]
 
 _DRAWN = 12
 
@@ -36,12 +37,12 @@ def contact_ellipses(
     Parameters
     ----------
     contacts : xr.Dataset
-        From `reconstruct`, with standard deviations.
+        From `reconstruct`, with standard deviations, or from `contact_moments`.
     probability : float
         Of each ellipse.
     samples : sequence of int, optional
         Which samples, of which those without a contact are left out; by default a dozen of those whose status is "ok",
-        evenly spread.
+        or whose every draw is in contact, evenly spread.
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
@@ -56,9 +57,7 @@ def contact_ellipses(
     ParameterError
         If no sample has an ellipse, or the probability is not in (0, 1).
     """
-    from matplotlib.patches import Ellipse
-
-    _refuse_probability(probability)
+    refuse_probability(probability)
     if not (isinstance(contacts, xr.Dataset) and "contact_x_sd" in contacts):
         raise ParameterError(
             "this is no result of reconstruct: give what it returned; contact_regions draws posteriors"
@@ -67,7 +66,8 @@ def contact_ellipses(
         raise ParameterError(f"samples are numbered from 0 to {contacts.sizes['sample'] - 1}: give some of these")
     spread_x, spread_y = contacts["contact_x_sd"].values, contacts["contact_y_sd"].values
     has = np.isfinite(spread_x) & np.isfinite(spread_y)
-    chosen = _spread(np.flatnonzero(has & (contacts["status"].values == "ok")), samples)
+    certain = contacts["status"] == "ok" if "status" in contacts else contacts["contact_probability"] == 1.0
+    chosen = _spread(np.flatnonzero(has & certain.values), samples)
     chosen = chosen[has[chosen]]
     if not chosen.size:
         raise ParameterError(
@@ -75,15 +75,11 @@ def contact_ellipses(
             "samples that are in contact"
         )
     ax = single_axes() if ax is None else ax
-    radius = float(np.sqrt(chdtri(2.0, 1.0 - probability)))
-    x, y, rho = (contacts[name].values for name in ("contact_x", "contact_y", "contact_xy_correlation"))
+    radius = radius_of(probability)
+    x, y = contacts["contact_x"].values, contacts["contact_y"].values
     for i in chosen.tolist():
-        shared = rho[i] * spread_x[i] * spread_y[i]
-        variances, axes = np.linalg.eigh([[spread_x[i] ** 2, shared], [shared, spread_y[i] ** 2]])
-        across, along = 2.0 * radius * np.sqrt(np.maximum(variances, 0.0))
-        angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))
         colour = PALETTE[str(contacts["contact_phase"].values[i])]
-        ax.add_patch(Ellipse((x[i], y[i]), along, across, angle=angle, fill=False, edgecolor=colour, linewidth=1.0))
+        ax.add_patch(ellipse_of(contacts, i, radius, fill=False, edgecolor=colour, linewidth=1.0))
         ax.plot(x[i], y[i], marker="+", color=colour, markersize=5.0, zorder=3)
     _finish(ax, contacts, chosen, x, y, truth, contacts["contact_phase"].values, f"{100 * probability:.6g} % ellipse")
     return ax
@@ -102,7 +98,7 @@ def contact_regions(
     Parameters
     ----------
     posterior : xr.DataTree
-        From `infer_contacts`.
+        From `infer_contacts` or `implied_contacts`.
     probability : float
         Of each region.
     samples : sequence of int, optional
@@ -123,13 +119,14 @@ def contact_regions(
         If no sample has a contact, or the probability is not in (0, 1).
     """
     from tactile_bayes.inference.result import contact_draws
+    from tactile_bayes.uncertainty.contact_moments import LEAST_DRAWS
     from tactile_bayes.uncertainty.contact_region import contact_region
 
-    _refuse_probability(probability)
+    refuse_probability(probability)
     draws = contact_draws(posterior)
     x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))
     tangential = draws["tangential"].mean(("chain", "draw")).values
-    has = np.isfinite(x) & np.isfinite(y)
+    has = draws["contact_x"].notnull().sum(("chain", "draw")).values >= LEAST_DRAWS
     labels = draws["sample"].values
     if samples is not None:
         absent = np.setdiff1d(samples, labels)
@@ -154,7 +151,27 @@ def contact_regions(
     return ax
 
 
-def _refuse_probability(probability: float) -> None:
+def ellipse_of(
+    contacts: xr.Dataset, sample: int, radius: float, centre: tuple[float, float] | None = None, **style: Any
+) -> Ellipse:
+    """The ellipse of one contact, of a radius in standard deviations, around the contact if not elsewhere."""
+    from matplotlib.patches import Ellipse
+
+    at = contacts.isel(sample=sample)
+    spread_x, spread_y, rho = (float(at[name]) for name in ("contact_x_sd", "contact_y_sd", "contact_xy_correlation"))
+    shared = rho * spread_x * spread_y
+    variances, axes = np.linalg.eigh([[spread_x**2, shared], [shared, spread_y**2]])
+    across, along = 2.0 * radius * np.sqrt(np.maximum(variances, 0.0))
+    angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))
+    return Ellipse(centre or (float(at["contact_x"]), float(at["contact_y"])), along, across, angle=angle, **style)
+
+
+def radius_of(probability: float) -> float:
+    """Of an ellipse that holds a probability, in standard deviations."""
+    return float(np.sqrt(chdtri(2.0, 1.0 - probability)))
+
+
+def refuse_probability(probability: float) -> None:
     if not 0.0 < probability < 1.0:
         raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.9")
 

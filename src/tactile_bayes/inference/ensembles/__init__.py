@@ -12,11 +12,16 @@ The proposals are differential evolution (ter Braak 2006, doi 10.1007/s11222-006
 doi 10.1088/0067-0049/210/1/11): the difference of two other walkers, scaled, and one time in ten unscaled, which lets
 a walker jump between separated modes. The snooker proposal of emcee 3.1.6 does not leave the target invariant and is
 not used.
+
+With a checkpoint, every block of steps is on disk before the next begins. A block's file holds the last positions of
+the walkers and the states of their random numbers, so that a run that was killed makes the same draws as one that was
+not.
 """
 
 from tactile_bayes.inference.ensembles.draws import Draws
+from tactile_bayes.inference.ensembles.places import Place
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, spawn
 
-__all__ = ["Draws", "Progress", "SamplerSettings", "Seed", "sample", "scatter_walkers", "spawn"]
+__all__ = ["Draws", "Place", "Progress", "SamplerSettings", "Seed", "sample", "scatter_walkers", "spawn"]

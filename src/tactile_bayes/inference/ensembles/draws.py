@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.inference.ensembles.places import Place
+
 __all__ = ["Draws"]
 
 
@@ -41,13 +43,16 @@ class Draws:
     comes out too small.
     """
     evaluations: int
-    """Points at which the log-probability was computed."""
+    """Points at which the log-probability was computed; with a checkpoint, those of earlier calls counted in."""
     seconds: float
+    """Time that it took [s]; with a checkpoint, that of the steps made in earlier calls counted in."""
     converged: bool
     message: str
     """In words, how the run ended."""
     stuck: int
     """Number of walkers that did not move in all the steps kept."""
+    places: tuple[Place, ...] = ()
+    """Where ensembles sit if each has come to rest but not all in one place; else empty."""
 
     def by_walker(self) -> Floats:
         """The samples as (chain, walker, step, parameter)."""

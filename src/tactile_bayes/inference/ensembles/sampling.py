@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import math
-import threading
+import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.ensembles.block import Block, WalkingEnsembles, next_look
+from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, open_checkpoint
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
 from tactile_bayes.inference.ensembles.draws import Draws
+from tactile_bayes.inference.ensembles.identity import identity_of_run
+from tactile_bayes.inference.ensembles.places import places_in_words, places_of
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability, Together
-from tactile_bayes.inference.ensembles.walkers import Seed, checked_start, spawn, walking_ensemble
+from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability
+from tactile_bayes.inference.ensembles.walkers import Seed, checked_start, first_random_state, spawn
 
 __all__ = ["Progress", "sample"]
 
 
 Floats = NDArray[np.float64]
-
-_GROWTH = 1.25
-"""Steps at one diagnosis over steps at the one before: all diagnoses together then cost five times the last."""
 
 _DRAWS_PER_WALKER = 5
 """Effective draws that the mean walker must have given: what is discarded then outlasts five autocorrelation times."""
@@ -52,54 +52,7 @@ class Progress:
     ess: float
     """Smallest effective sample size of all parameters, bulk or tail."""
     seconds: float
-    """Time since the start [s]."""
-
-
-class _Block:
-    """Consecutive steps of all ensembles; fewer than planned if time runs out or an interrupt comes."""
-
-    def __init__(
-        self,
-        pool: ThreadPoolExecutor,
-        together: Together,
-        ensembles: Sequence[Iterator[Any]],
-        walkers: int,
-        parameters: int,
-        planned: int,
-    ) -> None:
-        self._pool = pool
-        self._together = together
-        self._ensembles = ensembles
-        self._samples = np.empty((len(ensembles), planned, walkers, parameters))
-        self._values = np.empty((len(ensembles), planned, walkers))
-        self.steps = 0
-
-    def run(self, deadline: float) -> str:
-        """Make the steps; the answer is empty or says what cut them short."""
-        try:
-            while self.steps < self._samples.shape[1]:
-                waiting = [self._pool.submit(self._together.step, states) for states in self._ensembles]
-                failures = [failure for failure in (one.exception() for one in waiting) if failure is not None]
-                for failure in sorted(failures, key=lambda f: isinstance(f, threading.BrokenBarrierError)):
-                    raise failure
-                for k, one in enumerate(waiting):
-                    state = one.result()
-                    self._samples[k, self.steps], self._values[k, self.steps] = state.coords, state.log_prob
-                self.steps += 1
-                if time.monotonic() > deadline:
-                    return _OUT_OF_TIME
-        except KeyboardInterrupt:
-            self._together.abort()  # an ensemble may wait for others that were never asked to step
-            return _INTERRUPTED
-        return ""
-
-    @property
-    def samples(self) -> Floats:
-        return self._samples[:, : self.steps]
-
-    @property
-    def values(self) -> Floats:
-        return self._values[:, : self.steps]
+    """Time since the start [s], with a checkpoint that of the steps made in earlier calls counted in."""
 
 
 def sample(
@@ -110,6 +63,8 @@ def sample(
     seed: Seed,
     settings: SamplerSettings | None = None,
     progress: Callable[[Progress], object] | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    identity: Mapping[str, str] | None = None,
 ) -> Draws:
     """Draw from a posterior with independent ensembles of differential-evolution walkers.
 
@@ -134,6 +89,11 @@ def sample(
     settings : SamplerSettings, optional
     progress : callable, optional
         Is given a `Progress` after each look at the diagnostics.
+    checkpoint : path-like, optional
+        Folder, made if it is not there, in which every block of steps is kept (see Notes).
+    identity : mapping of str to str, optional
+        What the log-probability follows from, for the checkpoint: hash of the data, model, priors and the like. What
+        `sample` itself is given is added to it.
 
     Returns
     -------
@@ -146,7 +106,20 @@ def sample(
     ParameterError
         If shapes do not fit or there are too few walkers.
     InferenceError
-        If walkers start outside the support or in a plane, or the log-probability is NaN or +inf somewhere.
+        If walkers start outside the support or in a plane, or the log-probability is NaN or +inf somewhere; if the
+        checkpoint is another run's, of another format, damaged, in use, or a folder of other things.
+    OSError
+        If a block cannot be written. Those before it are kept.
+
+    Notes
+    -----
+    A run with a checkpoint may be killed at any moment. Called again with the same arguments it goes on after the last
+    block of at most `block_steps` steps that was finished, and its draws are, bit by bit, those of a run that was not
+    killed, as long as the log-probability is. A run that has ended is not made again: its draws come from the
+    checkpoint, and the log-probability is not asked. Of the settings, `max_steps`, `max_seconds`, `min_ess` and
+    `max_r_hat` may change from call to call, so that a run which ran out of steps or time goes on with more of them.
+    Steps that are there are never dropped: with a smaller `max_steps` all of them are returned. Steps that an interrupt
+    cuts short are returned, but not kept.
 
     Examples
     --------
@@ -163,35 +136,51 @@ def sample(
     points = checked_start(start, names, settings)
     chains, walkers, parameters = points.shape
     target = CheckedTarget(log_probability, names)
-    values = np.array([target(ensemble) for ensemble in points])
-    outside = int(np.count_nonzero(np.isneginf(values)))
-    if outside:
-        raise InferenceError(
-            f"{outside} of {values.size} walkers start where the log-probability is −inf: "
-            "start them inside the support, for instance with scatter_walkers"
-        )
-    together = Together(target, chains)
-    ensembles = [
-        walking_ensemble(place, value, together.target_of(k), own)
-        for k, (place, value, own) in enumerate(zip(points, values, spawn(seed, chains), strict=True))
-    ]
-
-    deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
     enough = max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers)
-    kept, kept_values = np.empty((chains, 0, walkers, parameters)), np.empty((chains, 0, walkers))
-    steps, ending = 0, ""
-    with ThreadPoolExecutor(chains) as pool:
+    deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
+    steps, evaluations_before, seconds_before = 0, 0, 0.0
+    ending, look = "", 0
+    stored: Checkpoint | None = None
+    with ExitStack() as stack:
+        if checkpoint is not None:
+            about = identity_of_run(identity, points, names, seed, settings)
+            stored = stack.enter_context(open_checkpoint(checkpoint, about, (chains, walkers, parameters)))
+        if stored is not None and stored.steps:
+            steps = stored.steps
+            last = stored.read(since=steps // 2)
+            kept, kept_values = last.samples, last.log_probability
+            evaluations_before, seconds_before = chains * walkers * (1 + steps), stored.seconds
+            if steps in (stored.judged, next_look(steps - 1, settings.block_steps)) or steps >= settings.max_steps:
+                look = steps  # else it was killed on its way to a look
+        else:
+            last = _beginning(points, target, seed)
+            kept, kept_values = last.samples[:, 1:], last.log_probability[:, 1:]
+        ensembles = stack.enter_context(
+            WalkingEnsembles(target, last.samples[:, -1], last.log_probability[:, -1], last.random_states)
+        )
+
         while not ending:
-            planned = max(settings.block_steps, math.ceil((_GROWTH - 1.0) * steps))
-            block = _Block(pool, together, ensembles, walkers, parameters, min(planned, settings.max_steps - steps))
-            ending = block.run(deadline)
-            dropped = steps - kept.shape[1]
-            steps += block.steps
+            look = look or min(next_look(steps, settings.block_steps), settings.max_steps)
+            blocks: list[Block] = []
+            while steps < look and not ending:
+                blocks.append(ensembles.make_block(min(settings.block_steps, look - steps)))
+                steps += blocks[-1].steps
+                try:
+                    if not blocks[-1].whole:
+                        ending = _INTERRUPTED
+                    elif stored is not None:
+                        stored.write(blocks[-1], seconds_before + time.monotonic() - began)
+                except KeyboardInterrupt:
+                    ending = _INTERRUPTED
+                if not ending and time.monotonic() > deadline:
+                    ending = _OUT_OF_TIME
             if not steps:
                 raise KeyboardInterrupt
-            later_half = slice(steps // 2 - dropped, None)
-            kept = np.concatenate([kept, block.samples], axis=1)[:, later_half]
-            kept_values = np.concatenate([kept_values, block.values], axis=1)[:, later_half]
+            look = 0
+            later_half = slice(steps // 2 - steps, None)
+            kept = np.concatenate([kept, *(block.samples for block in blocks)], axis=1)[:, later_half]
+            kept_values = np.concatenate([kept_values, *(block.log_probability for block in blocks)], axis=1)
+            kept_values = kept_values[:, later_half]
             try:
                 diagnosis = Diagnosis(kept)
             except KeyboardInterrupt:
@@ -199,20 +188,26 @@ def sample(
             lost = lost_walkers(kept_values)
             if ending != _INTERRUPTED and not lost and diagnosis.satisfies(settings.max_r_hat, enough):
                 ending = _CONVERGED
-            elif not ending and steps == settings.max_steps:
+            elif not ending and steps >= settings.max_steps:
                 ending = _OUT_OF_STEPS
-            if progress is not None:
-                worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
-                try:
-                    progress(Progress(steps, settings.max_steps, *worst, time.monotonic() - began))
-                except KeyboardInterrupt:
-                    ending = ending or _INTERRUPTED
+            try:
+                if stored is not None and ending not in ("", _INTERRUPTED):
+                    stored.note_end()
+                if progress is not None:
+                    worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
+                    seconds = seconds_before + time.monotonic() - began
+                    progress(Progress(steps, settings.max_steps, *worst, seconds))
+            except KeyboardInterrupt:
+                ending = ending or _INTERRUPTED
 
     moved = np.any(kept[:, 1:] != kept[:, :-1], axis=-1)  # (chain, step, walker)
     stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
+    places = () if ending == _CONVERGED else places_of(kept, kept_values, names)
     message = f"{ending} after {steps} steps: {diagnosis.in_words(names)}"
     if ending != _CONVERGED:
         message += f"; wanted are R̂ below {settings.max_r_hat:g} and an effective sample size of {enough:.0f}"
+    if places:
+        message += f"; {places_in_words(places)}"
     if lost:
         message += (
             f"; {lost} of {chains * walkers} walkers are lost where nothing is probable: results are not to be used"
@@ -231,9 +226,23 @@ def sample(
         ess_tail=diagnosis.ess_tail,
         acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
         autocorrelation_time=autocorrelation_time(kept),
-        evaluations=target.evaluations,
-        seconds=time.monotonic() - began,
+        evaluations=evaluations_before + target.evaluations,
+        seconds=seconds_before + time.monotonic() - began,
         converged=ending == _CONVERGED,
         message=message,
         stuck=stuck,
+        places=places,
     )
+
+
+def _beginning(points: Floats, target: CheckedTarget, seed: Seed) -> Block:
+    """The starting points as if they were a step."""
+    values = np.array([target(ensemble) for ensemble in points])
+    outside = int(np.count_nonzero(np.isneginf(values)))
+    if outside:
+        raise InferenceError(
+            f"{outside} of {values.size} walkers start where the log-probability is −inf: "
+            "start them inside the support, for instance with scatter_walkers"
+        )
+    randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
+    return Block(points[:, None], values[:, None], randoms)

@@ -27,7 +27,8 @@ class SamplerSettings:
         faster with more of them, but every one of them has to forget its start.
     block_steps : int
         Steps before the first look at the diagnostics, and the least between later ones, which come when the number of
-        steps has grown by a quarter.
+        steps has grown by a quarter. Also the steps between two looks at the clock, and between two files of a
+        checkpoint: what a killed run has to make again.
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
@@ -35,7 +36,9 @@ class SamplerSettings:
     max_steps : int
         Steps after which each ensemble stops, converged or not.
     max_seconds : float, optional
-        Time after which the ensembles stop [s]. A run that ends by it is not reproducible from its seed.
+        Time after which the ensembles stop [s], at the end of a block of at most `block_steps`. A run that ends by it
+        is not reproducible from its seed. It counts from the call: a run that goes on from a checkpoint has all of it
+        again.
 
     Raises
     ------

@@ -3,48 +3,84 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import emcee
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.ensembles.moves import differential_evolution
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["Seed", "checked_start", "scatter_walkers", "spawn", "walking_ensemble"]
+__all__ = [
+    "RandomState",
+    "Seed",
+    "checked_start",
+    "first_random_state",
+    "scatter_walkers",
+    "seed_sequence",
+    "spawn",
+    "walking_ensemble",
+]
 
 
 Floats = NDArray[np.float64]
 Seed = int | np.random.SeedSequence
 
 
+class RandomState(NamedTuple):
+    """State of NumPy's Mersenne Twister, as emcee hands it out and takes it."""
+
+    algorithm: str
+    key: NDArray[np.uint32]
+    """(624,)."""
+    position: int
+    has_gauss: int
+    gauss: float
+
+    def same_as(self, other: Any) -> bool:
+        return self[0] == other[0] and np.array_equal(self.key, other[1]) and self[2:] == tuple(other[2:])
+
+
+def first_random_state(seed: np.random.SeedSequence) -> RandomState:
+    return RandomState(*np.random.RandomState(np.random.MT19937(seed)).get_state(legacy=True))
+
+
+def seed_sequence(seed: Seed) -> np.random.SeedSequence:
+    """The seed as a sequence of which nothing has been spawned."""
+    if isinstance(seed, np.random.SeedSequence):
+        return np.random.SeedSequence(seed.entropy, spawn_key=seed.spawn_key, pool_size=seed.pool_size)
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up, or a numpy.random.SeedSequence")
+    return np.random.SeedSequence(int(seed))
+
+
 def spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:
     """Independent seeds; the same for the same seed, however often it has been asked before."""
-    if isinstance(seed, np.random.SeedSequence):
-        fresh = np.random.SeedSequence(seed.entropy, spawn_key=seed.spawn_key, pool_size=seed.pool_size)
-    elif isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up, or a numpy.random.SeedSequence")
-    else:
-        fresh = np.random.SeedSequence(int(seed))
-    return fresh.spawn(count)
+    return seed_sequence(seed).spawn(count)
 
 
 def walking_ensemble(
-    start: Floats, values: Floats, target: LogProbability, seed: np.random.SeedSequence
+    points: Floats,
+    values: Floats,
+    target: LogProbability,
+    random_state: RandomState,
+    moves: Sequence[tuple[Any, float]] | None = None,
 ) -> Iterator[Any]:
-    """Endless states of one ensemble."""
-    walkers, parameters = start.shape
-    moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
-    sampler: Any = emcee.EnsembleSampler(walkers, parameters, target, moves=moves, vectorize=True)
+    """Endless states of one ensemble, after the one given."""
+    walkers, parameters = points.shape
+    moves = differential_evolution() if moves is None else moves
+    sampler: Any = emcee.EnsembleSampler(walkers, parameters, target, moves=list(moves), vectorize=True)
     sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
-    given: Any = np.random.RandomState(np.random.MT19937(seed)).get_state()
-    sampler.random_state = given
-    taken = sampler.random_state
-    if not (taken[0] == given[0] and np.array_equal(taken[1], given[1]) and taken[2:] == given[2:]):
+    sampler.random_state = random_state
+    if not random_state.same_as(sampler.random_state):
         raise InferenceError("emcee did not take the random state that it was given: use version 3.1.6 or a later 3.1")
-    states: Iterator[Any] = sampler.sample(emcee.State(start, log_prob=values), iterations=None, store=False)
+    # Starting points are checked before; those of a run that goes on are where it was, whatever emcee thinks of them.
+    states: Iterator[Any] = sampler.sample(
+        emcee.State(points, log_prob=values), iterations=None, store=False, skip_initial_state_check=True
+    )
     return states
 
 

@@ -1,0 +1,200 @@
+"""Prints how many effective draws of one posterior our sampler and its peers make in a second, and of an evaluation.
+
+The posterior is the demonstration's: a parabola's three parameters and the factor on the load cell's noise. Every
+sampler is given the very same log-probability, the same starts, one processor core, and the same number of
+evaluations, in four independent runs of which the second half counts. Points that a sampler wants at once are computed
+at once. Times are the processor's. Effective sample size is that of the bulk, of the worst parameter, by arviz-stats
+over four chains; the chain of a run with many walkers is walker-major. Peers are not dependencies of this package;
+somewhere else they go by
+
+    pip install --target PEERS --no-deps pints tabulate zeus-mcmc tqdm seaborn scikit-learn joblib
+    PYTHONPATH=PEERS python -m benchmarks.samplers
+
+dynesty, which makes weighted draws and no chains, has no such number and is not in the table.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from arviz_stats.base.array import array_stats
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+import tactile_bayes as tb
+from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.inference.contour import default_priors
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_start import scattered_start
+from tactile_bayes.inference.ensembles import sample, spawn
+from tactile_bayes.inference.ensembles.diagnosis import walker_major
+from tactile_bayes.inference.families import family_named
+from tactile_bayes.inference.noise import noise_of
+from tactile_bayes.inference.nuisances import nuisances_of
+
+Floats = NDArray[np.float64]
+Sampler = Callable[["Counted", Floats, int], Floats]
+
+RUNS = 4
+WALKERS = 32
+
+
+class Counted:
+    """A log-probability that counts the points at which it was computed."""
+
+    def __init__(self, log_probability: Callable[[Floats], Floats]) -> None:
+        self.log_probability = log_probability
+        self.evaluations = 0
+
+    def __call__(self, points: Floats) -> Floats:
+        self.evaluations += len(points)
+        return self.log_probability(points)
+
+
+def main(evaluations: int = 100_000) -> None:
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    with threadpool_limits(1):
+        model = demonstration()
+        start = scattered_start(model, spawn(1, 1)[0], tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS))
+        model.log_probability(start[0])  # whatever is compiled is compiled here
+        print(f"{', '.join(model.names)}: {RUNS} runs of {evaluations // RUNS:,} evaluations\n")
+        print(f"{'':<54}{'evaluations':>12}{'CPU':>9}{'R̂':>8}{'ESS':>8}{'ESS/s':>8}{'ESS/1000':>10}{'means off':>11}")
+        reference = None
+        for name, package, sampler in samplers():
+            if not installed(package):
+                print(f"{name:<54}not installed, skipped: pip install --target PEERS {package[0]}")
+                continue
+            target = Counted(model.log_probability)
+            began = time.process_time()
+            draws = sampler(target, start, evaluations)
+            seconds = time.process_time() - began
+            chains = walker_major(draws[:, draws.shape[1] // 2 :])
+            reference = chains if reference is None else reference
+            print_row(f"{name}, {package[0]} {version(package[0])}", target.evaluations, seconds, chains, reference)
+
+
+def demonstration() -> ContourModel:
+    measured = LOAD_CELL.measure(tb.scan(CONTOUR, rod=ROD).record, seed=1)
+    noise = noise_of(measured, None)
+    nuisances = nuisances_of(measured, (), {}, noise.cell, 0.0)
+    priors = default_priors(measured, "parabola", nuisances=())
+    return ContourModel(measured, family_named("parabola"), nuisances, noise, priors)
+
+
+def installed(package: tuple[str, str]) -> bool:
+    try:
+        import_module(package[1])
+    except ImportError as error:
+        if error.name != package[1]:
+            print(f"{package[0]} lacks {error.name}: install it beside", file=sys.stderr)
+        return False
+    return True
+
+
+def print_row(name: str, evaluations: int, seconds: float, chains: Floats, reference: Floats) -> None:
+    """The largest distance of means is in standard deviations, and its Monte-Carlo error 1/√ESS of either."""
+    every = range(chains.shape[-1])
+    ess = min(array_stats.ess(chains[..., i], chain_axis=0, draw_axis=1, method="bulk") for i in every)
+    r_hat = max(array_stats.rhat(chains[..., i], chain_axis=0, draw_axis=1, method="rank") for i in every)
+    off = chains.mean(axis=(0, 1)) - reference.mean(axis=(0, 1))
+    off = float(np.abs(off / reference.std(axis=(0, 1))).max())
+    cells = f"{evaluations:>12,}{seconds:>7.1f} s{r_hat:>8.3f}{ess:>8,.0f}{ess / seconds:>8,.1f}"
+    print(f"{name:<54}{cells}{1000.0 * ess / evaluations:>10.1f}{off:>11.3f}", flush=True)
+
+
+# ---- samplers: from a target, starts (runs, walkers, parameters) and a number of evaluations to draws, shape
+# (runs, steps, walkers, parameters)
+
+
+def samplers() -> Iterator[tuple[str, tuple[str, str], Sampler]]:
+    """Name, distribution and module, and function."""
+    yield "infer_contour's", ("tactile-bayes", "tactile_bayes"), ours
+    pints = ("pints", "pints")
+    yield "DifferentialEvolutionMCMC", pints, population_of_pints("DifferentialEvolutionMCMC")
+    yield "DreamMCMC", pints, population_of_pints("DreamMCMC")
+    yield "HaarioBardenetACMC", pints, haario
+    yield "EnsembleSampler", ("zeus-mcmc", "zeus"), zeus
+
+
+def ours(target: Counted, start: Floats, evaluations: int) -> Floats:
+    """Until the evaluations are spent, though it would have stopped before."""
+    settings = tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS, max_steps=steps_for(evaluations), min_ess=1e9)
+    draws = sample(target, start, names=[f"p{i}" for i in range(start.shape[-1])], seed=1, settings=settings)
+    kept = np.swapaxes(draws.by_walker(), 1, 2)
+    return np.concatenate([np.full_like(kept, np.nan), kept], axis=1)  # it keeps the second half alone
+
+
+def population_of_pints(name: str) -> Sampler:
+    def draw(target: Counted, start: Floats, evaluations: int) -> Floats:
+        pints = import_module("pints")
+        np.random.seed(1)  # noqa: NPY002, it knows no other random numbers
+        runs = []
+        for of_run in start:
+            method = getattr(pints, name)(WALKERS, list(of_run))
+            runs.append(asked(target, [method], steps_for(evaluations)))
+        return np.array(runs)
+
+    return draw
+
+
+def haario(target: Counted, start: Floats, evaluations: int) -> Floats:
+    """One walker a run, from the first of the ensemble's; the scatter of the starts is the guess of its covariance."""
+    pints = import_module("pints")
+    np.random.seed(1)  # noqa: NPY002
+    covariance = np.cov(start.reshape(-1, start.shape[-1]).T)
+    methods = [pints.HaarioBardenetACMC(of_run[0], covariance) for of_run in start]
+    return np.swapaxes(asked(target, methods, evaluations // RUNS), 0, 1)[:, :, None]
+
+
+def asked(target: Counted, methods: list[Any], steps: int) -> Floats:
+    """Steps of methods of PINTS, whose points are computed together; shape (steps, walkers, parameters)."""
+    draws = []
+    quiet = [method for method in methods if method.needs_initial_phase()]
+    for method in quiet:
+        method.set_initial_phase(True)
+    current: list[Any] = [None] * len(methods)
+    while len(draws) < steps:
+        if len(draws) == min(200, steps // 4):  # the length that the controller of PINTS gives its initial phase
+            for method in quiet:
+                method.set_initial_phase(False)
+        points = [np.atleast_2d(method.ask()) for method in methods]
+        values = np.split(target(np.concatenate(points)), np.cumsum([len(p) for p in points])[:-1])
+        for i, (method, of_method) in enumerate(zip(methods, values, strict=True)):
+            told = method.tell(of_method if len(methods) == 1 else of_method[0])
+            current[i] = current[i] if told is None else np.atleast_2d(told[0])
+        if all(place is not None for place in current):
+            draws.append(np.concatenate(current))
+    return np.array(draws)
+
+
+def zeus(target: Counted, start: Floats, evaluations: int) -> Floats:
+    """Slices take as many evaluations as they take: a run ends when its share of them is spent."""
+    sampler_of = import_module("zeus").EnsembleSampler
+    np.random.seed(1)  # noqa: NPY002
+    runs = []
+    for of_run in start:
+        spent = target.evaluations
+        sampler = sampler_of(WALKERS, start.shape[-1], target, vectorize=True, verbose=False)
+        for _ in sampler.sample(of_run, iterations=steps_for(evaluations), progress=False):
+            if target.evaluations - spent >= evaluations // RUNS:
+                break
+        done = int(sampler.iteration)
+        runs.append(sampler.get_chain()[:done])
+    steps = min(map(len, runs))
+    return np.array([run[:steps] for run in runs])
+
+
+def steps_for(evaluations: int) -> int:
+    return evaluations // (RUNS * WALKERS)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

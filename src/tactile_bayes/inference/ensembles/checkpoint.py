@@ -1,0 +1,214 @@
+"""A run on disk, a file a block, from which it goes on after having been killed at any moment."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.files import write_atomically
+from tactile_bayes.inference.ensembles.block import Block
+from tactile_bayes.inference.ensembles.identity import changes
+from tactile_bayes.inference.ensembles.walkers import RandomState
+
+__all__ = ["Checkpoint", "open_checkpoint"]
+
+
+_DESCRIPTION = "checkpoint.json"
+
+_KIND = "ensembles of tactile-bayes"
+
+_FORMAT = 1
+
+_BLOCK = re.compile(r"block-(\d{8,})-(\d{8,})\.npz")
+"""First step of a block, counted from 0, and the step after its last."""
+
+_UNFINISHED = re.compile(r"\.[0-9a-f]{16}\.tmp\.(npz|json)")
+
+
+class Checkpoint:
+    """The blocks of one run in a folder.
+
+    Each file is written whole and holds all that the next step depends on, so that the last of them is where the run
+    stands. No block is ever written twice.
+    """
+
+    def __init__(self, folder: Path, identity: Mapping[str, str], shape: tuple[int, int, int]) -> None:
+        """`shape`: (chains, walkers, parameters)."""
+        self._folder = folder
+        self._identity = dict(identity)
+        self._shape = shape
+        self.judged = 0
+        """Steps after which the run was last ended and judged, be it by time or between two looks; 0 if never."""
+        self._ends = self._found()
+        self.seconds = 0.0
+        """Time that the steps up to the last block that was read or written took [s]."""
+
+    @property
+    def steps(self) -> int:
+        """Steps of each ensemble that are there."""
+        return self._ends[-1] if self._ends else 0
+
+    def read(self, since: int) -> Block:
+        """The steps from `since` on, in one block."""
+        begins = [0, *self._ends]
+        parts = [self._read(a, b) for a, b in zip(begins, self._ends, strict=False) if b > since]
+        dropped = since - (self.steps - sum(part.steps for part in parts))
+        samples = np.concatenate([part.samples for part in parts], axis=1)[:, dropped:]
+        values = np.concatenate([part.log_probability for part in parts], axis=1)[:, dropped:]
+        return Block(samples, values, parts[-1].random_states)
+
+    def write(self, block: Block, seconds: float) -> None:
+        """Append a block, made after `seconds` [s] of the whole run."""
+        if not self._ends:
+            self._describe()
+        end = self.steps + block.steps
+        path = self._folder / _name(self.steps, end)
+        if path.exists():
+            raise InferenceError(f"another run is at work on {self._folder}, {path.name} is there: wait for it to end")
+        _, keys, positions, has_gauss, gauss = zip(*block.random_states, strict=True)
+        with write_atomically(path) as temporary:
+            np.savez(
+                temporary,
+                samples=block.samples,
+                log_probability=block.log_probability,
+                random_keys=np.array(keys, dtype=np.uint32),
+                random_positions=np.array(positions, dtype=np.int64),
+                random_has_gauss=np.array(has_gauss, dtype=np.int64),
+                random_gauss=np.array(gauss, dtype=np.float64),
+                seconds=np.float64(seconds),
+            )
+        self._ends.append(end)
+        self.seconds = seconds
+
+    def note_end(self) -> None:
+        """Note that the run was judged after the last block and ended there."""
+        if self.judged != self.steps:
+            self.judged = self.steps
+            self._describe()
+
+    def _describe(self) -> None:
+        table = {"kind": _KIND, "format": _FORMAT, "judged": self.judged, "identity": self._identity}
+        text = json.dumps(table, indent=1, ensure_ascii=False)
+        with write_atomically(self._folder / _DESCRIPTION) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+
+    def _found(self) -> list[int]:
+        """Ends of the blocks that are there, in steps; they have to be this run's and without gaps."""
+        files = sorted(path.name for path in self._folder.iterdir())
+        leftovers = [name for name in files if _UNFINISHED.fullmatch(name)]
+        if _DESCRIPTION in files:
+            self.judged = self._description()
+        elif strangers := [name for name in files if name not in leftovers]:
+            raise InferenceError(
+                f"{self._folder} holds {strangers[0]!r} and no {_DESCRIPTION}, so it is no checkpoint: give a folder "
+                "that is empty or not there yet"
+            )
+        for name in leftovers:
+            (self._folder / name).unlink(missing_ok=True)
+        end, ends = 0, []
+        for begin, stop in sorted((int(m[1]), int(m[2])) for m in map(_BLOCK.fullmatch, files) if m):
+            if begin != end or stop <= begin:
+                raise InferenceError(
+                    f"{self._folder} has no block that begins with step {end}, but {_name(begin, stop)}: put the "
+                    "missing file back, or move away all blocks after it, and the run makes them again"
+                )
+            end = stop
+            ends.append(end)
+        return ends
+
+    def _description(self) -> int:
+        """Steps after which the run was last judged, if the description is of this run."""
+        path = self._folder / _DESCRIPTION
+        try:
+            table = json.loads(path.read_text(encoding="utf-8"))
+            if table["kind"] != _KIND:
+                raise ValueError(f"it is of kind {table['kind']!r}")
+            number = int(table["format"])
+            if number != _FORMAT:
+                raise InferenceError(
+                    f"{path} has format {number}, and this version reads format {_FORMAT}: go on with the version that "
+                    "began it, or give another folder"
+                )
+            identity = {name: str(value) for name, value in table["identity"].items()}
+            judged = int(table["judged"])
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise InferenceError(
+                f"{path} is not the description of a checkpoint, or damaged ({error!r}): put a copy of it back, or "
+                "give another folder"
+            ) from error
+        if found := changes(identity, self._identity):
+            raise InferenceError(
+                f"{self._folder} is the checkpoint of another run, which differs in {'; '.join(found)}: give another "
+                "folder, or what was given then (only max_steps, max_seconds, min_ess and max_r_hat may change)"
+            )
+        return judged
+
+    def _read(self, begin: int, end: int) -> Block:
+        path = self._folder / _name(begin, end)
+        chains, walkers, parameters = self._shape
+        try:
+            with zipfile.ZipFile(path) as archive:
+                if archive.testzip() is not None:
+                    raise ValueError("a checksum differs")
+            with np.load(path, allow_pickle=False) as arrays:
+                samples, values = arrays["samples"], arrays["log_probability"]
+                keys, positions = arrays["random_keys"], arrays["random_positions"].tolist()
+                has_gauss, gauss = arrays["random_has_gauss"].tolist(), arrays["random_gauss"].tolist()
+                seconds = float(arrays["seconds"])
+            if samples.shape != (chains, end - begin, walkers, parameters) or values.shape != samples.shape[:3]:
+                raise ValueError(f"its samples have shape {samples.shape}")
+            columns = zip(["MT19937"] * chains, keys, positions, has_gauss, gauss, strict=True)
+            states = tuple(RandomState(*column) for column in columns)
+        except Exception as error:  # a damaged archive fails its readers in many ways
+            raise InferenceError(
+                f"{path} is damaged or cannot be read ({error}): put a copy of it back, or move it and the blocks "
+                "after it away, and the run makes them again"
+            ) from error
+        self.seconds = seconds
+        return Block(samples, values, states)
+
+
+def _name(begin: int, end: int) -> str:
+    return f"block-{begin:08d}-{end:08d}.npz"
+
+
+@contextmanager
+def open_checkpoint(
+    path: str | os.PathLike[str], identity: Mapping[str, str], shape: tuple[int, int, int]
+) -> Iterator[Checkpoint]:
+    """The checkpoint in a folder, made if it is not there, for this run alone."""
+    folder = Path(path).resolve()
+    if folder.exists() and not folder.is_dir():
+        raise InferenceError(f"{folder} is a file: give a folder as checkpoint")
+    folder.mkdir(parents=True, exist_ok=True)
+    with _alone(folder):
+        yield Checkpoint(folder, identity, shape)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder, where the system can; the lock goes with the process."""
+    try:
+        import fcntl
+    except ImportError:  # Windows: the second of two runs fails when it finds a block that the first has written
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InferenceError(f"another run is at work on {folder}: wait for it, or stop it") from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(handle)

@@ -1,0 +1,84 @@
+"""What a run is about, as names and strings, so that one run does not go on with the steps of another."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.ensembles.settings import SamplerSettings
+from tactile_bayes.inference.ensembles.walkers import Seed, seed_sequence
+
+__all__ = ["changes", "identity_of_run"]
+
+
+Floats = NDArray[np.float64]
+
+_LONGEST = 60
+"""Characters of an entry that a refusal shows."""
+
+
+def identity_of_run(
+    identity: Mapping[str, str] | None, start: Floats, names: Sequence[str], seed: Seed, settings: SamplerSettings
+) -> dict[str, str]:
+    """What the draws follow from: what the caller says of the log-probability, and the rest.
+
+    Raises
+    ------
+    ParameterError
+        If the caller says something else than strings, or under a name that the rest has.
+    """
+    chains, walkers, _ = start.shape
+    entries = {} if identity is None else dict(identity)
+    rest = {
+        "names of parameters": ", ".join(names),
+        "number of ensembles": str(chains),
+        "walkers of an ensemble": str(walkers),
+        "block_steps": str(settings.block_steps),
+        "seed of the ensembles": _seed_in_words(seed),
+        "starting points": hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
+        "version of emcee": version("emcee"),
+    }
+    for name, value in entries.items():
+        if not (isinstance(name, str) and isinstance(value, str)):
+            raise ParameterError(f"the identity says {name!r}: {value!r}: give strings, they are compared as they are")
+        if name in rest:
+            raise ParameterError(f"the identity says {name!r}, which the sampler says itself: leave it out")
+    return {**entries, **rest}
+
+
+def _seed_in_words(seed: Seed) -> str:
+    sequence = seed_sequence(seed)
+    spawned = f", spawn key {sequence.spawn_key}" if sequence.spawn_key else ""
+    return f"{sequence.entropy}{spawned}, pool of {sequence.pool_size}"
+
+
+def changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
+    """What differs, an entry a string: which, from what, to what."""
+    found = []
+    for name in {**now, **before}:
+        was, has_become = before.get(name), now.get(name)
+        if was != has_become:
+            first = _first_difference(was or "", has_become or "")
+            found.append(f"{name} (was {_shown(was, first)}, now {_shown(has_become, first)})")
+    return found
+
+
+def _first_difference(one: str, other: str) -> int:
+    pairs = enumerate(zip(one, other, strict=False))
+    return next((i for i, (a, b) in pairs if a != b), min(len(one), len(other)))
+
+
+def _shown(text: str | None, at: int) -> str:
+    """An entry, shortened to what surrounds a place in it."""
+    if text is None:
+        return "not stated"
+    if len(text) <= _LONGEST:
+        return repr(text)
+    begin = max(0, min(at - _LONGEST // 3, len(text) - _LONGEST))
+    end = begin + _LONGEST
+    return ("…" if begin else "") + repr(text[begin:end]) + ("…" if end < len(text) else "")

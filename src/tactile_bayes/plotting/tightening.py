@@ -1,0 +1,214 @@
+"""How much the contour tightens the single contacts: both beside one another, and the ratio of their spreads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.axes import LABELS, PALETTE, AxesArray, Floats, legend_entry, set_unit
+from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, radius_of, refuse_probability
+from tactile_bayes.plotting.maps import outline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tactile_bayes.contours.base import Contour
+
+__all__ = ["tightening"]
+
+_DETAILS = "abc"
+_ON_MAP = 18
+_ALONG, _ACROSS = "#009E73", "#CC79A7"
+_IMPLIED = "#000000"
+_STYLES = {"forward": "-", "backward": "--"}
+
+
+def tightening(
+    implied: xr.DataTree,
+    single: xr.DataTree | xr.Dataset,
+    *,
+    probability: float = 0.9,
+    samples: Sequence[int] | None = None,
+    truth: Contour | None = None,
+    axes: Any = None,
+) -> AxesArray:
+    """Single contacts beside the contacts that the contour implies: how much the whole record tightens each of them.
+
+    A map with the ellipses of single contacts, three of them enlarged with the ellipses that the contour implies, and
+    over the drive angle how many times smaller the standard deviations along and across the contour have become.
+
+    Parameters
+    ----------
+    implied : xr.DataTree
+        From `implied_contacts`.
+    single : xr.DataTree or xr.Dataset
+        Of the same record, from `infer_contacts`, or from `reconstruct` with standard deviations, of which those whose
+        status is "ok" are shown.
+    probability : float
+        Of each ellipse.
+    samples : sequence of int, optional
+        The three that are enlarged; by default evenly picked from the sweep with the most contacts.
+    truth : Contour, optional
+        The true contour.
+    axes : array_like of Axes, shape (5,), optional
+        For the map, the three details, and the ratios.
+
+    Returns
+    -------
+    ndarray of Axes, shape (5,)
+
+    Raises
+    ------
+    ParameterError
+        If the two are not of one record, no contact or another number than three can be enlarged, or the probability
+        is not in (0, 1).
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, implied_contacts, infer_contour, reconstruct, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> implied = implied_contacts(infer_contour(measured, nuisances=[], seed=1, settings=quick), draws=50)
+    >>> tightening(implied, reconstruct(measured, method="constrained"))[-1].get_ylabel()
+    'single sd / implied sd'
+    """
+    from tactile_bayes.uncertainty.contact_moments import contact_moments
+
+    refuse_probability(probability)
+    tight = contact_moments(implied)
+    loose = single if isinstance(single, xr.Dataset) and "contact_x_sd" in single else contact_moments(single)
+    _refuse_another_record(implied, single, tight, loose)
+    shown = _certain(tight) & _certain(loose)
+    panels = _panels(axes)
+    chosen = _enlarged(shown, implied, samples)
+
+    x, y = tight["contact_x"].values, tight["contact_y"].values
+    dots = {"color": _IMPLIED, "linestyle": "none", "marker": ".", "markersize": 1.2, "zorder": 4}
+    panels[0].plot(x[shown], y[shown], **dots)
+    legend_entry(panels[0], "implied by the contour", **dots | {"markersize": 6.0})
+    on_map = _on_the_map(shown, chosen)
+    contact_ellipses(loose, probability=probability, truth=truth, samples=on_map, ax=panels[0])
+    radius = radius_of(probability)
+    for letter, ax, i in zip(_DETAILS, panels[1:4], chosen.tolist(), strict=True):
+        slope = float(tight["slope_angle"][i])
+        inside = (-14.0 * np.sin(slope), 14.0 * np.cos(slope))
+        letters: dict[str, Any] = {"ha": "center", "va": "center", "fontweight": "bold", "fontsize": "small"}
+        panels[0].annotate(letter, (x[i], y[i]), inside, textcoords="offset points", **letters)
+        _draw_detail(ax, tight, loose, i, radius, truth)
+        ax.set_title(letter, fontsize="small", fontweight="bold", loc="left")
+    _draw_ratios(panels[4], implied, tight, loose, shown)
+    return panels
+
+
+def _refuse_another_record(
+    implied: xr.DataTree, single: xr.DataTree | xr.Dataset, tight: xr.Dataset, loose: xr.Dataset
+) -> None:
+    if not {"observed_data", "constant_data"} <= set(getattr(implied, "children", ())):
+        raise ParameterError("implied is no tree of implied_contacts: give what it returned")
+    hashes = {tree.attrs["data_sha256"] for tree in (implied, single) if "data_sha256" in tree.attrs}
+    if len(hashes) > 1 or tight.sizes["sample"] != loose.sizes["sample"]:
+        raise ParameterError("implied and single contacts are not of one record: ask both of the same one")
+
+
+def _certain(moments: xr.Dataset) -> Any:
+    """Which samples are in contact without doubt, and have standard deviations, shape (samples,)."""
+    known = moments["status"] == "ok" if "status" in moments else moments["contact_probability"] == 1.0
+    return known.values & np.isfinite(moments["tangent_sd"].values) & np.isfinite(moments["normal_sd"].values)
+
+
+def _panels(axes: Any) -> AxesArray:
+    if axes is None:
+        from matplotlib import pyplot as plt
+
+        figure = plt.figure(figsize=(7.0, 7.6), layout="constrained")
+        grid = figure.add_gridspec(3, 3, height_ratios=(0.9, 1.0, 1.0))
+        whole, bottom = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[2, :])
+        panels = [whole, *(figure.add_subplot(grid[1, i]) for i in range(3)), bottom]
+    else:
+        panels = list(np.asarray(axes, dtype=object).ravel())
+    if len(panels) != 5:
+        raise ParameterError(f"axes are {len(panels)}: give five, for the map, three details, and the ratios")
+    return np.array(panels, dtype=object)
+
+
+def _enlarged(shown: Any, implied: xr.DataTree, samples: Sequence[int] | None) -> Any:
+    if samples is not None:
+        chosen = np.atleast_1d(np.asarray(samples, dtype=np.intp))
+        if chosen.size != len(_DETAILS) or not np.isin(chosen, np.flatnonzero(shown)).all():
+            raise ParameterError(
+                f"samples are {list(samples)!r}: give three that are certainly in contact and have standard deviations"
+            )
+        return chosen
+    sweep = implied["constant_data"].to_dataset()["sweep"].values
+    number, count = np.unique(sweep[shown], return_counts=True)
+    if not count.size or count.max() < len(_DETAILS):
+        raise ParameterError(
+            "there are not three contacts with a standard deviation in any sweep: reconstruct with a load cell that "
+            "states its noise, or infer the contacts"
+        )
+    of_sweep = np.flatnonzero(shown & (sweep == number[np.argmax(count)]))
+    return of_sweep[np.linspace(0.1 * of_sweep.size, 0.9 * (of_sweep.size - 1), len(_DETAILS)).astype(int)]
+
+
+def _on_the_map(shown: Any, chosen: Any) -> list[int]:
+    """A dozen and a half of the contacts, from the middles of equal parts, with those that are enlarged."""
+    every = np.flatnonzero(shown)
+    some = every[((np.arange(_ON_MAP) + 0.5) / _ON_MAP * every.size).astype(int)]
+    return [int(i) for i in np.union1d(some, chosen)]
+
+
+def _draw_detail(
+    ax: Axes, tight: xr.Dataset, loose: xr.Dataset, sample: int, radius: float, truth: Contour | None
+) -> None:
+    """Around the implied contact; the axes hold what is left when it is taken off."""
+    colour = PALETTE[str(loose["contact_phase"].values[sample])]
+    x, y = (float(tight[f"contact_{axis}"][sample]) for axis in "xy")
+    off = (float(loose["contact_x"][sample]) - x, float(loose["contact_y"][sample]) - y)
+    ax.add_patch(ellipse_of(loose, sample, radius, off, facecolor=colour, alpha=0.12, linewidth=0.0))
+    ax.add_patch(ellipse_of(loose, sample, radius, off, fill=False, edgecolor=colour, linewidth=1.0))
+    ax.plot(*off, marker="+", color=colour, markersize=5.0)
+    ax.add_patch(ellipse_of(tight, sample, radius, (0.0, 0.0), color=_IMPLIED, linewidth=0.6, zorder=4))
+    spread = [float(loose[f"contact_{axis}_sd"][sample]) for axis in "xy"]
+    reach = 1.15 * (radius * max(spread) + max(map(abs, off)))
+    if truth is not None:
+        along, height = outline(truth, x - 2.0 * reach, x + 2.0 * reach)
+        ax.plot(along - x, height - y, color=PALETTE["change"], linewidth=1.0, linestyle="--")
+    ax.set_aspect("equal", adjustable="box")
+    ax.set_xlim(-reach, reach)
+    ax.set_ylim(-reach, reach)
+    ax.locator_params(nbins=4)
+    ax.tick_params(labelsize="small")
+    limits = np.array([-reach, reach])
+    set_unit(ax.xaxis, LABELS["contact_x"] + " − implied ", "contact_x", tight["contact_x"].attrs, limits)
+    set_unit(ax.yaxis, LABELS["contact_y"] + " − implied ", "contact_y", tight["contact_y"].attrs, limits)
+
+
+def _draw_ratios(ax: Axes, implied: xr.DataTree, tight: xr.Dataset, loose: xr.Dataset, shown: Any) -> None:
+    angle = np.degrees(implied["observed_data"].to_dataset()["drive_angle"].values)
+    record = implied["constant_data"].to_dataset()
+    directions = record["direction"].values
+    for name, colour in (("tangent_sd", _ALONG), ("normal_sd", _ACROSS)):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio: Floats = np.where(shown, loose[name].values / tight[name].values, np.nan)
+        for number in np.unique(record["sweep"].values):
+            of_sweep = record["sweep"].values == number
+            style = _STYLES[str(directions[of_sweep][0])]
+            ax.plot(angle[of_sweep], ratio[of_sweep], color=colour, linestyle=style, linewidth=1.3)
+    for words, colour in (("along the contour", _ALONG), ("across it", _ACROSS)):
+        legend_entry(ax, words, color=colour, linewidth=1.3)
+    present = [direction for direction in _STYLES if direction in directions]
+    for direction in present:
+        legend_entry(ax, direction, color="0.4", linestyle=_STYLES[direction], linewidth=1.3)
+    ax.axhline(1.0, color="0.4", linewidth=0.8)
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.set_xlabel(LABELS["drive_angle"] + " [°]")
+    ax.set_ylabel("single sd / implied sd")
+    ax.grid(axis="y", color="0.9", linewidth=0.6)
+    ax.legend(fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2 + len(present))

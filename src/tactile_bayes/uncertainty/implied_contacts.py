@@ -1,0 +1,215 @@
+"""The contacts that a posterior of the contour implies: where each of its contours is touched, at every drive angle."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.elastica import TANGENTIAL
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.nuisances import Nuisances
+from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
+from tactile_bayes.touching import PLACE
+from tactile_bayes.world import in_world
+
+__all__ = ["implied_contacts"]
+
+Floats = NDArray[np.float64]
+
+_BLOCK = 200
+"""Contours whose paths are followed at a time."""
+
+_CONSTANT = ("sweep", "direction", "base_x", "base_y")
+_KEPT = (
+    "sampler",
+    "seed",
+    "settings",
+    "data_sha256",
+    "family",
+    "friction",
+    "nuisances",
+    "priors",
+    "converged",
+    "approximations",
+)
+"""Attributes of the posterior that hold for the contacts, too."""
+
+_TURNED_BY = ("drive_angle_offset", "suspension_compliance")
+"""What makes the slope of the rod at the pivot another one than was read, draw by draw."""
+
+_DIMS = ("chain", "draw", "sample")
+
+
+def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree:
+    """Contact point and slope angle at every sample, as the posterior of the whole contour has them, jointly.
+
+    Each draw is one contour, and its contacts at all samples are where the rod touches that contour: they belong
+    together, unlike those of `infer_contacts`, which asks each sample alone. It is the same posterior seen from the
+    contacts, and says how much the rest of the record, and the family, tighten each of them.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`; it holds the record.
+    draws : int
+        Of each chain, evenly picked; all if there are fewer. By default those of the group `events`.
+
+    Returns
+    -------
+    xr.DataTree
+        In the layout of `infer_contacts`, in the record's units. Group `posterior`, dimensions (chain, draw, sample):
+        contact_x, contact_y (on the object's surface), slope_angle, contact_arclength, drive_angle (the rod's slope at
+        the pivot) where the encoder's offset or the suspension's compliance was inferred, and tangential (1 in
+        tangential contact, 0 in tip contact); NaN where the contour of that draw is not in contact. Group
+        `sample_stats`, by sample: contact_probability, the share of draws in contact, and tangential_probability, the
+        share of these in tangential contact. Groups `observed_data` and `constant_data`: the record.
+
+    Raises
+    ------
+    InferenceError
+        If this is no result of `infer_contour`, or its record is not the one that it was inferred from.
+    ParameterError
+        If `draws` is not a whole number from 1 up.
+
+    Notes
+    -----
+    Before the first contact and after the snap-off of a contour there is no contact. Near these events only some of the
+    contours are touched, and the draws there are those of the contact given that there is one: contact_probability
+    says how many they are.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> implied = implied_contacts(infer_contour(measured, nuisances=[], seed=1, settings=quick), draws=50)
+    >>> [round(float(implied["posterior"][name][..., 20].mean()), 2) for name in ("contact_x", "contact_y")]
+    [0.66, 0.72]
+    """
+    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 1:
+        raise ParameterError(f"draws is {draws!r}: give a whole number from 1 up, of draws of each chain")
+    record = _record_of(posterior)
+    every = posterior_draws(posterior)
+    count = every.sizes["draw"]
+    # The rule by which `infer_contour` picks those of which it keeps events and predictions.
+    picked = every.isel(draw=np.unique(np.linspace(0, count - 1, min(count, draws)).astype(int)))
+    variables = _implied(posterior, record, picked)
+    tangential, has = variables["tangential"], np.isfinite(variables["tangential"])
+    share, lying = has.mean(axis=(0, 1)), np.nansum(tangential, axis=(0, 1))
+    stats = {
+        "contact_probability": ("sample", share, {"units": "1"}),
+        "tangential_probability": (
+            "sample",
+            np.divide(lying, has.sum(axis=(0, 1)), out=np.full(lying.size, np.nan), where=share > 0.0),
+            {"units": "1"},
+        ),
+    }
+    units, sample = record.attrs["units"], np.arange(record.sizes["sample"])
+    coords = {"chain": picked["chain"].values, "draw": picked["draw"].values, "sample": sample}
+    labelled = {name: (_DIMS, values, _attributes(name, units)) for name, values in variables.items()}
+    tree = xr.DataTree.from_dict(
+        {
+            "posterior": xr.Dataset(labelled, coords=coords),
+            "sample_stats": xr.Dataset(stats, coords={"sample": sample}),
+            "observed_data": record[["drive_angle", *CHANNELS]].drop_attrs(deep=False).assign_coords(sample=sample),
+            "constant_data": record[list(_CONSTANT)].drop_attrs(deep=False).assign_coords(sample=sample),
+        }
+    )
+    number = picked.sizes["chain"] * picked.sizes["draw"]
+    tree.attrs = {
+        "inference_library": "tactile-bayes",
+        "inference_library_version": version("tactile-bayes"),
+        **{name: posterior.attrs[name] for name in _KEPT if name in posterior.attrs},
+        "draws": number,
+        "dependence": "a draw is one contour, and its contacts at all samples lie on it",
+        "message": f"contacts of {number} contours of the posterior; {posterior.attrs['message']}",
+        "units": units,
+    }
+    return tree
+
+
+def _record_of(posterior: xr.DataTree) -> xr.Dataset:
+    """The record that a contour was inferred from, with the rod and the load cell that were taken."""
+    groups = ("posterior", "observed_data", "constant_data")
+    is_tree = isinstance(posterior, xr.DataTree) and set(groups) <= set(posterior.children)
+    if not (is_tree and "family" in posterior.attrs and "sample" not in posterior["posterior"].dims):
+        raise InferenceError("this is no result of infer_contour: give the tree that it returned")
+    record = posterior["constant_data"].to_dataset().assign(posterior["observed_data"].to_dataset().data_vars)
+    stated = ("units", "rod_length", "rod_flexural_rigidity", "rod_diameter")
+    attrs = {k: v for k, v in posterior.attrs.items() if k in stated or str(k).startswith("load_cell_")}
+    record = validate(record.assign_attrs(attrs))
+    if record_hash(record) != posterior.attrs["data_sha256"]:
+        raise InferenceError(
+            "observed_data and constant_data are not the record that this posterior was inferred from: give the whole "
+            "tree, as infer_contour has returned it"
+        )
+    return record
+
+
+def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> dict[str, Floats]:
+    """Variables of the contacts by name, each of shape (chains, draws, samples)."""
+    friction, rod = posterior.attrs["friction"], rod_of(record)
+    inferred = json.loads(posterior.attrs.get("nuisances", "[]"))
+    nuisances = Nuisances(tuple(inferred), {}, rod, friction)
+    # `infer_contour` holds a cell whose noise it infers for one of noise 1.
+    unknown: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in picked}
+    cell = replace(LoadCell.from_record(record) or LoadCell(), **unknown)
+    likelihood = RecordLikelihood(record, cell, friction)
+    angle = record["drive_angle"].values - cell.drive_angle_offset
+    contours = contours_of(picked, posterior.attrs["family"])
+    values = {name: picked[name].values.ravel() for name in inferred}
+    every = np.arange(contours.shape[0])
+    parts = []
+    for block in np.array_split(every, -(-every.size // _BLOCK)):
+        rig = nuisances.rig({name: of_draws[block] for name, of_draws in values.items()})
+        parts.append(_contacts(likelihood, contours.take(block), rig, angle))
+    shape = (picked.sizes["chain"], picked.sizes["draw"], -1)
+    names = [*PLACE, "tangential"]
+    if any(name in inferred for name in _TURNED_BY):
+        names.insert(-1, "drive_angle")
+    return {name: np.concatenate([part[name] for part in parts]).reshape(shape) for name in names}
+
+
+def _contacts(likelihood: RecordLikelihood, contours: Contour, rig: Rig, angle: Floats) -> dict[str, Floats]:
+    """Contacts of contours, shape (contours, samples), in the world's signs and the record's units.
+
+    Drive angles are those of the samples, shape (samples,), as read but for what the data sheet says.
+    """
+    count, strokes = contours.shape[0], likelihood.strokes
+    paths = likelihood.paths(contours, rig, exact_events=True)
+    read = angle - np.broadcast_to(rig.drive_angle_offset, (count,))[:, None]
+    shape = (len(strokes), max(stroke.samples.size for stroke in strokes))
+    samples = np.zeros(shape, dtype=np.intp)
+    seen = np.full((shape[0], count, shape[1]), np.nan)
+    for which, angles, stroke in zip(samples, seen, strokes, strict=True):
+        which[: stroke.samples.size] = stroke.samples
+        of_stroke = read[:, stroke.samples]
+        angles[:, : stroke.samples.size] = np.pi - of_stroke if stroke.backward else of_stroke
+    lane, rank, states = paths.loaded_states(seen.reshape(-1, shape[1]))
+    columns = in_world(paths.seen, lane, states, likelihood.rod)
+    columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
+    out = {name: np.full(read.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}
+    for name, values in out.items():
+        values[lane % count, samples[lane // count, rank]] = columns[name]
+    return out
+
+
+def _attributes(name: str, units: str) -> dict[str, str]:
+    if name == "tangential":
+        return {"units": "1", "long_name": "whether the contact is tangential"}
+    if name == "drive_angle":
+        return {"units": "rad", "long_name": "drive angle"}
+    return {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name}

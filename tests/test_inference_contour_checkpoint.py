@@ -1,0 +1,48 @@
+"""Runs that are stopped and go on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from helpers.contour_posteriors import CELL, infer_as_stated, measured
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.ensembles import SamplerSettings
+
+SHORT = SamplerSettings(ensembles=2, walkers=12, block_steps=20, max_steps=60, min_ess=1e9)
+
+
+def infer(checkpoint=None, **options):
+    options = {"load_cell": CELL, "seed": 1, "settings": SHORT} | options
+    return infer_as_stated(measured(), checkpoint=checkpoint, **options)
+
+
+def test_a_run_that_goes_on_gives_the_draws_of_one_that_was_not_stopped(tmp_path):
+    whole = infer()
+    infer(tmp_path / "run", settings=replace(SHORT, max_steps=20))
+    rest = infer(tmp_path / "run")
+    assert rest["sample_stats"].attrs["steps_run"] == 60
+    for group in ("posterior", "posterior_predictive", "events"):
+        for name, values in whole[group].data_vars.items():
+            np.testing.assert_array_equal(rest[group][name].values, values.values)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"seed": 2}, "seed of the ensembles"),
+        ({"family": "circle"}, "family"),
+        ({"events": False}, "events"),
+        ({"nuisances": ["rigidity_scale"]}, "nuisances"),
+        ({"load_cell": replace(CELL, force_noise=0.06)}, "load_cell_force_noise"),
+        ({"settings": replace(SHORT, walkers=14)}, "walkers of an ensemble"),
+    ],
+)
+def test_another_run_is_refused_and_told_what_differs(tmp_path, change, words):
+    infer(tmp_path, settings=replace(SHORT, max_steps=20))
+    before = sorted(path.name for path in tmp_path.iterdir())
+    with pytest.raises(InferenceError, match=words):
+        infer(tmp_path, **change)
+    assert sorted(path.name for path in tmp_path.iterdir()) == before

@@ -1,0 +1,94 @@
+"""The moves against targets whose moments are known exactly."""
+
+from __future__ import annotations
+
+import emcee
+import numpy as np
+import pytest
+
+from tactile_bayes.inference.ensembles.moves import differential_evolution
+from tactile_bayes.inference.ensembles.walkers import first_random_state, walking_ensemble
+
+WALKERS = 20
+
+CASES = [(2, 1.0, False), (2, 1e-6, True), (8, 1e-6, False), (8, 1.0, True)]
+
+MOVES = {
+    "scaled": lambda: [(emcee.moves.DEMove(), 1.0)],
+    "unscaled": lambda: [(emcee.moves.DEMove(gamma0=1.0), 1.0)],
+    "mixed": differential_evolution,
+    "snooker": lambda: [(emcee.moves.DESnookerMove(), 1.0)],
+}
+
+
+class Gaussian:
+    """A correlated normal distribution, the first coordinate cut off at its mode if there is a wall."""
+
+    def __init__(self, parameters: int, scale: float, *, wall: bool) -> None:
+        rng = np.random.default_rng(parameters)
+        root = scale * np.linalg.cholesky(0.4 * np.eye(parameters) + 0.6)  # correlations of 0.6
+        self.root = root * np.exp(rng.normal(size=(parameters, 1)))
+        self.wall = wall
+        self.precision = np.linalg.inv(self.root @ self.root.T)
+        # The first coordinate is root[0, 0] times the first of independent normal numbers; with a wall, times a
+        # half-normal number, whose mean is √(2/π) and whose variance is 1 − 2/π.
+        mean, variance = (np.sqrt(2.0 / np.pi), 1.0 - 2.0 / np.pi) if wall else (0.0, 1.0)
+        self.mean = self.root[:, 0] * mean
+        self.deviation = np.sqrt((self.root[:, 1:] ** 2).sum(axis=1) + self.root[:, 0] ** 2 * variance)
+
+    def draw(self, rng, count):
+        numbers = rng.normal(size=(count, len(self.root)))
+        if self.wall:
+            numbers[:, 0] = np.abs(numbers[:, 0])
+        return numbers @ self.root.T
+
+    def log_probability(self, x):
+        value = -0.5 * ((x @ self.precision) * x).sum(axis=1)
+        return np.where(x[:, 0] > 0.0, value, -np.inf) if self.wall else value
+
+
+def moments(target: Gaussian, moves, *, ensembles: int, steps: int):
+    """Mean less the true mean, and mean square about it less 1, in true sd; their standard errors: (2, parameters).
+
+    The walkers start from the target itself, exactly, and a move that leaves it invariant keeps them there: every step
+    counts, none is burnt. The error is that between ensembles, which are independent.
+    """
+    totals, moved = [], 0.0
+    for own in np.random.SeedSequence(1).spawn(ensembles):
+        first, second = own.spawn(2)
+        start = target.draw(np.random.default_rng(first), WALKERS)
+        states = walking_ensemble(
+            start, target.log_probability(start), target.log_probability, first_random_state(second), moves()
+        )
+        samples = np.array([next(states).coords.copy() for _ in range(steps)])
+        moved += float(np.mean(samples[1:, :, 0] != samples[:-1, :, 0])) / ensembles
+        centred = (samples - target.mean) / target.deviation
+        totals.append([centred.mean(axis=(0, 1)), (centred**2).mean(axis=(0, 1)) - 1.0])
+    assert moved > 0.05  # else nothing would be shown
+    values = np.array(totals)
+    return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(ensembles)
+
+
+@pytest.mark.parametrize(("parameters", "scale", "wall"), CASES)
+def test_the_mix_leaves_a_target_invariant(parameters, scale, wall):
+    """Within 4 standard errors of 32 ensembles: false alarm 4e-4 a number (Student's t), 40 numbers in all."""
+    error, standard = moments(Gaussian(parameters, scale, wall=wall), differential_evolution, ensembles=32, steps=50)
+    assert np.all(standard < 0.05)
+    assert np.all(np.abs(error) < 4.0 * standard)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("moves", ["scaled", "unscaled", "mixed"])
+@pytest.mark.parametrize(("parameters", "scale"), [(2, 1.0), (2, 1e-6), (8, 1.0), (8, 1e-6)])
+@pytest.mark.parametrize("wall", [False, True])
+def test_each_move_leaves_a_target_invariant(moves, parameters, scale, wall):
+    """Within 4 standard errors of 64 ensembles: false alarm 2e-4 a number; 120 numbers, as scales give the same."""
+    error, standard = moments(Gaussian(parameters, scale, wall=wall), MOVES[moves], ensembles=64, steps=60)
+    assert np.all(standard < 0.05)
+    assert np.all(np.abs(error) < 4.0 * standard)
+
+
+def test_a_move_that_does_not_is_noticed():
+    """The snooker move of emcee 3.1.6 draws walkers together: the spread of every parameter comes out too small."""
+    error, standard = moments(Gaussian(8, 1.0, wall=False), MOVES["snooker"], ensembles=32, steps=50)
+    assert np.all(error[1] < -4.0 * standard[1])
