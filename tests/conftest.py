@@ -10,7 +10,7 @@ from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.scanning import scan
 
-QUICK = SamplerSettings(ensembles=2, walkers=10, block_steps=10, max_steps=30)
+QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
 """Enough for files and messages, not for numbers."""
 
 
@@ -34,7 +34,7 @@ def analysed(measured, tmp_path_factory):
     from tactile_bayes.run import analyse
 
     folder = tmp_path_factory.mktemp("analysed") / "made" / "on the way"
-    return analyse(measured, folder, settings=QUICK, truth=CONTOUR), folder
+    return analyse(measured, folder, nuisances=[], settings=QUICK, truth=CONTOUR), folder
 
 
 @pytest.fixture

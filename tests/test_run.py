@@ -11,7 +11,7 @@ import pytest
 from conftest import QUICK
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.demonstration import CONTOUR, ROD, TRUTH
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.load_cell import LoadCell
@@ -20,7 +20,7 @@ from tactile_bayes.record import to_dimensionless
 from tactile_bayes.run import analyse, summary
 from tactile_bayes.scanning import scan
 
-FIGURES = ("observables", "predictive", "rods", "contour", "trace", "pairs")
+FIGURES = ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs")
 
 
 def assert_every_file_is_there(run, folder):
@@ -33,7 +33,7 @@ def assert_every_file_is_there(run, folder):
 
 def test_a_run_writes_every_file_it_names(analysed):
     run, folder = analysed
-    assert list(run.files) == ["posterior", "contacts", "band", "summary", *FIGURES]
+    assert list(run.files) == ["posterior", "contacts", "band", "verdicts", "summary", *FIGURES]
     assert_every_file_is_there(run, folder)
 
 
@@ -58,6 +58,29 @@ def test_the_files_hold_what_the_run_returns(analysed, measured):
     assert table["unit"].tolist() == ["1/m", "m", "m", "1", "m"]
 
 
+def test_the_summary_begins_with_the_verdicts(analysed):
+    run, _ = analysed
+    lines = run.files["verdicts"].read_text(encoding="utf-8").splitlines()
+    assert tuple(lines[: lines.index("")]) == run.verdicts
+    assert run.verdicts[0].startswith("NOT CONVERGED, the steps allowed ran out after 30 steps: largest R̂ ")
+    table = lines[lines.index("") + 1 :]
+    assert [line.split()[0] for line in table] == ["median", "quantity", "a", "q", "x_c", "noise_scale", "gap"]
+
+
+def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path, monkeypatch):
+    from tactile_bayes import run as module
+
+    def infer_nothing(*arguments, **options):
+        raise InferenceError("no parabola was found.")
+
+    monkeypatch.setattr(module, "infer_contour", infer_nothing)
+    wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
+    with pytest.raises(InferenceError, match=r"^no parabola was found\. Forces reach .* check the units of the loads"):
+        analyse(wrong, tmp_path)
+    with pytest.raises(InferenceError, match=r"^no parabola was found\.$"):
+        analyse(measured, tmp_path)
+
+
 def test_the_estimate_is_near_the_truth(analysed):
     """Not a test of the posterior: that names and units were not mixed up on the way."""
     run, _ = analysed
@@ -79,9 +102,9 @@ def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
     record = scan(Parabola(0.5, 0.5), direction="backward", base=(0.1, 0.0), drive_step=0.05).record
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
     measured["force_x"][:] = measured["force_y"][:] = np.nan
-    run = analyse(measured, tmp_path, settings=QUICK)
+    run = analyse(measured, tmp_path, nuisances=[], settings=QUICK)
     assert run.contacts is None
-    assert list(run.files) == ["posterior", "band", "summary", *FIGURES]
+    assert list(run.files) == ["posterior", "band", "verdicts", "summary", *FIGURES]
     assert_every_file_is_there(run, tmp_path)
     assert summary(run.posterior).quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
 
@@ -92,7 +115,7 @@ def test_a_dimensionless_record_with_unknown_noise(tmp_path):
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
     for name in ("load_cell_force_noise", "load_cell_moment_noise"):
         del measured.attrs[name]
-    run = analyse(measured, tmp_path, family="circle", settings=QUICK, truth=contour)
+    run = analyse(measured, tmp_path, family="circle", nuisances=[], settings=QUICK, truth=contour)
     assert_every_file_is_there(run, tmp_path)
     table = summary(run.posterior)
     assert table.quantity.values.tolist() == ["r", "q", "x_c", "moment_noise", "force_noise"]
@@ -128,7 +151,7 @@ def test_another_rod_is_that_of_all_results(measured, tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_units_do_not_matter(analysed, measured, tmp_path):
     """To the rounding of the conversion; priors and random numbers scale with the rod."""
-    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path)
+    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path, nuisances=[])
     ratio = si.contacts.contact_x / plain.contacts.contact_x
     np.testing.assert_allclose(ratio[si.contacts.status == "ok"], ROD.length, rtol=1e-9)
     medians = [summary(run.posterior)["median"].sel(quantity="q").item() for run in (si, plain)]
@@ -140,7 +163,7 @@ def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
-    run = analyse(measured, tmp_path, settings=few)
+    run = analyse(measured, tmp_path, nuisances=[], settings=few)
     assert not run.posterior.attrs["converged"]
     assert "not converged, the steps allowed ran out after 1 steps" in run.posterior.attrs["message"]
 

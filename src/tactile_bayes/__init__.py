@@ -25,6 +25,7 @@ _HOMES = {
     "RandomWalk": "load_cell",
     "Rod": "rod",
     "SamplerSettings": "inference.ensembles",
+    "check_record": "uncertainty.record_check",
     "contact_moments": "uncertainty.contact_moments",
     "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
@@ -43,7 +44,9 @@ _HOMES = {
     "reconstruct": "reconstruction",
     "scan": "scanning",
     "scan_many": "scanning_many",
+    "suspicions": "uncertainty.suspicions",
     "to_arviz": "inference.result",
+    "verdicts": "uncertainty.verdicts",
     "write_record": "record",
     "write_result": "inference.result",
     "zero_load": "load_cell",
@@ -84,6 +87,9 @@ if TYPE_CHECKING:
     from tactile_bayes.uncertainty.implied_contacts import implied_contacts as implied_contacts
     from tactile_bayes.uncertainty.normal_band import normal_band as normal_band
     from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval
+    from tactile_bayes.uncertainty.record_check import check_record as check_record
+    from tactile_bayes.uncertainty.suspicions import suspicions as suspicions
+    from tactile_bayes.uncertainty.verdicts import verdicts as verdicts
 
 
 def __getattr__(name: str) -> Any:

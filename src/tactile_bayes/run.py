@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -12,10 +12,11 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
+from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
@@ -25,6 +26,8 @@ from tactile_bayes.scanning import scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.gap import gap
 from tactile_bayes.uncertainty.predictive import predictive_interval
+from tactile_bayes.uncertainty.suspicions import suspicions
+from tactile_bayes.uncertainty.verdicts import verdicts
 
 __all__ = ["Run", "analyse", "summary"]
 
@@ -42,6 +45,8 @@ class Run:
         Most likely contact points (raw Step 2 for Student's t with 2 degrees of freedom and fewer); None where a load
         channel is missing.
     band : xr.Dataset
+    verdicts : tuple of str
+        What is wrong, the most serious first, or that all is well; see `tactile_bayes.verdicts`.
     files : mapping of str to Path
         By what they hold.
     """
@@ -49,6 +54,7 @@ class Run:
     posterior: xr.DataTree
     contacts: xr.Dataset | None
     band: xr.Dataset
+    verdicts: tuple[str, ...]
     files: Mapping[str, Path]
 
 
@@ -60,9 +66,11 @@ def analyse(
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
     friction: float = 0.0,
+    nuisances: Sequence[str] = STANDARD,
     probability: float = 0.95,
     seed: int = 1,
     settings: SamplerSettings | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
     truth: Contour | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> Run:
@@ -73,9 +81,9 @@ def analyse(
     measured : xr.Dataset
         A record.
     out : path-like
-        Folder for posterior.nc, contacts.csv, band.csv, summary.csv and the figures; made if it is not there. Files of
-        these names in it are replaced.
-    family, load_cell, rod, friction, seed, settings, progress
+        Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
+        the figures; made if it is not there. Files of these names in it are replaced.
+    family, load_cell, rod, friction, nuisances, seed, settings, checkpoint, progress
         As `infer_contour` takes them.
     probability : float
         Of the band and of the intervals in the summary.
@@ -85,21 +93,31 @@ def analyse(
     Returns
     -------
     Run
+
+    Raises
+    ------
+    RecordError, ParameterError, InferenceError
+        As `infer_contour`; where no contour is found, with what speaks for a wrong unit or sign.
     """
     if not 0.0 < probability < 1.0:
         raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
     measured = with_rod(validate(measured), rod)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    result = infer_contour(
-        measured,
-        family=family,
-        load_cell=load_cell,
-        seed=seed,
-        friction=friction,
-        settings=settings,
-        progress=progress,
-    )
+    try:
+        result = infer_contour(
+            measured,
+            family=family,
+            load_cell=load_cell,
+            seed=seed,
+            friction=friction,
+            nuisances=nuisances,
+            settings=settings,
+            checkpoint=checkpoint,
+            progress=progress,
+        )
+    except InferenceError as error:
+        raise type(error)(" ".join((str(error), *suspicions(measured, load_cell)))) from error
     files = {"posterior": folder / "posterior.nc"}
     write_result(result, files["posterior"])
 
@@ -113,10 +131,15 @@ def analyse(
     band = contour_band(result, _reach(result), probability)
     files["band"] = folder / "band.csv"
     _write_table(band.to_dataframe(), files["band"])
+    found = verdicts(result, contacts)
+    numbers = summary(result, probability).to_dataframe()
+    files["verdicts"] = folder / "summary.txt"
+    with write_atomically(files["verdicts"]) as temporary:
+        temporary.write_text("\n".join((*found, "", numbers.to_string(), "")), encoding="utf-8")
     files["summary"] = folder / "summary.csv"
-    _write_table(summary(result, probability).to_dataframe(), files["summary"])
+    _write_table(numbers, files["summary"])
     files |= _draw(measured, result, contacts, band, folder, truth=truth, friction=friction)
-    return Run(result, contacts, band, files)
+    return Run(result, contacts, band, found, files)
 
 
 def _known_cell(measured: xr.Dataset, load_cell: LoadCell | None, result: xr.DataTree) -> LoadCell:
@@ -234,6 +257,10 @@ def _draw(
     plotting.contour(band.x.values, truth=truth, contacts=contacts, band=band, gap=edges, base=base, ax=axes[0, 0])
     plotting.band_detail(band, truth=truth, gap=edges, ax=axes[1, 0])
     save("contour", figure)
+    if edges is not None:
+        figure, axes = panels(1, 1, 7.0, 3.6)
+        plotting.gap(edges, truth=truth, ax=axes[0, 0])
+        save("gap", figure)
     names = list(draws.data_vars)
     figure, axes = panels(len(names), 2, 7.0, 1.6 * len(names))
     plotting.trace(result, axes=axes)

@@ -60,10 +60,27 @@ def infer(
         typer.Option(help="Axes of the forces, if the file does not say: the world's, or turning with the drive."),
     ] = None,
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)] = 0.0,
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset and "
+            "bias: one of these, or gain, friction, suspension_compliance; give it again for another."
+        ),
+    ] = None,
+    as_stated: Annotated[
+        bool, typer.Option("--as-stated", help="Take everything about the rig as stated: fewer parameters, narrower.")
+    ] = False,
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
     max_seconds: Annotated[
         float | None, typer.Option(help="Time for sampling, at most [s]; what is there by then is the result.")
+    ] = None,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder in which every block of steps is kept: the same command goes on where it was stopped.",
+            file_okay=False,
+        ),
     ] = None,
     seed: Seed = 1,
     quiet: Quiet = False,
@@ -71,11 +88,15 @@ def infer(
     """Infer the contour from a measured record: contact points, posterior, band and figures."""
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.inference.ensembles import SamplerSettings
+    from tactile_bayes.inference.nuisances import STANDARD
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.record import present_channels, read_record
     from tactile_bayes.rod import Rod
     from tactile_bayes.run import analyse
 
+    if as_stated and nuisance:
+        raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")
+    nuisances = [] if as_stated else list(nuisance or STANDARD)
     if (length is None) != (flexural_rigidity is None):
         raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
     if diameter and length is None:
@@ -111,6 +132,8 @@ def infer(
             family=family,
             load_cell=cell,
             friction=friction,
+            nuisances=nuisances,
+            checkpoint=checkpoint,
             probability=probability,
             seed=seed,
             settings=SamplerSettings(max_steps=max_steps, max_seconds=max_seconds),
@@ -135,11 +158,14 @@ def demo(
             f"A wire of {ROD.length * 1e3:g} mm and {ROD.diameter * 1e3:g} mm diameter has swept forward and backward "
             f"along a parabola; a load cell\nwith {LOAD_CELL.force_noise * 1e3:g} mN and "
             f"{LOAD_CELL.moment_noise * 1e3:g} mN m of noise has recorded {path}.\nFrom here on this file is all there "
-            f"is; the same job on your own: tactile-bayes infer RECORD --out RUN\n",
+            f"is, and the rig is taken as stated; the same job on your own: tactile-bayes infer RECORD --as-stated "
+            f"--out RUN\n",
             flush=True,
         )
     with _progress(quiet) as progress:
-        run = analyse(read_record(path), out, family="parabola", seed=seed, truth=CONTOUR, progress=progress)
+        run = analyse(
+            read_record(path), out, family="parabola", nuisances=[], seed=seed, truth=CONTOUR, progress=progress
+        )
     _print_run(run, {"record": path}, TRUTH)
 
 
@@ -202,10 +228,13 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
         unit = "" if str(row["unit"].values) == "1" else str(row["unit"].values)
         table.add_row(str(name), *true, *shown, unit, *checks)
     console = Console()
+    for verdict in run.verdicts:
+        console.print(verdict, markup=False, highlight=False, soft_wrap=True)
+    console.print()
     console.print(table)
     attrs = run.posterior.attrs
-    message = attrs["message"].replace("not converged", "NOT CONVERGED", 1)
-    console.print(message, highlight=False, soft_wrap=True)
+    if attrs["converged"]:  # else it is among the verdicts
+        console.print(attrs["message"], highlight=False, soft_wrap=True)
     if run.contacts is None:
         console.print("No contact points: Step 2 needs all three load channels.")
     else:

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numba
 
-__all__ = ["compiled", "kept"]
+__all__ = ["compiled", "inlined", "kept"]
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -18,6 +18,13 @@ Function = TypeVar("Function", bound=Callable[..., object])
 def compiled(function: Function) -> Function:
     """Machine code, as a part of what calls it."""
     made: Function = numba.njit(function, error_model="numpy", nogil=True)
+    return made
+
+
+def inlined(function: Function) -> Function:
+    """Compiled into every place that calls it: a call that hands arrays over counts references to each of them, which
+    takes longer than what small functions do."""
+    made: Function = numba.njit(function, error_model="numpy", nogil=True, inline="always")
     return made
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
-from tactile_bayes.compiled.compiler import compiled
+from tactile_bayes.compiled.compiler import compiled, inlined
 from tactile_bayes.compiled.lane import Lane, bearing
 from tactile_bayes.compiled.limits import limits
 from tactile_bayes.compiled.states import Tables, combine, excess, series, state
@@ -25,7 +25,7 @@ _CELLS = 16
 """Of each piece, in which a change of the phase is looked for."""
 
 _RESOLVED, _HALVINGS, _BRIEF = 1e-3, 8, BRIEF
-_LAST_STEP, _CHANGE = 1e-6, 1e-9
+_LAST_STEP, _CHANGE = 1e-4, 1e-7
 _TOUCHES, _RUNS_OUT = int(Reach.TOUCHES), int(Reach.RUNS_OUT)
 _MOST = 64
 """Stretches that may wait for being followed."""
@@ -101,12 +101,12 @@ def work(samples: int) -> Work:
 
 
 @compiled
-def _change(lane: Lane, lying: Floats, p: float, at_p: float, q: float, at_q: float) -> float:
+def _change(lane: Lane, stretch: Floats, p: float, at_p: float, q: float, at_q: float) -> float:
     """Where the excess changes its sign between p and q: false position with halved weights (Illinois)."""
     span = _CHANGE * abs(q - p)
     for _ in range(60):
         new = q - at_q * (q - p) / (at_q - at_p)
-        value = excess(lane, new, lying)
+        value = excess(lane, new, stretch)
         if (value > 0.0) == (at_q > 0.0):
             at_p *= 0.5
         else:
@@ -119,7 +119,7 @@ def _change(lane: Lane, lying: Floats, p: float, at_p: float, q: float, at_q: fl
 
 
 @compiled
-def _cut(lane: Lane, begin: float, end: float, has_knot: bool, tip_first: bool, lying: Floats, out: Floats) -> int:
+def _cut(lane: Lane, begin: float, end: float, has_knot: bool, tip_first: bool, stretch: Floats, out: Floats) -> int:
     """Stretches of one phase without a knot inside, in the order of the path; the answer is their number."""
     count = 0
     knot = has_knot and end < 0.0 < begin
@@ -130,13 +130,13 @@ def _cut(lane: Lane, begin: float, end: float, has_knot: bool, tip_first: bool, 
         if not abs(span) > 1e-13 * (begin - end):
             continue
         start, old = p, p
-        at_old = excess(lane, p, lying)
+        at_old = excess(lane, p, stretch)
         beyond = at_old > 0.0
         for cell in range(_CELLS):
             new = last if cell == _CELLS - 1 else p + span * (cell + 1.0) / _CELLS
-            at_new = excess(lane, new, lying)
+            at_new = excess(lane, new, stretch)
             if (at_new > 0.0) != beyond and count < out.shape[0] - 2:
-                here = _change(lane, lying, old, at_old, new, at_new)
+                here = _change(lane, stretch, old, at_old, new, at_new)
                 out[count, 0], out[count, 1], out[count, 2] = start, here, beyond
                 count += 1
                 start, beyond = here, not beyond
@@ -185,7 +185,7 @@ def _first_fall(room: Work, on: Nodes, is_first: bool) -> float:
     return 2.0
 
 
-@compiled
+@inlined
 def _both(one: Floats, other: Floats, z: float) -> tuple[float, float]:
     """Two series at once, which takes no longer than one."""
     twice = 4.0 * z - 2.0
@@ -196,7 +196,7 @@ def _both(one: Floats, other: Floats, z: float) -> tuple[float, float]:
     return one[0] + 0.5 * twice * a - a_before, other[0] + 0.5 * twice * b - b_before
 
 
-@compiled
+@inlined
 def _root_of(function: Floats, slope: Floats, value: float, left: float, right: float, z: float) -> float:
     """Where a series takes a value from above on its way from left to right, or, with left > right, from right to left:
     Newton kept in its bracket."""
@@ -225,12 +225,14 @@ def _root_of(function: Floats, slope: Floats, value: float, left: float, right: 
 @compiled
 def _over_drive_angle(stop: float, begin: float, end: float, steadiness: float, on: Nodes, room: Work) -> None:
     """Coefficients of the loads over the stretched drive angle."""
+    angle, moment, force_x, force_y = room.series[0], room.series[1], room.series[2], room.series[3]
+    slope, values = room.slope, room.values
     for k in range(_ORDER):
         ahead = 1.0 - on.nodes[k]
         wanted = end - (end - begin) * ahead * (steadiness + (1.0 - steadiness) * ahead)
-        way = _root_of(room.series[0], room.slope, wanted, stop, 0.0, stop * on.nodes[k])
-        for c in range(3):
-            room.values[c, k] = series(room.series[c + 1], way)
+        way = _root_of(angle, slope, wanted, stop, 0.0, stop * on.nodes[k])
+        values[0, k], values[1, k] = _both(moment, force_x, way)
+        values[2, k] = series(force_y, way)
     for c in range(3):
         combine(on.fit, room.values[c], room.loads[c])
 
@@ -294,7 +296,7 @@ def follow(
     if reach != _TOUCHES:
         return reach, math.nan
     waiting = room.waiting
-    count = _cut(lane, begin, end, has_knot, tip_first, known.lying, waiting)
+    count = _cut(lane, begin, end, has_knot, tip_first, known.stretch, waiting)
     for k in range(count // 2):  # the first one is to be the last, where a stack ends
         for c in range(5):
             waiting[k, c], waiting[count - 1 - k, c] = waiting[count - 1 - k, c], waiting[k, c]

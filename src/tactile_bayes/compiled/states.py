@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.compiled.compiler import compiled
+from tactile_bayes.compiled.compiler import compiled, inlined
 from tactile_bayes.compiled.lane import Lane, place
 from tactile_bayes.universal import rough_tables
 
@@ -18,18 +18,24 @@ Floats = NDArray[np.float64]
 
 
 class Tables(NamedTuple):
-    """Chebyshev coefficients: of force, turn and stretch in tangential contact, and of force, turn and tilt at the tip.
+    """Chebyshev coefficients in tangential contact, and of the tip over angle and share of the greatest radius.
 
-    Those of the tip stand over angle and share of the greatest radius, which has its own series over the angle.
+    They are arrays of their own, because making views of parts of one takes as long as a series.
     """
 
-    lying: Floats
+    lying_force: Floats
+    lying_turn: Floats
+    stretch: Floats
     radius: Floats
-    ending: Floats
+    """The greatest one, over the angle."""
+    tip_force: Floats
+    tip_turn: Floats
+    tip_tilt: Floats
 
 
 def tables() -> Tables:
-    return Tables(*(np.ascontiguousarray(table) for table in rough_tables()))
+    lying, radius, tip = rough_tables()
+    return Tables(*(np.array(table) for table in (*lying, radius, *tip)))
 
 
 @compiled
@@ -42,7 +48,7 @@ def series(coefficients: Floats, z: float) -> float:
     return coefficients[0] + 0.5 * twice * now - before
 
 
-@compiled
+@inlined
 def _polynomials(z: float, out: Floats) -> None:
     twice = 4.0 * z - 2.0
     out[0] = 1.0
@@ -51,15 +57,15 @@ def _polynomials(z: float, out: Floats) -> None:
         out[k] = twice * out[k - 1] - out[k - 2]
 
 
-@compiled
-def excess(lane: Lane, p: float, lying: Floats) -> float:
+@inlined
+def excess(lane: Lane, p: float, stretch: Floats) -> float:
     """Arc length over the rod's that tangential contact would take, less one."""
     x, y, sin, cos, _, _ = place(lane, p)
     angle = math.atan2(max(y * cos - x * sin, 0.0), x * cos + y * sin)
-    return math.sqrt(x * x + y * y) * series(lying[2], min(angle / (0.5 * math.pi), 1.0)) - 1.0
+    return math.sqrt(x * x + y * y) * series(stretch, min(angle / (0.5 * math.pi), 1.0)) - 1.0
 
 
-@compiled
+@inlined
 def combine(rows: Floats, weights: Floats, out: Floats) -> None:
     """Σ weights[i] · rows[i], an inner loop that has no order to keep."""
     out[:] = 0.0
@@ -69,7 +75,7 @@ def combine(rows: Floats, weights: Floats, out: Floats) -> None:
             out[j] += weight * rows[i, j]
 
 
-@compiled
+@inlined
 def _twice(coefficients: Floats, by_share: Floats, by_angle: Floats, row: Floats) -> float:
     """A series in both directions."""
     combine(coefficients, by_share, row)
@@ -79,7 +85,7 @@ def _twice(coefficients: Floats, by_share: Floats, by_angle: Floats, row: Floats
     return total
 
 
-@compiled
+@inlined
 def state(
     lane: Lane, p: float, tip: bool, known: Tables, by_angle: Floats, by_share: Floats, row: Floats
 ) -> tuple[float, float, float, float]:
@@ -96,12 +102,12 @@ def state(
         _polynomials(angle / (0.5 * math.pi), by_angle)
         share = min(math.sqrt(lack * lack + tilt * tilt) / series(known.radius, angle / (0.5 * math.pi)), 1.0)
         _polynomials(share, by_share)
-        force = _twice(known.ending[0], by_share, by_angle, row) * angle
-        turn = _twice(known.ending[1], by_share, by_angle, row) * angle
-        drive_angle = slope + 0.5 * math.pi - _twice(known.ending[2], by_share, by_angle, row) * share + turn
+        force = _twice(known.tip_force, by_share, by_angle, row) * angle
+        turn = _twice(known.tip_turn, by_share, by_angle, row) * angle
+        drive_angle = slope + 0.5 * math.pi - _twice(known.tip_tilt, by_share, by_angle, row) * share + turn
     else:
         angle = math.atan2(across, along)
         level = min(angle / (0.5 * math.pi), 1.0)
-        force = series(known.lying[0], level) * angle / distance2
-        drive_angle = slope + series(known.lying[1], level) * angle
+        force = series(known.lying_force, level) * angle / distance2
+        drive_angle = slope + series(known.lying_turn, level) * angle
     return drive_angle, force * along, -force * sin, force * cos

@@ -1,0 +1,224 @@
+"""Verdicts: what is wrong with a result, in words, and what to do."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.load_cell import LoadCell, zero_load
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.uncertainty.record_check import Residuals, check_record, record_of, residuals_of
+from tactile_bayes.uncertainty.suspicions import suspicions
+
+__all__ = ["verdicts"]
+
+Floats = NDArray[np.float64]
+
+_NOISES = ("noise_scale", "moment_noise", "force_noise")
+
+_FACTOR = 2.0
+"""Between the noise that is stated and the one that is found: less is what data sheets are like."""
+
+_OFF_ZERO = 5.0
+"""Standard errors by which a zero must be off to be told."""
+
+_CONTRADICTION = 1e-4
+"""Probability of the misfit of single samples below which it is told."""
+
+_FEWEST_PRIOR_DRAWS = 500
+
+_PRIOR_DOMINATED = 0.7
+"""Width of the posterior over that of the prior above which the record is said to tell little."""
+
+_CAUSES = {
+    "runs": "whose residuals do not scatter about zero but stay on one side",
+    "neighbours": "whose residuals do not scatter about zero but stay on one side",
+    "largest": "of which single samples are far off",
+    "loaded": "whose loaded samples are further from what is predicted than its unloaded ones",
+    "zero": "whose unloaded samples are off zero",
+}
+
+
+def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tuple[str, ...]:
+    """What is wrong with a result of `infer_contour`, in sentences, the most serious first, or that all is well.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    contacts : xr.Dataset, optional
+        From `reconstruct` by method="constrained", whose misfits tell whether the loads of a sample agree.
+
+    Returns
+    -------
+    tuple of str
+        At least one. Told are: loads that such a rod cannot have (`suspicions`); a zero that is off; a record that
+        does not look like what the posterior predicts (`check_record`); ensembles that have not converged; noise twice
+        as large as stated, or half; loads of a sample that contradict one another; nuisance parameters that are beyond
+        what the prior thought possible. Last, and not against the result, are parameters of which the record tells
+        little.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
+    >>> measured = cell.measure(scan(paper_profile("IV", q=0.5), drive_step=0.05).record, seed=1)
+    >>> quick = SamplerSettings(ensembles=2, walkers=20, max_steps=50)
+    >>> found = verdicts(infer_contour(measured, family="parabola", load_cell=cell, seed=1, settings=quick))
+    >>> print(found[0].split(":")[0])
+    The family parabola does not describe the record
+    """
+    record = record_of(posterior)
+    residuals = residuals_of(posterior)
+    try:
+        check = check_record(posterior)
+    except InferenceError:  # too few draws, which the message tells
+        check = None
+    against = [*suspicions(record), *_off_zero(record, residuals)]
+    if check is not None and not check.attrs["passed"]:
+        against.append(_not_described(posterior, check))
+    if not posterior.attrs["converged"]:
+        against.append(posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1) + ".")
+    noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
+    against += [*_noise(posterior, noisier), *_contradictions(record, contacts, noisier), *_beyond_prior(posterior)]
+    if not against:
+        p_value = math.nan if check is None else float(check.overall_p_value)
+        against.append(
+            f"All is well: the ensembles agree, and the record looks like what they predict (p = {p_value:.2g})."
+        )
+    return (*against, *_prior_dominated(posterior))
+
+
+def _off_zero(record: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
+    """Channels that read something without load which the posterior does not expect."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DriftWarning)  # a drift that is stated makes it too
+        found = zero_load(record)
+    off = []
+    for name, of_channel in residuals.items():
+        unloaded = found.unloaded.values & ~of_channel.loaded
+        uncertainty = float(found.bias_uncertainty.sel(channel=name))
+        if np.count_nonzero(unloaded) < 3 or not math.isfinite(uncertainty):
+            continue
+        means = (of_channel.values * of_channel.scale)[:, unloaded].mean(axis=1)
+        error = math.hypot(uncertainty, float(np.std(means[1:])))
+        if abs(means[0]) > _OFF_ZERO * error > 0.0:
+            unit = _unit(record, name)
+            off.append(f"{name} {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
+    if not off:
+        return []
+    return [
+        f"Without load the cell reads more than its data sheet says: {', '.join(off)}. Was the tare forgotten? Take it "
+        "out of the readings, or give LoadCell.from_zero_load(record)."
+    ]
+
+
+def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
+    score = check.score.fillna(-np.inf)
+    place = score.argmax(("discrepancy", "channel"))
+    channel, cause = (str(score[dim].values[int(place[dim])]) for dim in ("channel", "discrepancy"))
+    worst = check.sel(channel=channel)
+    unit = "" if str(worst.unit.values) == "1" else f" {worst.unit.values}"
+    family, predictions = posterior.attrs["family"], check.attrs["predictions"]
+    # The share of predictions alone: the record itself is no prediction.
+    like = round(float(check.overall_p_value) * (predictions + 1)) - 1
+    return (
+        f"The family {family} does not describe the record: {like or 'none'} of {predictions} records that the "
+        f"posterior predicts {'are' if like > 1 else 'is'} so far off. Worst is {channel}, {_CAUSES[cause]}; in sweep "
+        f"{int(worst.worst_sweep)} from {float(worst.worst_from):.3g} to {float(worst.worst_to):.3g} rad it reads "
+        f"{float(worst.worst_residual):+.2g}{unit} beside what is predicted. Do not use this contour: try another "
+        "family, and check the rod, the friction and the load cell."
+    )
+
+
+def _neighbours_over_stated(record: xr.Dataset, check: xr.Dataset) -> float:
+    """How much neighbouring samples scatter over what the load cell states, the median of the channels; 1 if unknown.
+
+    Only so much of the misfit can be noise.
+    """
+    cell = LoadCell.from_record(record) or LoadCell()
+    stated = np.hypot(list(cell.standard_deviations.values()), cell.resolution / math.sqrt(12.0))
+    ratios = [
+        float(check.neighbour_noise.sel(channel=name)) / stated[CHANNELS.index(name)]
+        for name in check.channel.values
+        if 0.0 < stated[CHANNELS.index(name)] < math.inf
+    ]
+    return float(np.median(ratios)) if ratios else 1.0
+
+
+def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
+    draws = posterior_draws(posterior)
+    if "noise_scale" not in draws:
+        return []
+    factor = float(draws["noise_scale"].median())
+    if 1.0 / _FACTOR <= factor <= _FACTOR:
+        return []
+    said = f"The noise is {factor:.3g} times what the load cell states"
+    if noisier < 0.5 * factor and factor > _FACTOR:
+        return [
+            f"{said}, but neighbouring samples scatter {noisier:.2g} times as much as stated: the rest is misfit, no "
+            "noise."
+        ]
+    return [f"{said}, and neighbouring samples scatter alike: state the noise that it has, or are the units right?"]
+
+
+def _contradictions(record: xr.Dataset, contacts: xr.Dataset | None, noisier: float) -> list[str]:
+    """Of normal noise: outliers make the misfits larger than the probability knows of."""
+    cell = LoadCell.from_record(record) or LoadCell()
+    if contacts is None or math.isfinite(cell.degrees_of_freedom):
+        return []
+    chance = float(contacts.attrs.get("misfit_probability", math.nan))
+    if not chance < _CONTRADICTION or noisier > 0.75 * _FACTOR:  # more noise than stated explains it
+        return []
+    words = f"{chance:.1g}" if chance > 1e-99 else "below 1e-99"
+    return [
+        "The loads of single samples contradict one another, whatever the contour (noise explains it with probability "
+        f"{words}): check length and flexural rigidity of the rod, the friction, the zero of the drive angle, and "
+        "unit, sign and axes of each load."
+    ]
+
+
+def _beyond_prior(posterior: xr.DataTree) -> list[str]:
+    """Parameters whose prior has next to nothing where the posterior is."""
+    draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
+    said = []
+    for name in draws.data_vars:
+        believed = prior[name].values.ravel()
+        if name in _NOISES or believed.size < _FEWEST_PRIOR_DRAWS:
+            continue
+        median = float(draws[name].median())
+        if not believed.min() <= median <= believed.max():
+            said.append(f"{name} = {median:.3g} (prior: {believed.min():.3g} to {believed.max():.3g})")
+    if not said:
+        return []
+    return [
+        f"The record wants what the prior hardly allows: {', '.join(said)}. Check what is stated of rod, drive angle "
+        "and tare, or give a wider prior."
+    ]
+
+
+def _prior_dominated(posterior: xr.DataTree) -> list[str]:
+    draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
+    names = [name for name in draws.data_vars if name not in _NOISES]
+    names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
+    if not names:
+        return []
+    return [f"The record tells little more than the prior of {', '.join(map(str, names))}."]
+
+
+def _width(values: Floats) -> float:
+    """Two standard deviations, but of the middle."""
+    low, high = np.quantile(values, [0.16, 0.84])
+    return float(high - low)
+
+
+def _unit(record: xr.Dataset, name: str) -> str:
+    unit = str(record[name].attrs.get("units", "1"))
+    return "" if unit == "1" else f" {unit}"

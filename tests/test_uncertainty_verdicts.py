@@ -1,0 +1,121 @@
+"""Verdicts: the cause comes first, and what is right is said to be."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.predicted_records import CELL, ideal, predicted, with_readings
+from tactile_bayes.contours import paper_profile
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.scanning import scan
+from tactile_bayes.uncertainty.verdicts import verdicts
+
+
+def changed(tree, group, **values):
+    """The tree with other draws of parameters in a group."""
+    other = tree.copy()
+    draws = {name: (("chain", "draw"), np.atleast_2d(v)) for name, v in values.items()}
+    other[group] = xr.DataTree(xr.Dataset(draws))
+    return other
+
+
+def readings(tree):
+    return {name: tree["observed_data"].to_dataset()[name].values for name in CHANNELS}
+
+
+def test_of_a_good_result_all_is_well():
+    found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
+    assert len(found) == 1
+    assert found[0].startswith("All is well: the ensembles agree, and the record looks like what they predict (p = 0.")
+
+
+def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
+    measured = CELL.measure(scan(paper_profile("IV", q=0.5), drive_step=0.05).record, seed=1)
+    short = SamplerSettings(ensembles=4, walkers=12, max_steps=40)
+    found = verdicts(infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=short))
+    assert re.match(
+        "The family parabola does not describe the record: none of [0-9]+ records that the posterior predicts is so "
+        "far off. Worst is (holding_moment|force_x|force_y), whose ",
+        found[0],
+    )
+    assert "Do not use this contour: try another family" in found[0]
+    assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 40 steps")
+    assert found[2].startswith("The noise is ")
+    assert found[2].endswith("times as much as stated: the rest is misfit, no noise.")
+
+
+def test_a_forgotten_tare_is_told_with_its_size():
+    tree = predicted()
+    found = verdicts(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
+    assert found[0].startswith("Without load the cell reads more than its data sheet says: force_y 0.3")
+    assert found[0].endswith("or give LoadCell.from_zero_load(record).")
+    assert found[1].startswith("The family parabola does not describe the record")
+    assert "sweep" in found[1]
+
+
+def test_forces_in_another_unit_come_first():
+    tree = predicted()
+    thousandfold = {name: 1e3 * readings(tree)[name] for name in ("force_x", "force_y")}
+    found = verdicts(with_readings(tree, **thousandfold))
+    assert found[0].startswith("Forces reach 1.1")
+    assert found[1].startswith("The family parabola does not describe the record")
+
+
+def test_a_flipped_moment_comes_first():
+    tree = predicted()
+    found = verdicts(with_readings(tree, holding_moment=-readings(tree)["holding_moment"]))
+    assert found[0].startswith("The holding moment has the sign of contacts on the other side in every sweep")
+
+
+def test_what_has_not_converged_is_said_even_where_there_is_nothing_to_compare_with():
+    tree = predicted(chains=1, draws=20)
+    tree.attrs |= {"converged": 0, "message": "not converged, the steps allowed ran out"}
+    assert verdicts(tree) == ("NOT CONVERGED, the steps allowed ran out.",)
+
+
+@pytest.mark.parametrize(
+    ("factor", "scatter", "words"),
+    [
+        (4.0, 4.0, "The noise is 4 times what the load cell states, and neighbouring samples scatter alike: state the"),
+        (0.25, 0.25, "The noise is 0.25 times what the load cell states, and neighbouring samples scatter alike: st"),
+        (4.0, 1.0, "The noise is 4 times what the load cell states, but neighbouring samples scatter 0.9"),
+    ],
+)
+def test_noise_that_is_not_as_stated(factor, scatter, words):
+    tree = changed(predicted(), "posterior", noise_scale=np.full((4, 250), factor))
+    predictive = tree["posterior_predictive"].to_dataset()
+    for name in CHANNELS:
+        predictive[name] = ideal(name) + factor * (predictive[name] - ideal(name))
+    tree["posterior_predictive"] = xr.DataTree(predictive)
+    found = verdicts(
+        with_readings(tree, **{name: ideal(name) + scatter * (v - ideal(name)) for name, v in readings(tree).items()})
+    )
+    assert len(found) == 1
+    assert found[0].startswith(words)
+
+
+def test_loads_that_contradict_one_another_unless_noise_does_it():
+    found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0}))
+    assert found[0].startswith("The loads of single samples contradict one another, whatever the contour (noise expl")
+    assert "below 1e-99" in found[0]
+
+
+def test_what_the_prior_forbids_and_what_it_says_alone():
+    rng = np.random.default_rng(1)
+    prior = {"noise_scale": rng.lognormal(size=(1, 1000)), "rigidity_scale": rng.lognormal(0.0, 0.05, (1, 1000))}
+    tree = changed(predicted(), "prior", **prior, x_c=rng.normal(size=(1, 1000)))
+    noise = np.ones((4, 250))
+    far = {"rigidity_scale": rng.normal(1.3, 0.01, (4, 250)), "x_c": rng.normal(0.0, 0.9, (4, 250))}
+    found = verdicts(changed(tree, "posterior", noise_scale=noise, **far))
+    assert found[0].startswith("The record wants what the prior hardly allows: rigidity_scale = 1.3 (prior: 0.8")
+    assert found[1] == "The record tells little more than the prior of x_c."
+    near = {**far, "rigidity_scale": rng.normal(1.0, 0.01, (4, 250))}
+    found = verdicts(changed(tree, "posterior", noise_scale=noise, **near))
+    assert found[0].startswith("All is well")
+    assert found[1] == "The record tells little more than the prior of x_c."
