@@ -122,7 +122,7 @@ def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_p
 
 
 def test_a_run_may_be_given_a_time(record, tmp_path):
-    result = call("infer", record, "--out", tmp_path / "run", "--max-seconds", 0.1, "--quiet")
+    result = call("infer", record, "--out", tmp_path / "run", "--as-stated", "--max-seconds", 0.1, "--quiet")
     assert result.stdout.startswith("NOT CONVERGED, the time allowed ran out")
 
 
@@ -295,7 +295,7 @@ main()
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
-    command = [sys.executable, "-c", SAMPLING, "infer", record, "--out", "run", "-q"]
+    command = [sys.executable, "-c", SAMPLING, "infer", record, "--as-stated", "--out", "run", "-q"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", cwd=tmp_path
     ) as process:

@@ -203,6 +203,7 @@ def test_contours_that_were_drawn_again_are_counted(specification, tmp_path):
     assert re.fullmatch(rf"{total} contours were drawn again: .*\d+ out of reach.*", line)
 
 
+@pytest.mark.slow
 def test_numbers_do_not_depend_on_the_workers(small, tmp_path):
     folder, _ = small
     done = subprocess.run(
@@ -278,7 +279,7 @@ STOPS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
-@pytest.mark.parametrize("sent", STOPS)
+@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("shard", "suppressed"), [(2, "ValueError"), pytest.param(1, "KeyboardInterrupt", marks=pytest.mark.slow)]
 )

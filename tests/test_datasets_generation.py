@@ -376,6 +376,7 @@ def test_wild_shapes_are_drawn_again():
 # ---- what is not as one may wish
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("diameter", [0.05, 0.01])
 def test_records_whose_rod_is_strained_beyond_the_model_are_counted(diameter):
     """Against `scan`, which warns of them; strains agree to 1 %."""

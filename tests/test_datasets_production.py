@@ -165,6 +165,7 @@ def test_what_was_noted_is_not_made_again(many, tmp_path):
     assert hashes(out) == expected
 
 
+@pytest.mark.slow
 @on_linux
 def test_a_killed_worker_is_replaced(many, tmp_path):
     expected, spec = many

@@ -222,7 +222,7 @@ def test_polar_is_flat_over_distance(i):
     agree(found, weights, exact)
 
 
-@pytest.mark.parametrize(("kind", "i"), [("plain", 21), ("SI", 102)])
+@pytest.mark.parametrize(("kind", "i"), [pytest.param("plain", 21, marks=pytest.mark.slow), ("SI", 102)])
 def test_a_prior_of_ones_own_is_in_the_record_s_units_and_axes(kind, i):
     record, cell = measured(kind), CELLS[kind]
     about = posterior(Sample(record, i, cell))

@@ -248,6 +248,7 @@ def test_several_pivots():
     assert float(abs(result["posterior"].a - 0.5).max()) < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_no_walker_lives_on_noise(seed):
     """Walkers that start beyond a snap-off can hold out for thousands of steps where the noise is ten times too great.

@@ -99,6 +99,7 @@ def test_a_sample_beside_the_snap_off_may_be_loaded_or_not():
     assert swapped.log_likelihood(contour)[0] < exact.log_likelihood(contour)[0] - 20.0
 
 
+@pytest.mark.slow
 def test_a_posterior_with_a_noisy_encoder_is_right_and_wider():
     settings = SamplerSettings(ensembles=2, walkers=16, min_ess=100, max_r_hat=1.1)
     record = ROUGH.measure(swept(Parabola(**TRUTH), step=0.1), seed=3)

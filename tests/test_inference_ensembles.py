@@ -95,7 +95,7 @@ def test_a_lost_walker_is_noticed():
     draws = sample(log_probability, start, names=["a"], seed=1, settings=SamplerSettings(max_steps=400))
     assert np.all(draws.r_hat < 1.01)
     assert not draws.converged
-    assert "1 of 128 walkers are lost" in draws.message
+    assert "1 of 192 walkers are lost" in draws.message
 
 
 def test_same_seed_same_draws():
@@ -361,7 +361,7 @@ def test_bad_settings_are_refused(setting, value, word):
 
 
 def test_walkers_of_a_target():
-    assert SamplerSettings().walkers_for(2) == 32
+    assert SamplerSettings().walkers_for(2) == 48
     assert SamplerSettings().walkers_for(15) == 90
     assert SamplerSettings(walkers=20).walkers_for(10) == 20
     with pytest.raises(ParameterError, match="at least 22"):

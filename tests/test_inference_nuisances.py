@@ -196,9 +196,8 @@ def flawed(name, value):
     return CELL.measure(record, seed=1)
 
 
-@pytest.mark.parametrize(
-    "name", [name if name == "moment_bias" else pytest.param(name, marks=pytest.mark.slow) for name in FLAWS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FLAWS)
 def test_a_flaw_that_is_inferred_is_found_and_does_no_harm(name):
     """Within 4.5 posterior standard deviations, contour and flaw; not inferred, some of them would be far off."""
     settings = SamplerSettings(min_ess=300.0, max_r_hat=1.02)

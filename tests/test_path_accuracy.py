@@ -251,6 +251,7 @@ def test_against_shooting_with_friction(scene, friction, share):
     assert np.all(np.abs(shooting - loads) <= ACCURACY * greatest_loads(paths) + 1e-12 * slope)
 
 
+@pytest.mark.slow
 @settings(FEW, max_examples=8)
 @given(scenes(), st.tuples(st.floats(0.02, 0.98), st.sampled_from([1e-2, 1e-3, 1e-4])))
 def test_against_shooting(scene, where):

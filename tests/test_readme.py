@@ -16,6 +16,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_first_python_block_runs(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict = {}
     exec(compile(blocks("python")[0], "README.md", "exec"), names)

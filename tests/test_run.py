@@ -25,7 +25,7 @@ FIGURES = ("observables", "predictive", "rods", "contour", "gap", "trace", "pair
 
 def assert_every_file_is_there(run, folder):
     assert {path.name for path in run.files.values()} == {path.name for path in folder.iterdir()}
-    for name in FIGURES:
+    for name in set(FIGURES) & set(run.files):
         content = run.files[name].read_bytes()
         assert content.startswith(b"\x89PNG\r\n")
         assert len(content) > 5000
@@ -104,7 +104,7 @@ def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
     measured["force_x"][:] = measured["force_y"][:] = np.nan
     run = analyse(measured, tmp_path, nuisances=[], settings=QUICK)
     assert run.contacts is None
-    assert list(run.files) == ["posterior", "band", "verdicts", "summary", *FIGURES]
+    assert list(run.files) == ["posterior", "band", "verdicts", "summary", *(f for f in FIGURES if f != "gap")]
     assert_every_file_is_there(run, tmp_path)
     assert summary(run.posterior).quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
 

@@ -22,7 +22,7 @@ class SamplerSettings:
         Number of independent ensembles, the chains of the result.
     walkers : int, optional
         Number of walkers of each ensemble, even and at least twice the number of parameters. By default the larger of
-        32 and six times the number of parameters: the effective draws per evaluation hardly depend on it (Gaussian
+        48 and six times the number of parameters: the effective draws per evaluation hardly depend on it (Gaussian
         targets of 2 to 14 dimensions, 2 to 12 walkers per dimension), and a vectorised target and emcee itself are
         faster with more of them, but every one of them has to forget its start.
     block_steps : int
@@ -87,7 +87,7 @@ class SamplerSettings:
     def walkers_for(self, parameters: int) -> int:
         """Number of walkers of each ensemble for a target of this many parameters."""
         if self.walkers is None:
-            return max(32, 6 * parameters)
+            return max(48, 6 * parameters)
         refuse_few_walkers(self.walkers, parameters)
         return self.walkers
 

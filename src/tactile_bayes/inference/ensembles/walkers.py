@@ -150,7 +150,7 @@ def scatter_walkers(
     ...     return np.where(x[:, 0] > 0, -x[:, 0], -np.inf)
     >>> start = scatter_walkers(log_probability, lambda rng, n: rng.normal(size=(n, 1)), parameters=1, seed=1)
     >>> start.shape, bool(np.all(start > 0))
-    ((4, 32, 1), True)
+    ((4, 48, 1), True)
     """
     settings = SamplerSettings() if settings is None else settings
     walkers = settings.walkers_for(parameters)
