@@ -15,7 +15,7 @@ demo: $(READY)
 
 test: $(READY)
 	$(BIN)/python -m pytest -n auto
-	$(BIN)/python -m pytest --doctest-modules src
+	$(BIN)/python -m pytest -n auto --doctest-modules src
 	$(BIN)/python -m pytest --nbmake notebooks
 
 test-slow: $(READY)

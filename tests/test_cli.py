@@ -293,6 +293,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
     command = [sys.executable, "-c", SAMPLING, "infer", record, "--as-stated", "--out", "run", "-q"]

@@ -302,6 +302,7 @@ def test_control_c_says_how_to_go_on_and_the_same_command_does(specification, tm
     assert tb.datasets.verify(tmp_path / "set").records == 6
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
 def test_workers_end_when_it_is_terminated(specification, tmp_path):
     """In the middle of their work, of which there are hours."""

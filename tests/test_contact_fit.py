@@ -303,6 +303,7 @@ def test_samples_that_are_no_numbers_do_not_disturb_the_others():
     assert_same(*(ContactFit(*(column[~wrong] for column in one)) for one in (found, fit(case))), 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "push",
     [

@@ -253,6 +253,7 @@ def most(alarms_of, rate):
     return int(binom.isf(1e-4, alarms_of, rate))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [10, pytest.param(40, marks=pytest.mark.slow)])
 def test_false_alarms_of_the_bends_where_they_are_most_likely(count):
     """A contour's own curvature speaks against an alarm: the rate is greatest for a line."""
@@ -288,6 +289,7 @@ def alarms(count, draws, arc, seed):
     return refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arc", [lambda x: 0.0 * x, lambda x: np.maximum(0.0, x) ** 3], ids=["line", "half a line"])
 @pytest.mark.parametrize("count", [8, pytest.param(40, marks=pytest.mark.slow)])
 def test_false_alarms_with_the_scatter_estimated(count, arc):

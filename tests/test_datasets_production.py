@@ -77,6 +77,7 @@ def test_neither_workers_nor_order_change_a_byte(tmp_path):
     assert one == hashes(tmp_path / "2")
 
 
+@pytest.mark.slow
 def test_order_does_not_change_a_byte(many, tmp_path, monkeypatch):
     def backwards(function, tasks, **options):
         yield from ((task, function(task)) for task in reversed(tasks))
@@ -147,6 +148,7 @@ def test_killed_at_random_moments_it_goes_on(many, tmp_path, workers, kills):
     verify(out)
 
 
+@pytest.mark.slow
 @on_linux
 def test_what_was_noted_is_not_made_again(many, tmp_path):
     expected, spec = many
@@ -179,6 +181,7 @@ def test_a_killed_worker_is_replaced(many, tmp_path):
     assert hashes(out) == expected
 
 
+@pytest.mark.slow
 @on_linux
 @pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
 def test_an_interrupt_leaves_what_is_finished(many, tmp_path, workers):

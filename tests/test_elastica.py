@@ -141,7 +141,7 @@ TINY_LOADS = [
 ]
 
 
-@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("side", [1, pytest.param(-1, marks=pytest.mark.slow)])
 def test_the_contact_is_where_integration_finds_no_curvature(side):
     for shape in TANGENTIAL_SHAPES + TIP_SHAPES + TINY_LOADS:
         phi0, moment, fx, fy, delta = exact_rod.wrench(shape)

@@ -58,6 +58,7 @@ def ess(draws):
 # --- Engines ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("i", "k"), [pytest.param(21, 1, marks=pytest.mark.slow), (61, 2), pytest.param(99, 3, marks=pytest.mark.slow)]
 )

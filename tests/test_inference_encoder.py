@@ -110,6 +110,7 @@ def test_a_posterior_with_a_noisy_encoder_is_right_and_wider():
     assert wide["x_c"].std() > 1.2 * narrow["x_c"].std() / narrow["noise_scale"].mean()
 
 
+@pytest.mark.slow
 def test_predictions_have_the_errors_of_the_encoder():
     """Where loads change with the drive angle they scatter by more than the noise of the load cell."""
     cell = LoadCell(force_noise=0.002, moment_noise=0.002, drive_angle_noise=0.01)

@@ -227,6 +227,7 @@ def test_a_run_that_ended_between_two_looks_is_judged_there_again(tmp_path):
     assert draw(tmp_path, settings=loose).steps_run == 125
 
 
+@pytest.mark.slow
 def test_stricter_settings_go_on_and_looser_ones_do_not(tmp_path):
     first = draw(tmp_path, settings=STEADY)
     assert_same(draw(tmp_path, settings=replace(STEADY, min_ess=100)), first)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactile_bayes.errors import ContourError, ParameterError
-from tactile_bayes.inference.families import FAMILIES, FLANKS, family_named
+from tactile_bayes.inference.families import FAMILIES, FLANKS, FLANKS, family_named
 
 OWN = {"parabola": (0.8,), "circle": (0.7,), "ellipse": (0.9, 0.6), "power-law": (1.2, 2.5)}
 CASES = {name: (*(v for flank in name.split("/") for v in OWN[flank]), 0.3, -0.2) for name in FAMILIES}
@@ -61,7 +61,13 @@ def test_outliers_do_not_rule_a_fit(name):
     np.testing.assert_allclose(fitted.height(x), contour.height(x), atol=3e-3)
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        *FLANKS,
+        *(pytest.param(name, marks=pytest.mark.slow) for name in FAMILIES if name not in FLANKS),
+    ],
+)
 @given(x=st.floats(-2.0, 2.0), y=st.floats(-2.0, 2.0), length=st.floats(0.01, 10.0), u=st.floats(0.01, 0.99))
 def test_priors_move_with_the_pivot_and_scale_with_the_rod(name, x, y, length, u):
     family = family_named(name)

@@ -274,6 +274,7 @@ def test_the_suspension_of_a_real_whisker_is_soft(whisker_posterior):
     assert float(compliance.mean()) > 4.0 * float(compliance.std())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "least", "most"),
     [

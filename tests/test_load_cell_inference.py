@@ -51,6 +51,7 @@ def test_known_errors_are_accounted_for():
     assert known.attrs["approximations"] == ""
 
 
+@pytest.mark.slow
 def test_errors_that_are_not_told_mislead():
     """The posterior of the height alone, on a grid of heights and factors on the noise with a flat prior."""
     measured, _ = posterior_of(None)
@@ -70,6 +71,7 @@ def test_errors_that_are_not_told_mislead():
     assert off_by(CELL) > 8.0
 
 
+@pytest.mark.slow
 def test_a_bias_that_is_not_known_widens_the_posterior():
     _, known = posterior_of(None)
     _, unknown = posterior_of(UNKNOWN_BIAS)
@@ -79,6 +81,7 @@ def test_a_bias_that_is_not_known_widens_the_posterior():
     assert "the steps of the reading are taken for white noise" in unknown.attrs["approximations"]
 
 
+@pytest.mark.slow
 def test_what_is_predicted_has_the_law_of_the_load_cell():
     """Steps, a bias for each draw, and white noise on it."""
     _, unknown = posterior_of(UNKNOWN_BIAS)

@@ -109,6 +109,7 @@ def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
     assert summary(run.posterior).quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
 
 
+@pytest.mark.slow
 def test_a_dimensionless_record_with_unknown_noise(tmp_path):
     contour = Circle(1.0, 0.5)
     record = scan(contour, direction="forward", drive_step=0.05).record

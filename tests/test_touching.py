@@ -194,7 +194,7 @@ def wrench_of(rod: Touching, rods: Rods):
 
 
 @PHASES
-@pytest.mark.parametrize("amplitudes", [BENT, WEAK], ids=["bent", "weak"])
+@pytest.mark.parametrize("amplitudes", [BENT, pytest.param(WEAK, marks=pytest.mark.slow)], ids=["bent", "weak"])
 def test_slopes_of_step2_are_those_of_the_integrated_one(phase, amplitudes):
     """From the pivot on, to the first zero of curvature: relative to the largest slope by the same number."""
     rods = some_rods(phase, amplitudes, seed=11)
