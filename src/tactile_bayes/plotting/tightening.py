@@ -39,7 +39,8 @@ def tightening(
     """Single contacts beside the contacts that the contour implies: how much the whole record tightens each of them.
 
     A map with the ellipses of single contacts, three of them enlarged with the ellipses that the contour implies, and
-    over the drive angle how many times smaller the standard deviations along and across the contour have become.
+    over the drive angle how many times smaller the standard deviations along and across the contour have become. Below
+    1 they are larger: a contour posterior may know that the rig is not as stated, single contacts take it as it is.
 
     Parameters
     ----------
@@ -94,6 +95,7 @@ def tightening(
     legend_entry(panels[0], "implied by the contour", **dots | {"markersize": 6.0})
     on_map = _on_the_map(shown, chosen)
     contact_ellipses(loose, probability=probability, truth=truth, samples=on_map, ax=panels[0])
+    panels[0].legend(fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     radius = radius_of(probability)
     for letter, ax, i in zip(_DETAILS, panels[1:4], chosen.tolist(), strict=True):
         slope = float(tight["slope_angle"][i])
@@ -182,7 +184,7 @@ def _draw_detail(
     ax.set_aspect("equal", adjustable="box")
     ax.set_xlim(-reach, reach)
     ax.set_ylim(-reach, reach)
-    ax.locator_params(nbins=4)
+    ax.locator_params(nbins=3)
     ax.tick_params(labelsize="small")
     limits = np.array([-reach, reach])
     set_unit(ax.xaxis, LABELS["contact_x"] + " − implied ", "contact_x", tight["contact_x"].attrs, limits)
