@@ -143,6 +143,7 @@ def test_si_without_a_rod_says_how_to_state_one(table, tmp_path):
     assert "on the command line --length and --flexural-rigidity" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("way", ["an empty column", pytest.param("no column", marks=pytest.mark.slow)])
 def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):

@@ -121,6 +121,7 @@ def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_p
         assert (tmp_path / line.split()[-1]).stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_a_run_may_be_given_a_time(record, tmp_path):
     result = call("infer", record, "--out", tmp_path / "run", "--as-stated", "--max-seconds", 0.1, "--quiet")
     assert result.stdout.startswith("NOT CONVERGED, the time allowed ran out")
@@ -184,6 +185,7 @@ def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(record, tmp_p
     assert "effective draws" not in result.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_path):
     path = tmp_path / "plain.csv"

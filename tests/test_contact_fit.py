@@ -169,6 +169,7 @@ def assert_nothing_is_better(case, starts):
         np.testing.assert_allclose(place[k], right, rtol=0.0, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_other_contact_is_more_likely(kind):
     options, count = KINDS[kind]

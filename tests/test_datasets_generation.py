@@ -252,6 +252,7 @@ def test_numbers_are_drawn_by_their_laws():
     assert stats.kstest(data.truth_contour_r.values[circle], stats.uniform(0.4, 0.6).cdf).pvalue > FALSE_ALARM
 
 
+@pytest.mark.slow
 def test_shape_free_radii_are_a_gaussian_process():
     data = generated(drawn_from("shape-free", 500, scan={"samples": 2}, contours=[
         {"family": "shape-free", "radius": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": 0.5},
@@ -432,6 +433,7 @@ def test_records_depend_on_seed_and_index_alone():
     np.testing.assert_allclose(apart.sample["force_x"], one.sample["force_x"][3:5], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [

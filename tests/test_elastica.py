@@ -284,6 +284,7 @@ def judged(contact):
     return wrench_ratios(contact)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("states", CONTACT_REGIONS)
 def test_contact_to_wrench_loses_no_digits(states):
     for contact in states:

@@ -232,6 +232,7 @@ def test_progress_reaches_the_end():
 # --- Load cells of every kind -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "further",
     [
@@ -372,6 +373,7 @@ def test_cut_off_samples_are_left_out():
     assert (stats_of(tree).converged.values == left).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees_of_freedom", [1.5, 2.0, 3.0])
 def test_outliers_of_every_kind_have_posteriors(degrees_of_freedom):
     cell = replace(CELL, degrees_of_freedom=degrees_of_freedom)

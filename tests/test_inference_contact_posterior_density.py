@@ -169,6 +169,7 @@ def reach_by_chance(rng, count):
     return points[there], wrench.phase[there], wrench.drive_angle[there]
 
 
+@pytest.mark.slow
 def test_nothing_measured_leaves_the_flat_prior():
     """Noise beyond all loads: what is left is the prior where the encoder says that the rod is, in shares and means.
 

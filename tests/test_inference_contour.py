@@ -165,6 +165,7 @@ def coarse(contour=None, cell=CELL, seed=3, **options):
     return cell.measure(swept(contour or Parabola(**TRUTH), step=np.radians(5.0), **options), seed=seed)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_draws():
     record, brief = coarse(), replace(BRIEF, block_steps=8, max_steps=8)
     first, again, other = (infer_as_stated(record, seed=seed, settings=brief) for seed in (1, 1, 2))
@@ -175,6 +176,7 @@ def test_the_same_seed_gives_the_same_draws():
     assert "not converged" in first.attrs["message"]
 
 
+@pytest.mark.slow
 def test_units_do_not_matter():
     """SI and dimensionless records of one measurement: the same draws, up to rounding that the optimiser amplifies."""
     rod = Rod(length=0.25, flexural_rigidity=2.4e-3)
@@ -329,6 +331,7 @@ def test_a_record_without_load_is_refused():
         infer_as_stated(record, seed=1)
 
 
+@pytest.mark.slow
 def test_a_very_tight_prior_is_obeyed():
     """As if a were known: within 5 prior standard deviations, and the noise is not inflated."""
     result = infer_as_stated(coarse(), seed=1, priors={"a": stats.norm(0.5, 1e-5)}, settings=BRIEF)
@@ -365,6 +368,7 @@ def test_ranks_of_the_truth_are_uniform():
         assert stats.kstest(column, "uniform").pvalue > 1e-3, name
 
 
+@pytest.mark.slow
 def test_samples_without_load_tell_where_contact_begins_and_ends():
     """Left out, the posterior is wider, and still right."""
     whole = posterior()["posterior"]

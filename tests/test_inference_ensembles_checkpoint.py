@@ -77,6 +77,7 @@ def test_a_run_goes_on_bit_by_bit_wherever_it_was_killed(tmp_path, calls):
     assert target.calls == 2 * (SMALL.max_steps - made) + (0 if made else 2)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_to_convergence_after_many_kills(tmp_path):
     """One that is killed after every three blocks or so judges at the same steps and ends where it would have ended."""
     kills = 0

@@ -87,6 +87,7 @@ def funnel(x):
     return -0.5 * ((x[:, 0] / 3.0) ** 2 + (x[:, 1:] ** 2).sum(axis=1) * np.exp(-x[:, 0]) + others * x[:, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [60, 250])
 @pytest.mark.parametrize("log_probability", [banana, uneven, funnel])
 def test_a_slow_run_is_not_taken_for_several_modes(log_probability, steps):

@@ -119,6 +119,7 @@ def made_up():
     return infer_point_load(*made_up_readings(1), seed=2, settings=QUICK)
 
 
+@pytest.mark.slow
 def test_a_made_up_rig_is_recovered(made_up):
     """Nine parameters within 4 posterior sd: false alarm below 1e-3."""
     assert made_up.attrs["converged"], made_up.attrs["message"]

@@ -177,6 +177,7 @@ def test_the_data_sheet_goes_with_the_record():
     assert LoadCell.from_record(half) == LoadCell(force_noise=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["csv", "nc"])
 @settings(max_examples=8, deadline=None)
 @given(sheet=load_cells(), rod=rods)

@@ -178,6 +178,7 @@ HARD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", HARD.values(), ids=HARD)
 def test_hard_cases_down_to_the_snap_off(scene):
     check_against_forty_digits(scene)

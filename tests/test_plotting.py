@@ -126,6 +126,7 @@ def test_every_function_draws_where_it_is_told_and_nowhere_else(plain, noisy, co
     assert plt.get_fignums() == []
 
 
+@pytest.mark.slow
 def test_every_function_makes_one_figure_of_its_own(plain, posterior):
     plotting.observables(plain.record)
     plotting.rods(plain)

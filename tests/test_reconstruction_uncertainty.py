@@ -186,6 +186,7 @@ def in_contact(record, *, weak=0.3):
     return record.isel(sample=np.flatnonzero(np.abs(record.holding_moment.values) > weak))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["white", "correlated", "encoder", "encoder, turning", "friction"])
 def test_the_misfit_is_chi_square_clear_of_the_edge(scenes, sensor):
     """Kolmogorov and Smirnov's test at one in ten thousand, at a thirtieth of ordinary noise."""

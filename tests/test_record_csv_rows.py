@@ -72,6 +72,7 @@ def test_a_piece_of_truth_values_is_no_piece_of_numbers(tmp_path, word):
     assert f"line 8, column 'sweep': {word.strip(chr(34))!r} is not an integer" in str(message)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(table=tables())
 def test_the_fast_reader_and_the_careful_one_agree(tmp_path, table):
@@ -90,6 +91,7 @@ def test_the_fast_reader_and_the_careful_one_agree(tmp_path, table):
         assert whole == fast
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(numbers=st.lists(st.floats(allow_nan=False, width=64) | st.decimals(allow_nan=False), min_size=20, max_size=40))
 @pytest.mark.parametrize("decimal", [".", ","])

@@ -98,6 +98,7 @@ def test_the_summary_has_the_probability_it_is_asked_for(analysed):
     assert (narrow["upper"] < wide["upper"]).all()
 
 
+@pytest.mark.slow
 def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
     record = scan(Parabola(0.5, 0.5), direction="backward", base=(0.1, 0.0), drive_step=0.05).record
     measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
@@ -139,6 +140,7 @@ def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
     assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_another_rod_is_that_of_all_results(measured, tmp_path):
     wrong = measured.assign_attrs(rod_length=0.21, rod_diameter=0.0)

@@ -180,6 +180,7 @@ def test_clear_means_that_the_straight_rod_is_outside(name, q, x, direction):
 WIRE = Rod.circular(length=0.2, diameter=0.5e-3, youngs_modulus=206e9, elastic_strain=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", ["forward", pytest.param("backward", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("q", [0.06, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_the_largest_strain_against_integration(direction, q):

@@ -108,6 +108,7 @@ def test_processes_die_with_their_parent(tmp_path):
     wait_until(lambda: not any(alive(path.name) for path in tmp_path.iterdir()), seconds=5.0)
 
 
+@pytest.mark.slow
 @on_linux
 @pytest.mark.parametrize("begun", [True, False])
 def test_an_interrupt_ends_all_at_once(tmp_path, begun):
