@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 
 import pytest
+from hypothesis import settings
 
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.inference.ensembles import SamplerSettings
@@ -12,6 +13,15 @@ from tactile_bayes.scanning import scan
 
 QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
 """Enough for files and messages, not for numbers."""
+
+
+settings.register_profile("few", max_examples=30)
+
+
+def pytest_configure(config):
+    """Fewer examples of everything, but where all tests or the slow ones are asked for."""
+    if config.getoption("markexpr") == "not slow":
+        settings.load_profile("few")
 
 
 @pytest.fixture(scope="session", autouse=True)
