@@ -8,7 +8,7 @@ DEMO_OUT ?= results/demo
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench coverage images lint clean
+.PHONY: demo test test-slow bench coverage calibration images lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -26,6 +26,9 @@ bench: $(READY)
 
 coverage: $(READY)
 	$(BIN)/python -m benchmarks.contacts
+
+calibration: $(READY)
+	$(BIN)/python -m benchmarks.calibration
 
 images: $(READY)
 	$(BIN)/python docs/images.py
