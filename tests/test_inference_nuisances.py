@@ -112,6 +112,56 @@ def test_an_offset_shifts_what_the_encoder_reads(order):
 
 
 @pytest.mark.parametrize("order", [16, FINE_ORDER], ids=["compiled", "arrays"])
+def test_a_pivot_may_be_off_where_the_record_has_it(order):
+    bases = [(0.0, 0.0), (0.25, 0.0), (-0.2, 0.05)]
+    off = np.array([[0.0, 0.0], [0.01, -0.004], [0.0, 0.02]])
+    true = scanned(base=[tuple(base) for base in np.array(bases) + off])
+    stated = true.assign({name: true[name].copy() for name in ("base_x", "base_y")})
+    for k, base in enumerate(bases):
+        at = (true.base_x == base[0] + off[k, 0]).values
+        stated.base_x[at], stated.base_y[at] = base
+    likelihood = RecordLikelihood(stated, CELL, order=order)
+    twice = family_named("parabola").build(*(np.full(2, value) for value in TRUTH.values()))
+    loads, usable = likelihood.predict(twice, Rig(base_shifts=np.stack([off, np.zeros_like(off)])))
+    assert usable.all()
+    measured = np.stack([true[name].values for name in CHANNELS], axis=-1)
+    largest = np.abs(measured).max()
+    assert np.sort(np.abs(loads[0] - measured).max(axis=1))[-6] < 2e-4 * largest  # one of six may be past an event
+    of_first = (stated.base_x == 0.0).values
+    assert np.median(np.abs(loads[1] - measured)[~of_first]) > 1e-3
+    np.testing.assert_array_equal(loads[0, of_first], loads[1, of_first])
+
+
+@pytest.mark.slow
+def test_a_pivot_that_is_off_is_found():
+    """By 2 % of a rod length, of which the prior says 1 %; within 4 standard deviations, and 10 times as sharp."""
+    true = scanned(base=[(0.0, 0.0), (0.27, -0.02)])
+    stated = true.assign(base_x=true.base_x.round(1) * 0.25 / 0.3, base_y=0.0 * true.base_y)
+    result = infer_contour(CELL.measure(stated, seed=1), nuisances=["bias", "base"], seed=1)
+    posterior = result["posterior"].to_dataset()
+    assert result.attrs["converged"]
+    for name, value in {"base_2_x": 0.02, "base_2_y": -0.02, **TRUTH}.items():
+        assert abs(posterior[name].mean() - value) < 4.0 * posterior[name].std()
+    assert posterior.base_2_x.std() < 1e-3
+    assert posterior.base_2_y.std() < 1e-3
+
+
+def test_pivots_are_named_from_the_second_on():
+    record = scanned(base=[(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0)])
+
+    def named(*nuisances):
+        return [name for name in default_priors(record, nuisances=nuisances) if name.startswith("base")]
+
+    assert named("base") == ["base_2_x", "base_2_y", "base_3_x", "base_3_y"]
+    assert named("base_y") == ["base_2_y", "base_3_y"]
+    assert named("base_3_x", "base_x") == ["base_3_x", "base_2_x"]
+    with pytest.raises(ParameterError, match=r"base_1_y cannot be inferred: .* relative to the first pivot"):
+        named("base_1_y")
+    with pytest.raises(ParameterError, match=r"there is no base_4_x: the record has 3 pivots"):
+        named("base_4_x")
+
+
+@pytest.mark.parametrize("order", [16, FINE_ORDER], ids=["compiled", "arrays"])
 def test_a_compliant_suspension_turns_with_the_moment(order):
     """States are the same, but the drive stands elsewhere, until it stands farthest."""
     record, compliance = scan(Parabola(0.5, 0.5), drive_step=np.radians(0.5)).record, 0.02

@@ -39,7 +39,7 @@ class Strokes(NamedTuple):
 
 
 def loads_of(
-    halves: Halves, strokes: Strokes, rod: tuple[float, float], rig: Floats, *, is_always_clear: bool
+    halves: Halves, strokes: Strokes, rod: tuple[float, float], rig: Floats, shifts: Floats, *, is_always_clear: bool
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Loads in EI/L and EI/L², zero out of contact, shape (n, samples, 3), and which contours are usable, shape (n,).
 
@@ -53,6 +53,8 @@ def loads_of(
         Its length, and half its diameter.
     rig : ndarray, shape (n, 2)
         What the encoder reads too much [rad], and the suspension's compliance [rad/(EI/L)].
+    shifts : ndarray, shape (n, strokes, 2)
+        By how much the pivot of every stroke is off.
     """
     known, on = _constants()
     columns = (*halves.left[1:], *halves.right[1:], halves.x, halves.y)
@@ -60,7 +62,7 @@ def loads_of(
     out = np.zeros((halves.x.size, strokes.samples.size, 3))
     usable = np.ones(halves.x.size, dtype=bool)
     kinds, room = (halves.left.kind, halves.right.kind), work(int(np.diff(strokes.first).max()))
-    _fill(kinds, contours, halves.has_knot, strokes, rod, rig, is_always_clear, known, on, room, out, usable)
+    _fill(kinds, contours, halves.has_knot, strokes, rod, rig, shifts, is_always_clear, known, on, room, out, usable)
     return out, usable
 
 
@@ -86,6 +88,7 @@ def _fill(
     strokes: Strokes,
     rod: tuple[float, float],
     rig: Floats,
+    shifts: Floats,
     is_always_clear: bool,
     known: Tables,
     on: Nodes,
@@ -99,7 +102,8 @@ def _fill(
         l_size, l_shape = _in_rod_lengths(left, contours[i, 0], contours[i, 1], length)
         r_size, r_shape = _in_rod_lengths(right, contours[i, 2], contours[i, 3], length)
         for k in range(strokes.base_x.size):
-            x, y = (contours[i, 4] - strokes.base_x[k]) / length, (contours[i, 5] - strokes.base_y[k]) / length
+            x = (contours[i, 4] - strokes.base_x[k] - shifts[i, k, 0]) / length
+            y = (contours[i, 5] - strokes.base_y[k] - shifts[i, k, 1]) / length
             lane = Lane(left, l_size, l_shape, right, r_size, r_shape, x, y, standoff / length)
             sign = 1.0
             if strokes.backward[k]:

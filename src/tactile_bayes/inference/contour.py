@@ -76,8 +76,9 @@ def infer_contour(
         stated), "drive_angle_offset" (what the encoder reads too much [rad]), "bias" (of all channels, or
         "moment_bias", "force_x_bias", "force_y_bias"), "gain" (of all, or "moment_gain" and so on), "friction"
         (Coulomb's coefficient; several times slower), "suspension_compliance" (turn of the pivot per holding moment).
-        By default the first three; an empty list takes all as stated. The pivot's place cannot be inferred, since a
-        shift of pivot and object together changes nothing that is measured: results are relative to the pivot.
+        By default the first three; an empty list takes all as stated. "base": how much the second and further pivots of
+        a record are off, as "base_2_x", "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred,
+        since a shift of pivots and object together changes nothing that is measured: results are relative to it.
     events : bool
         Whether the samples without load count, which tell where contact begins and ends. Without them only those count
         whose load noise does not explain: what a method knows that looks at contacts alone.
@@ -121,8 +122,8 @@ def infer_contour(
     log-uniform from 1e-6 to 10, in EI/L and EI/L². Of the nuisances: rigidity_scale log-normal around 1 with 5 %,
     drive_angle_offset normal with 1°, biases normal with 0.1 EI/L and EI/L² (one of which the load cell states a
     bias_uncertainty is integrated out instead), gains normal around 1 with 2 %, friction half-normal with scale 0.3,
-    suspension_compliance half-normal with 0.05 rad per EI/L. Contours out of reach, and those that the rod would still
-    cut after snap-off, are excluded on top.
+    suspension_compliance half-normal with 0.05 rad per EI/L, pivots normal with 1 % of L. Contours out of reach, and
+    those that the rod would still cut after snap-off, are excluded on top.
 
     Examples
     --------

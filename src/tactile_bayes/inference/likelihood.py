@@ -23,7 +23,7 @@ from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, t
 if TYPE_CHECKING:
     from tactile_bayes.compiled.loads import Strokes
 
-__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood", "Rig"]
+__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood", "Rig", "bases_of"]
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +35,8 @@ FAST_ORDER, FINE_ORDER = 16, 32
 class _Stroke:
     """Samples with one pivot, that meet the object from one side."""
 
+    pivot: int
+    """Which of the record's pivots, in the order in which they come."""
     base: tuple[float, float]
     backward: bool
     samples: NDArray[np.intp]
@@ -51,6 +53,9 @@ class Rig(NamedTuple):
     """Turn of the pivot's suspension per holding moment, in the unit of the record as stated [rad/(EI/L)]."""
     friction: Any = 0.0
     """Coulomb's coefficient."""
+    base_shifts: Any = None
+    """By how much pivots are off where the record has them, in its unit of length, shape (n, pivots, 2), in the order
+    in which they come; those after the last that is given are where they should be."""
 
 
 class RecordLikelihood:
@@ -100,11 +105,14 @@ class RecordLikelihood:
         angle = record.drive_angle.values - load_cell.drive_angle_offset
         self._turn = angle if frame_of(record) == "turning" else None
         backward = contact_sides(_without_errors(measured, load_cell), load_cell) < 0.0
-        place = np.stack([measured.base_x.values, measured.base_y.values, backward], axis=-1)
-        kinds, which = np.unique(place, axis=0, return_inverse=True)
+        places = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
+        pivots = {base: k for k, base in enumerate(bases_of(measured))}
+        kinds, which = np.unique(np.column_stack([places, backward]), axis=0, return_inverse=True)
         self.strokes = [
-            _Stroke((float(x), float(y)), bool(b), np.flatnonzero(which == k)) for k, (x, y, b) in enumerate(kinds)
+            _Stroke(pivots[float(x), float(y)], (float(x), float(y)), bool(b), np.flatnonzero(which == k))
+            for k, (x, y, b) in enumerate(kinds)
         ]
+        self._pivots = np.array([stroke.pivot for stroke in self.strokes])
         others = [[t.base == s.base and t.backward != s.backward for t in self.strokes] for s in self.strokes]
         self._opposite = np.argmax(others, axis=1) if np.all(np.any(others, axis=1)) else None
         longest = max(stroke.samples.size for stroke in self.strokes)
@@ -120,14 +128,9 @@ class RecordLikelihood:
         rig = self._rig_of(rig, count)
         strokes = len(self.strokes)
         index = np.tile(np.arange(count), strokes)
-        base_x, base_y, backward = (
-            np.repeat(np.array(column), count)
-            for column in (
-                [s.base[0] for s in self.strokes],
-                [s.base[1] for s in self.strokes],
-                [s.backward for s in self.strokes],
-            )
-        )
+        backward = np.repeat([stroke.backward for stroke in self.strokes], count)
+        stated = np.array([stroke.base for stroke in self.strokes])
+        base_x, base_y = (stated[:, None] + rig.base_shifts[:, self._pivots].swapaxes(0, 1)).reshape(-1, 2).T
         seen = SeenContour(contours.take(index), base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
         return trace(
             seen,
@@ -183,7 +186,11 @@ class RecordLikelihood:
 
     def _rig_of(self, rig: Rig | None, count: int) -> Rig:
         """Of every contour, what is known of the rig where nothing is said of it."""
-        return Rig(*(np.broadcast_to(value, (count,)) for value in rig or Rig(friction=self.friction)))
+        rig = rig or Rig(friction=self.friction)
+        shifts = np.zeros((count, self._pivots.max() + 1, 2))
+        if rig.base_shifts is not None:
+            shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
+        return Rig._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
 
     def _by_compiled(self, halves: Halves, rig: Rig, errors: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """`predict`, in the pivot's frame, without friction and to `FAST_ORDER`."""
@@ -194,7 +201,12 @@ class RecordLikelihood:
             [rig.drive_angle_offset, rig.suspension_compliance * rig.rigidity_scale], axis=1
         )
         loads, usable = loads_of(
-            halves, self._strokes_with(errors), rod, offset_and_compliance, is_always_clear=self.is_always_clear
+            halves,
+            self._strokes_with(errors),
+            rod,
+            offset_and_compliance,
+            rig.base_shifts[:, self._pivots],
+            is_always_clear=self.is_always_clear,
         )
         return loads.reshape(len(loads), errors.size, *self.measured.shape), usable
 
@@ -278,6 +290,11 @@ class RecordLikelihood:
                 f"the likelihood of {np.count_nonzero(np.isnan(values))} contours is not a number: please report this"
             )
         return values
+
+
+def bases_of(measured: xr.Dataset) -> list[tuple[float, float]]:
+    """Where the record has pivots, in the order in which they come."""
+    return list(dict.fromkeys(zip(measured.base_x.values.tolist(), measured.base_y.values.tolist(), strict=True)))
 
 
 def _without_errors(measured: xr.Dataset, load_cell: LoadCell) -> xr.Dataset:

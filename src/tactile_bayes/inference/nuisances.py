@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from scipy import stats
 from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import Prior
-from tactile_bayes.inference.likelihood import Rig
+from tactile_bayes.inference.likelihood import Rig, bases_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 from tactile_bayes.rod import Rod
@@ -29,15 +30,17 @@ STANDARD = ("rigidity_scale", "drive_angle_offset", "bias")
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "gain")}
 
-_RIGIDITY, _OFFSET, _BIAS, _GAIN, _FRICTION, _COMPLIANCE = 0.05, np.radians(1.0), 0.1, 0.02, 0.3, 0.05
-"""Standard deviations (scales of half normals) of the priors: of ratios; rad; EI/L and EI/L²; and rad per EI/L."""
+_RIGIDITY, _OFFSET, _BIAS, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.1, 0.02, 0.3, 0.05, 0.01
+"""Standard deviations (scales of half normals) of the priors: of ratios; rad; EI/L and EI/L²; rad per EI/L; and L."""
+
+
+_BASE = re.compile(r"base_(\d+)_([xy])")
+"""How much a pivot of the record, counted from 1, is off."""
 
 
 class _Kind(NamedTuple):
     """One nuisance parameter."""
 
-    stated: float
-    """Its value if the rig is as stated."""
     low: float
     high: float
     power_of_moment: int = 0
@@ -45,12 +48,12 @@ class _Kind(NamedTuple):
 
 
 _KINDS = {
-    "rigidity_scale": _Kind(1.0, 0.0, np.inf),
-    "drive_angle_offset": _Kind(0.0, -np.pi, np.pi),
-    "suspension_compliance": _Kind(0.0, 0.0, np.inf, power_of_moment=-1),
-    "friction": _Kind(0.0, 0.0, float(np.tan(MAX_FRICTION_ANGLE))),
-    **{name: _Kind(0.0, -np.inf, np.inf, power_of_moment=1) for name in _GROUPS["bias"]},
-    **{name: _Kind(1.0, 0.0, np.inf) for name in _GROUPS["gain"]},
+    "rigidity_scale": _Kind(0.0, np.inf),
+    "drive_angle_offset": _Kind(-np.pi, np.pi),
+    "suspension_compliance": _Kind(0.0, np.inf, power_of_moment=-1),
+    "friction": _Kind(0.0, float(np.tan(MAX_FRICTION_ANGLE))),
+    **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in _GROUPS["bias"]},
+    **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
 }
 _RIG = ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")
 
@@ -80,22 +83,41 @@ class Nuisances:
     def __post_init__(self) -> None:
         moment, force = self.rod.moment_unit, self.rod.force_unit
         units = {n: (force if n.startswith("force") else moment) ** k.power_of_moment for n, k in _KINDS.items()}
+        units |= {n: 1.0 for n in self.names if _BASE.fullmatch(n)}  # lengths are the record's inside, too
         object.__setattr__(self, "units", units)
 
     def bounds(self, name: str) -> tuple[float, float]:
         """Between which values it lies, whatever a prior says."""
-        return _KINDS[name].low, _KINDS[name].high
+        kind = _KINDS.get(name)
+        return (-np.inf, np.inf) if kind is None else (kind.low, kind.high)
 
     def unit(self, name: str) -> str:
         """Of an SI record, in words."""
         if name in _GROUPS["bias"]:
             return "N m" if name == "moment_bias" else "N"
+        if _BASE.fullmatch(name):
+            return "m"
         return {"drive_angle_offset": "rad", "suspension_compliance": "rad/(N m)"}.get(name, "1")
 
     def rig(self, values: Mapping[str, Floats]) -> Rig:
         """The rig of every point, from values by name, each of shape (n,)."""
         known = {"friction": self.friction} if "friction" not in self.names else {}
-        return Rig(**known, **{name: values[name] / self.units[name] for name in _RIG if name in self.names})
+        return Rig(
+            base_shifts=self._base_shifts(values),
+            **known,
+            **{name: values[name] / self.units[name] for name in _RIG if name in self.names},
+        )
+
+    def _base_shifts(self, values: Mapping[str, Floats]) -> Floats | None:
+        """Shape (n, pivots, 2), to the last that is off."""
+        shifted = [(name, _BASE.fullmatch(name)) for name in self.names]
+        off = [(name, int(found[1]) - 1, "xy".index(found[2])) for name, found in shifted if found]
+        if not off:
+            return None
+        shifts = np.zeros((len(values[off[0][0]]), max(pivot for _, pivot, _ in off) + 1, 2))
+        for name, pivot, axis in off:
+            shifts[:, pivot, axis] = values[name]
+        return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
         """Loads, shape (n, ..., 3), with errors of calibration, and with what the cell will read as a bias."""
@@ -131,15 +153,13 @@ def nuisances_of(
     present = [_SHORT[name] for name in present_channels(measured)]
     uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
     names: list[str] = []
-    for name in (*chosen, *(name for name in priors if name in _KINDS)):
-        if name in ("base", "base_x", "base_y"):
-            raise ParameterError(
-                f"{name} cannot be inferred: if pivot and object are shifted together nothing measured changes. "
-                "Results are relative to the pivot as stated; add what is not known of its place to them"
-            )
+    for name in (*chosen, *(name for name in priors if name in _KINDS or _BASE.fullmatch(name))):
+        if name in ("base", "base_x", "base_y") or _BASE.fullmatch(name):
+            names += _bases_off(name, measured)
+            continue
         if name not in _KINDS and name not in _GROUPS:
             raise ParameterError(
-                f"there is no nuisance parameter {name!r}: choose from {', '.join([*_GROUPS, *_KINDS])}"
+                f"there is no nuisance parameter {name!r}: choose from {', '.join([*_GROUPS, *_KINDS])}, or base"
             )
         members = [n for n in _GROUPS[name] if n.rpartition("_")[0] in present] if name in _GROUPS else [name]
         for member in members:
@@ -163,8 +183,24 @@ def nuisances_of(
         )
     rod = rod_of(measured)
     nuisances = Nuisances(tuple(names), {}, rod, friction)
-    defaults = {name: _default_prior(name, nuisances.units[name]) for name in names}
+    defaults = {name: _default_prior(name, rod.length if "base" in name else nuisances.units[name]) for name in names}
     return Nuisances(tuple(names), defaults, rod, friction)
+
+
+def _bases_off(name: str, measured: xr.Dataset) -> list[str]:
+    """Names of the pivots' shifts that a name stands for."""
+    number, found = len(bases_of(measured)), _BASE.fullmatch(name)
+    if number == 1 or (found and found[1] == "1"):
+        raise ParameterError(
+            f"{name} cannot be inferred: if pivot and object are shifted together nothing measured changes. "
+            f"Results are relative to the {'first ' if number > 1 else ''}pivot as stated; add to them what is not "
+            "known of its place"
+        )
+    if found and not 2 <= int(found[1]) <= number:
+        raise ParameterError(f"there is no {name}: the record has {number} pivots, base_2_x is of the second")
+    if found:
+        return [f"base_{int(found[1])}_{found[2]}"]
+    return [f"base_{k}_{axis}" for k in range(2, number + 1) for axis in (name[5:] or "xy")]
 
 
 def _default_prior(name: str, unit: float) -> Prior:
@@ -179,4 +215,6 @@ def _default_prior(name: str, unit: float) -> Prior:
             return stats.halfnorm(scale=_COMPLIANCE * unit)
         case _ if name in _GROUPS["gain"]:
             return stats.norm(1.0, _GAIN)
+        case _ if _BASE.fullmatch(name):
+            return stats.norm(0.0, _SHIFT * unit)
     return stats.norm(0.0, _BIAS * unit)

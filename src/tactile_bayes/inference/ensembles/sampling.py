@@ -66,7 +66,7 @@ def sample(
     checkpoint: str | os.PathLike[str] | None = None,
     identity: Mapping[str, str] | None = None,
 ) -> Draws:
-    """Draw from a posterior with independent ensembles of differential-evolution walkers.
+    """Draw from a posterior with independent ensembles of walkers, which propose from one another.
 
     The ensembles run in step. After `block_steps` steps, and whenever their number has grown by a quarter, the second
     half of the steps so far is judged: rank-normalised R̂ across ensembles, each cut in early and late steps, and

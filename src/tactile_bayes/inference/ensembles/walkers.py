@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles.moves import differential_evolution
+from tactile_bayes.inference.ensembles.moves import standard_moves
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.inference.ensembles.target import LogProbability
 
@@ -71,7 +71,7 @@ def walking_ensemble(
 ) -> Iterator[Any]:
     """Endless states of one ensemble, after the one given."""
     walkers, parameters = points.shape
-    moves = differential_evolution() if moves is None else moves
+    moves = standard_moves() if moves is None else moves
     sampler: Any = emcee.EnsembleSampler(walkers, parameters, target, moves=list(moves), vectorize=True)
     sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
     sampler.random_state = random_state
