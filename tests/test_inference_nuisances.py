@@ -193,15 +193,15 @@ def test_friction_is_that_of_each_contour():
 
 
 @pytest.mark.parametrize("rod", [Rod(), SI], ids=["dimensionless", "SI"])
-def test_gains_biases_and_rigidity_change_what_is_sensed_as_they_say(rod):
-    names = ["rigidity_scale", "moment_gain", "force_y_gain", "bias"]
+def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod):
+    names = ["rigidity_scale", "moment_gain", "force_y_gain", "bias", "force_y_drift"]
     length = rod.length
     gain = ((1.02, 0.0, 0.003 * length), (0.0, 0.97, 0.01), (0.0, 0.0, 1.0))
     cell = LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit, gain=gain)
     record = scan(Parabola(0.5 / length, 0.5 * length), rod=rod, drive_step=0.1).record
     model = model_of(record, names, cell)
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
-    values = {"rigidity_scale": 1.1, "moment_gain": 0.9, "force_y_gain": 1.2}
+    values = {"rigidity_scale": 1.1, "moment_gain": 0.9, "force_y_gain": 1.2, "force_y_drift": 0.05 * rod.force_unit}
     values |= dict(
         zip(("moment_bias", "force_x_bias", "force_y_bias"), np.array([0.01, -0.02, 0.03]) * units, strict=True)
     )
@@ -211,6 +211,7 @@ def test_gains_biases_and_rigidity_change_what_is_sensed_as_they_say(rod):
     plain, _ = model.likelihood.predict(model.contours(point))
     true = 1.1 * plain[0] * np.array([0.9, 1.0, 1.2]) * units
     expected = true @ np.array(gain).T + np.array([0.01, -0.02, 0.03]) * units
+    expected[:, 2] += np.linspace(-0.5, 0.5, len(expected)) * 0.05 * rod.force_unit
     np.testing.assert_allclose(found / units, expected / units, rtol=0.0, atol=1e-12)
 
 
@@ -218,6 +219,7 @@ FLAWS = {
     "rigidity_scale": 1.06,
     "drive_angle_offset": 0.02,
     "moment_bias": 0.05,
+    "force_x_drift": -0.1,
     "force_x_gain": 1.03,
     "suspension_compliance": 0.02,
     "friction": 0.2,
@@ -241,6 +243,8 @@ def flawed(name, value):
         record = record.assign(drive_angle=record.drive_angle + value)
     if name == "moment_bias":
         record = record.assign(holding_moment=record.holding_moment + value)
+    if name == "force_x_drift":
+        record = record.assign(force_x=record.force_x + value * np.linspace(-0.5, 0.5, record.sizes["sample"]))
     if name == "force_x_gain":
         record = record.assign(force_x=value * record.force_x)
     return CELL.measure(record, seed=1)
@@ -299,7 +303,7 @@ def test_biases_that_the_cell_is_not_sure_of_are_integrated_out_and_not_inferred
     ("nuisances", "words"),
     [
         (["base_x"], "base_x cannot be inferred: if pivot and object are shifted together"),
-        (["EI"], "there is no nuisance parameter 'EI': choose from bias, gain, rigidity_scale"),
+        (["EI"], "there is no nuisance parameter 'EI': choose from bias, drift, gain, rigidity_scale"),
         ("bias", r"nuisances is 'bias': give a list of names, like \['bias'\]"),
         (
             ["rigidity_scale", "gain"],

@@ -1,4 +1,4 @@
-"""Files written whole: a reader sees the old file or the new one, never half of either."""
+"""Files written whole, of which a reader sees the old or the new one and never half of either; folders for one run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["write_atomically"]
+__all__ = ["alone_in", "write_atomically"]
 
 
 @contextmanager
@@ -63,3 +63,30 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
             os.fsync(directory)
         finally:
             os.close(directory)
+
+
+@contextmanager
+def alone_in(folder: Path, refusal: type[Exception]) -> Iterator[None]:
+    """Keep other runs out of a folder, where the system can; the lock goes with the process.
+
+    Raises
+    ------
+    Exception
+        Of the type `refusal`, if another run is at work there.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows: nothing keeps the second run out
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise refusal(f"another run is at work on {folder}: wait for it, or stop it") from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(handle)

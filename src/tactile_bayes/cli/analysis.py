@@ -64,8 +64,8 @@ def infer(
         list[str] | None,
         typer.Option(
             help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset and "
-            "bias: one of these, or gain, friction, suspension_compliance, base (where further pivots stand); give it "
-            "again for another."
+            "bias: one of these, or drift, gain, friction, suspension_compliance, base (where further pivots "
+            "stand); give it again for another."
         ),
     ] = None,
     as_stated: Annotated[

@@ -6,8 +6,8 @@ import hashlib
 import os
 import reprlib
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from tactile_bayes.datasets.shard import Written, shard_file, write_shard
 from tactile_bayes.datasets.specification import UNNAMED, Specification, meaning, read_specification
 from tactile_bayes.datasets.specification_text import differences
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.files import write_atomically
+from tactile_bayes.files import alone_in, write_atomically
 from tactile_bayes.tasks import run_tasks
 
 __all__ = ["Production", "generate"]
@@ -103,7 +103,7 @@ def generate(
     if folder.exists() and not folder.is_dir():
         raise SpecificationError(f"{folder} is a file: give a folder")
     folder.mkdir(parents=True, exist_ok=True)
-    with _alone(folder):
+    with alone_in(folder, SpecificationError):
         manifest = _begun(spec, folder)
         done = {shard.file for shard in manifest.shards}
         tasks = [(spec.text, n, str(folder)) for n in range(spec.shards) if shard_file(n) not in done]
@@ -203,24 +203,3 @@ def _said(value: Any) -> str:
         return "is left out"
     is_whole = isinstance(value, float) and value.is_integer()
     return f"is {int(value) if is_whole else reprlib.repr(value)}"
-
-
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Keep other runs out of a folder, where the system can; the lock goes with the process."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: two runs would write the same files twice
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise SpecificationError(f"another run is at work on {folder}: wait for it, or stop it") from None
-        except OSError:  # a file system without locks
-            pass
-        yield
-    finally:
-        os.close(handle)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
@@ -74,7 +75,8 @@ def infer_contour(
     nuisances : sequence of str
         What is not known of the rig, and inferred beside the contour: "rigidity_scale" (flexural rigidity over that
         stated), "drive_angle_offset" (what the encoder reads too much [rad]), "bias" (of all channels, or
-        "moment_bias", "force_x_bias", "force_y_bias"), "gain" (of all, or "moment_gain" and so on), "friction"
+        "moment_bias", "force_x_bias", "force_y_bias"), "drift" (of all, or "moment_drift" and so on: by how much a zero
+        moves evenly from the first sample to the last; a bias is that in the middle), "gain" (likewise), "friction"
         (Coulomb's coefficient; several times slower), "suspension_compliance" (turn of the pivot per holding moment).
         By default the first three; an empty list takes all as stated. "base": how much the second and further pivots of
         a record are off, as "base_2_x", "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred,
@@ -120,10 +122,10 @@ def infer_contour(
     L, standard deviation 1 of the logarithm; n − 1: log-normal around 1, standard deviation 0.7 of the logarithm, n
     from 1.1 to 50. noise_scale: log-normal around 1, standard deviation 0.5 of the logarithm. Unknown noises:
     log-uniform from 1e-6 to 10, in EI/L and EI/L². Of the nuisances: rigidity_scale log-normal around 1 with 5 %,
-    drive_angle_offset normal with 1°, biases normal with 0.1 EI/L and EI/L² (one of which the load cell states a
-    bias_uncertainty is integrated out instead), gains normal around 1 with 2 %, friction half-normal with scale 0.3,
-    suspension_compliance half-normal with 0.05 rad per EI/L, pivots normal with 1 % of L. Contours out of reach, and
-    those that the rod would still cut after snap-off, are excluded on top.
+    drive_angle_offset normal with 1°, biases and drifts normal with 0.1 EI/L and EI/L² (a bias of which the load cell
+    states a bias_uncertainty is integrated out instead), gains normal around 1 with 2 %, friction half-normal with
+    scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, pivots normal with 1 % of L. Contours out of
+    reach, and those that the rod would still cut after snap-off, are excluded on top.
 
     Examples
     --------
@@ -160,6 +162,7 @@ def infer_contour(
         )
     if not events:
         measured = measured.isel(sample=np.flatnonzero(loaded))
+        rig = replace(rig, way=rig.way[loaded])
     chosen_priors.update(priors or {})
     model = ContourModel(measured, chosen, rig, noise, chosen_priors)
     about = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.likelihood import Rig, bases_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, present_channels, rod_of
+from tactile_bayes.record import present_channels, rod_of
 from tactile_bayes.rod import Rod
 
 __all__ = ["STANDARD", "Nuisances", "nuisances_of"]
@@ -28,7 +28,7 @@ STANDARD = ("rigidity_scale", "drive_angle_offset", "bias")
 """What is inferred unless something else is asked for."""
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
-_GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "gain")}
+_GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}
 
 _RIGIDITY, _OFFSET, _BIAS, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.1, 0.02, 0.3, 0.05, 0.01
 """Standard deviations (scales of half normals) of the priors: of ratios; rad; EI/L and EI/L²; rad per EI/L; and L."""
@@ -44,7 +44,7 @@ class _Kind(NamedTuple):
     low: float
     high: float
     power_of_moment: int = 0
-    """Of the unit of moments in its unit; for a bias of a force that of forces stands in for it."""
+    """Of the unit of moments in its unit; for zeros of forces that of forces stands in for it."""
 
 
 _KINDS = {
@@ -52,7 +52,7 @@ _KINDS = {
     "drive_angle_offset": _Kind(-np.pi, np.pi),
     "suspension_compliance": _Kind(0.0, np.inf, power_of_moment=-1),
     "friction": _Kind(0.0, float(np.tan(MAX_FRICTION_ANGLE))),
-    **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in _GROUPS["bias"]},
+    **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in (*_GROUPS["bias"], *_GROUPS["drift"])},
     **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
 }
 _RIG = ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")
@@ -71,12 +71,15 @@ class Nuisances:
         As stated.
     friction : float
         Coulomb's coefficient where it is not inferred.
+    way : ndarray, shape (samples,)
+        How far each sample is on the way from the record's first (−½) to its last (½).
     """
 
     names: tuple[str, ...]
     priors: Mapping[str, Prior]
     rod: Rod
     friction: float
+    way: Floats = field(default_factory=lambda: np.zeros(1))
     units: Mapping[str, float] = field(init=False)
     """Of each name, in the record's units, what is one inside."""
 
@@ -93,8 +96,8 @@ class Nuisances:
 
     def unit(self, name: str) -> str:
         """Of an SI record, in words."""
-        if name in _GROUPS["bias"]:
-            return "N m" if name == "moment_bias" else "N"
+        if name in (*_GROUPS["bias"], *_GROUPS["drift"]):
+            return "N m" if name.startswith("moment") else "N"
         if _BASE.fullmatch(name):
             return "m"
         return {"drive_angle_offset": "rad", "suspension_compliance": "rad/(N m)"}.get(name, "1")
@@ -125,15 +128,16 @@ class Nuisances:
         for channel, gain in enumerate(gains):
             if gain is not None:
                 loads[..., channel] *= gain.reshape(-1, *(1,) * (loads.ndim - 2))
-        if set(self.names).isdisjoint(_GROUPS["bias"]):
-            return loads
-        biases = np.zeros((loads.shape[0], len(CHANNELS)))
-        for channel, name in enumerate(_GROUPS["bias"]):
-            if name in self.names:
-                biases[:, channel] = values[name] / self.units[name]
-        shift = np.linalg.solve(np.asarray(cell.gain, dtype=float), biases.T).T
-        loads += shift.reshape(len(shift), *(1,) * (loads.ndim - 2), -1)
+        for what, course in (("bias", np.ones(1)), ("drift", self.way)):
+            if not set(self.names).isdisjoint(_GROUPS[what]):
+                zeros = self._zeros(_GROUPS[what], values, cell)
+                loads += zeros.reshape(len(zeros), *(1,) * (loads.ndim - 2), -1) * course[:, None]
         return loads
+
+    def _zeros(self, names: Sequence[str], values: Mapping[str, Floats], cell: LoadCell) -> Floats:
+        """Loads that the cell reads as what is named, by channel, shape (n, 3)."""
+        read = [values[name] / self.units[name] if name in self.names else 0.0 for name in names]
+        return np.linalg.solve(np.asarray(cell.gain, dtype=float), np.array(np.broadcast_arrays(*read))).T
 
 
 def nuisances_of(
@@ -163,7 +167,7 @@ def nuisances_of(
             )
         members = [n for n in _GROUPS[name] if n.rpartition("_")[0] in present] if name in _GROUPS else [name]
         for member in members:
-            if member.rpartition("_")[0] not in present and member in (*_GROUPS["bias"], *_GROUPS["gain"]):
+            if member.rpartition("_")[0] not in present and any(member in group for group in _GROUPS.values()):
                 raise ParameterError(f"{member} cannot be inferred: the record has no such channel")
             if uncertain.get(member, 0.0) > 0.0:
                 if name in _GROUPS:
@@ -182,9 +186,10 @@ def nuisances_of(
             "measure the same; leave one of them"
         )
     rod = rod_of(measured)
-    nuisances = Nuisances(tuple(names), {}, rod, friction)
+    way = np.linspace(-0.5, 0.5, measured.sizes["sample"])
+    nuisances = Nuisances(tuple(names), {}, rod, friction, way)
     defaults = {name: _default_prior(name, rod.length if "base" in name else nuisances.units[name]) for name in names}
-    return Nuisances(tuple(names), defaults, rod, friction)
+    return replace(nuisances, priors=defaults)
 
 
 def _bases_off(name: str, measured: xr.Dataset) -> list[str]:

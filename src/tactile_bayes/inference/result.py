@@ -21,6 +21,7 @@ __all__ = [
     "posterior_draws",
     "provenance",
     "read_result",
+    "record_of",
     "sample_stats",
     "seed_words",
     "to_arviz",
@@ -48,6 +49,7 @@ def sample_stats(draws: Draws) -> xr.Dataset:
             "evaluations": draws.evaluations,
             "seconds": draws.seconds,
             "stuck": draws.stuck,
+            "places": json.dumps([asdict(place) for place in draws.places]),
         },
     )
 
@@ -81,6 +83,13 @@ def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
     if "posterior" not in result.children:
         raise InferenceError(f"this tree has no group 'posterior', only {', '.join(result.children) or 'nothing'}")
     return result["posterior"].to_dataset()
+
+
+def record_of(posterior: xr.DataTree) -> xr.Dataset:
+    """The record that a contour was inferred from, with the rod and the load cell that were taken for it."""
+    kept = {name: value for name, value in posterior.attrs.items() if str(name).startswith(("rod_", "load_cell_"))}
+    columns = [posterior[group].to_dataset() for group in ("constant_data", "observed_data")]
+    return xr.merge(columns).assign_attrs({"units": posterior.attrs["units"], **kept})
 
 
 def contact_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:

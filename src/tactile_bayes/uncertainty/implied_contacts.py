@@ -17,7 +17,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.nuisances import Nuisances
-from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
 from tactile_bayes.touching import PLACE
@@ -101,7 +101,7 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     """
     if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 1:
         raise ParameterError(f"draws is {draws!r}: give a whole number from 1 up, of draws of each chain")
-    record = _record_of(posterior)
+    record = _checked_record(posterior)
     every = posterior_draws(posterior)
     count = every.sizes["draw"]
     # The rule by which `infer_contour` picks those of which it keeps events and predictions.
@@ -141,16 +141,13 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     return tree
 
 
-def _record_of(posterior: xr.DataTree) -> xr.Dataset:
+def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
     """The record that a contour was inferred from, with the rod and the load cell that were taken."""
     groups = ("posterior", "observed_data", "constant_data")
     is_tree = isinstance(posterior, xr.DataTree) and set(groups) <= set(posterior.children)
     if not (is_tree and "family" in posterior.attrs and "sample" not in posterior["posterior"].dims):
         raise InferenceError("this is no result of infer_contour: give the tree that it returned")
-    record = posterior["constant_data"].to_dataset().assign(posterior["observed_data"].to_dataset().data_vars)
-    stated = ("units", "rod_length", "rod_flexural_rigidity", "rod_diameter")
-    attrs = {k: v for k, v in posterior.attrs.items() if k in stated or str(k).startswith("load_cell_")}
-    record = validate(record.assign_attrs(attrs))
+    record = validate(record_of(posterior))
     if record_hash(record) != posterior.attrs["data_sha256"]:
         raise InferenceError(
             "observed_data and constant_data are not the record that this posterior was inferred from: give the whole "

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.result import record_of
 from tactile_bayes.load_cell import LoadCell, rough_noise
 
-__all__ = ["DISCREPANCIES", "Residuals", "check_record", "record_of", "residuals_of"]
+__all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -169,13 +170,6 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             "predictions": predictions,
         },
     )
-
-
-def record_of(posterior: xr.DataTree) -> xr.Dataset:
-    """The record that a posterior was inferred from, with the rod and the load cell that were taken for it."""
-    kept = {name: value for name, value in posterior.attrs.items() if str(name).startswith(("rod_", "load_cell_"))}
-    columns = [posterior[group].to_dataset() for group in ("constant_data", "observed_data")]
-    return xr.merge(columns).assign_attrs({"units": posterior.attrs["units"], **kept})
 
 
 def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:

@@ -10,10 +10,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import DriftWarning, InferenceError
-from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.uncertainty.record_check import Residuals, check_record, record_of, residuals_of
+from tactile_bayes.uncertainty.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.uncertainty.suspicions import suspicions
 
 __all__ = ["verdicts"]

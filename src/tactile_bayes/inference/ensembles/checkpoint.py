@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.files import write_atomically
+from tactile_bayes.files import alone_in, write_atomically
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.identity import changes
 from tactile_bayes.inference.ensembles.walkers import RandomState
@@ -189,26 +189,5 @@ def open_checkpoint(
     if folder.exists() and not folder.is_dir():
         raise InferenceError(f"{folder} is a file: give a folder as checkpoint")
     folder.mkdir(parents=True, exist_ok=True)
-    with _alone(folder):
+    with alone_in(folder, InferenceError):
         yield Checkpoint(folder, identity, shape)
-
-
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Keep other runs out of a folder, where the system can; the lock goes with the process."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: the second of two runs fails when it finds a block that the first has written
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InferenceError(f"another run is at work on {folder}: wait for it, or stop it") from None
-        except OSError:  # a file system without locks
-            pass
-        yield
-    finally:
-        os.close(handle)
