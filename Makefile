@@ -5,10 +5,12 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 DEMO_OUT ?= results/demo
+# Samplers that ours is compared with, and that nothing else needs.
+PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench coverage calibration images lint clean
+.PHONY: demo test test-slow bench coverage calibration samplers images lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -29,6 +31,11 @@ coverage: $(READY)
 
 calibration: $(READY)
 	$(BIN)/python -m benchmarks.calibration
+
+samplers: $(READY)
+	$(BIN)/python -m pip install --quiet --target $(PEERS) --upgrade --no-deps \
+		pints tabulate zeus-mcmc tqdm seaborn scikit-learn joblib
+	PYTHONPATH=$(PEERS) $(BIN)/python -m benchmarks.samplers
 
 images: $(READY)
 	$(BIN)/python docs/images.py

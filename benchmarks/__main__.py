@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import cache
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any
 
+import emcee
 import numpy as np
 import xarray as xr
+from arviz_stats.base.array import array_stats
 from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
+from benchmarks.samplers import demonstration
 from benchmarks.shooting import (
     contact_by_integration,
     misfit_by_least_squares,
@@ -21,6 +25,10 @@ from benchmarks.shooting import (
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.demonstration import CONTOUR as DEMONSTRATED
+from tactile_bayes.demonstration import LOAD_CELL, ROD
+from tactile_bayes.inference.contour_start import scattered_start
+from tactile_bayes.inference.ensembles import spawn
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.path import trace
 from tactile_bayes.record import make_record
@@ -48,6 +56,8 @@ SPECIFICATION: dict[str, Any] = {
     "load_cell": {"force_noise": 0.05, "moment_noise": 0.02},
 }
 MANY = 100_000
+STRETCHES = 1_000
+"""Steps of emcee's ensembles, by its own moves."""
 TIGHT = 1e-12
 """Tolerance at which accuracy is judged; what is timed has 1e-9."""
 
@@ -58,8 +68,9 @@ def main() -> None:
         two, error_of_two = step_two()
         likeliest, error_of_likeliest = constrained()
         of_records, rate = data_set()
-        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two, likeliest, posteriors(), of_records])
-        print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}")
+        of_contour, draws = contour_posterior()
+        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two, likeliest, posteriors(), of_contour, of_records])
+        print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}\n{draws}")
         print("\nTime a piece, for ever more of them:")
         print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
         print_growth("sample, reconstruct", (1_000, 10_000, 100_000, 1_000_000), reconstruct)
@@ -138,6 +149,32 @@ def posteriors() -> Row:
     by_emcee = best_time(lambda: tb.infer_contacts(some, seed=1, method="emcee"), 1) / counts[0]
     ours = best_time(lambda: tb.infer_contacts(measured, seed=1), 1) / counts[1]
     return Row(f"posterior of one of {counts[1]} contacts: emcee for each / infer_contacts", by_emcee, ours)
+
+
+def contour_posterior() -> tuple[Row, str]:
+    """The demonstration's, start and predictions included; by emcee's own moves what 1000 effective draws take.
+
+    These are given the start, the very same log-probability, vectorised, and enough steps to forget the start; their
+    effective draws are those of the second half.
+    """
+    measured = LOAD_CELL.measure(tb.scan(DEMONSTRATED, rod=ROD).record, seed=1)
+    results: list[xr.DataTree] = []
+    ours = best_time(lambda: results.append(tb.infer_contour(measured, nuisances=[], seed=1)), 3)
+    model = demonstration()
+    start = scattered_start(model, spawn(1, 1)[0], tb.SamplerSettings())
+    began = time.perf_counter()
+    chains = []
+    for of_ensemble in start:
+        sampler: Any = emcee.EnsembleSampler(*of_ensemble.shape, model.log_probability, vectorize=True)
+        sampler.run_mcmc(of_ensemble, STRETCHES)
+        chains.append(sampler.get_chain()[STRETCHES // 2 :].swapaxes(0, 1).reshape(-1, of_ensemble.shape[1]))
+    seconds = time.perf_counter() - began
+    ess = min(array_stats.ess(np.array(chains)[..., i], chain_axis=0, draw_axis=1) for i in range(len(model.names)))
+    stats = results[-1]["sample_stats"]
+    return Row("posterior of the demonstration, 4 parameters: emcee / infer_contour", seconds * 1000.0 / ess, ours), (
+        f"Posterior: {float(stats.ess_bulk.min()):,.0f} effective draws of {stats.attrs['evaluations']:,} evaluations; "
+        f"emcee's own moves gave {ess:,.0f} of {start.shape[0] * start.shape[1] * STRETCHES:,} in {seconds:.1f} s"
+    )
 
 
 def sweeps(by_hand: float) -> list[Row]:

@@ -4,11 +4,8 @@ The posterior is the demonstration's: a parabola's three parameters and the fact
 sampler is given the very same log-probability, the same starts, one processor core, and the same number of
 evaluations, in four independent runs of which the second half counts. Points that a sampler wants at once are computed
 at once. Times are the processor's. Effective sample size is that of the bulk, of the worst parameter, by arviz-stats
-over four chains; the chain of a run with many walkers is walker-major. Peers are not dependencies of this package;
-somewhere else they go by
-
-    pip install --target PEERS --no-deps pints tabulate zeus-mcmc tqdm seaborn scikit-learn joblib
-    PYTHONPATH=PEERS python -m benchmarks.samplers
+over four chains; the chain of a run with many walkers is walker-major. Peers are not dependencies of this package:
+`make samplers` puts them in a folder of their own.
 
 dynesty, which makes weighted draws and no chains, has no such number and is not in the table.
 """
@@ -43,7 +40,7 @@ Floats = NDArray[np.float64]
 Sampler = Callable[["Counted", Floats, int], Floats]
 
 RUNS = 4
-WALKERS = 32
+WALKERS = 48
 
 
 class Counted:
@@ -70,7 +67,7 @@ def main(evaluations: int = 100_000) -> None:
         reference = None
         for name, package, sampler in samplers():
             if not installed(package):
-                print(f"{name:<54}not installed, skipped: pip install --target PEERS {package[0]}")
+                print(f"{name:<54}not installed, skipped: see `make samplers`")
                 continue
             target = Counted(model.log_probability)
             began = time.process_time()
