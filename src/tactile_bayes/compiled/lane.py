@@ -6,11 +6,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_bayes.compiled.compiler import compiled
-from tactile_bayes.contours.halves import OVAL, PARABOLA
+from tactile_bayes.contours.halves import OVAL, PARABOLA, TABLE
 
 __all__ = ["Lane", "bearing", "end_of", "mirrored", "place"]
+
+Floats = NDArray[np.float64]
 
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3
@@ -18,7 +21,7 @@ _FAR = 1e3
 
 
 class Lane(NamedTuple):
-    """One contour as one rod sees it."""
+    """One contour as one rod sees it; one with a table is a mirror image of that if the shape of its right is −1."""
 
     left_kind: int
     left_size: float
@@ -29,11 +32,15 @@ class Lane(NamedTuple):
     x: float
     y: float
     standoff: float
+    table: Floats | None
 
 
 @compiled
 def mirrored(lane: Lane) -> Lane:
     """As the opposite sweep sees it."""
+    if lane.right_kind == TABLE:
+        left, right, size = lane.right_size, lane.left_size, -lane.right_shape
+        return Lane(TABLE, left, size, TABLE, right, size, -lane.x, lane.y, lane.standoff, lane.table)
     return Lane(
         lane.right_kind,
         lane.right_size,
@@ -44,6 +51,7 @@ def mirrored(lane: Lane) -> Lane:
         -lane.x,
         lane.y,
         lane.standoff,
+        lane.table,
     )
 
 
@@ -67,6 +75,10 @@ def place(lane: Lane, p: float) -> tuple[float, float, float, float, float, floa
         square = size * size * c * c + shape * shape * s * s
         speed, bend = math.sqrt(square), size * shape / square
         sin, cos = shape * s / speed, size * c / speed
+    elif kind == TABLE:
+        x, y, speed = _in_table(lane.table, shape * p)
+        x *= shape
+        sin, cos, bend = math.sin(p), math.cos(p), 1.0
     else:
         of_offset, of_slope = max(1.0, 1.0 / (shape - 1.0)), max(1.0, shape - 1.0)
         flat, steep = abs(p) ** (of_offset - 1.0), abs(p) ** (of_slope - 1.0)
@@ -78,6 +90,34 @@ def place(lane: Lane, p: float) -> tuple[float, float, float, float, float, floa
         speed, bend = of_offset * flat * root, size * shape * of_slope * steep / square
     d = lane.standoff
     return lane.x + x + d * sin, lane.y + y - d * cos, sin, cos, speed + d * bend, bend
+
+
+@compiled
+def _in_table(table: Floats | None, alpha: float) -> tuple[float, float, float]:
+    """Point and radius of curvature at a slope angle: polynomials of fifth degree through what is known beside it."""
+    if table is None:  # what is compiled for contours without one
+        return math.nan, math.nan, math.nan
+    cells = table.shape[0] - 1
+    way = (alpha + _UPRIGHT) * (cells / (2.0 * _UPRIGHT))
+    cell = min(max(int(way), 0), cells - 1)
+    t = way - cell
+    x, x_rate = _between(table, cell, 0, t)
+    y, y_rate = _between(table, cell, 1, t)
+    return x, y, (x_rate * math.cos(alpha) + y_rate * math.sin(alpha)) * (cells / (2.0 * _UPRIGHT))
+
+
+@compiled
+def _between(table: Floats, cell: int, axis: int, t: float) -> tuple[float, float]:
+    """A coordinate and its rate, as `tactile_bayes.contours.smooth` has them."""
+    start, rate, bend = table[cell, axis], table[cell, axis + 2], table[cell, axis + 4]
+    rise = table[cell + 1, axis] - start - rate - 0.5 * bend
+    rate_rise = table[cell + 1, axis + 2] - rate - bend
+    bend_rise = table[cell + 1, axis + 4] - bend
+    c = 10.0 * rise - 4.0 * rate_rise + 0.5 * bend_rise
+    d = -15.0 * rise + 7.0 * rate_rise - bend_rise
+    e = 6.0 * rise - 3.0 * rate_rise + 0.5 * bend_rise
+    value = start + t * (rate + t * (0.5 * bend + t * (c + t * (d + t * e))))
+    return value, rate + t * (bend + t * (3.0 * c + t * (4.0 * d + t * 5.0 * e)))
 
 
 @compiled
@@ -95,6 +135,8 @@ def end_of(lane: Lane, outward: float) -> float:
         end = np.nextafter(_UPRIGHT, 0.0)
     elif kind == OVAL:
         end = _UPRIGHT
+    elif kind == TABLE:
+        return outward * (lane.left_size if outward < 0.0 else lane.right_size)
     else:
         end = 1.0
         while not outward * place(lane, outward * end)[0] > 1.0:

@@ -14,7 +14,7 @@ from tactile_bayes.compiled.lane import Lane, bearing, mirrored
 from tactile_bayes.compiled.limits import first_contact
 from tactile_bayes.compiled.path import Nodes, Work, follow, nodes, work
 from tactile_bayes.compiled.states import Tables, tables
-from tactile_bayes.contours.halves import OVAL, PARABOLA, Halves
+from tactile_bayes.contours.halves import OVAL, PARABOLA, TABLE, Halves
 from tactile_bayes.reach import Reach
 
 __all__ = ["Strokes", "loads_of"]
@@ -62,7 +62,8 @@ def loads_of(
     out = np.zeros((halves.x.size, strokes.samples.size, 3))
     usable = np.ones(halves.x.size, dtype=bool)
     kinds, room = (halves.left.kind, halves.right.kind), work(int(np.diff(strokes.first).max()))
-    _fill(kinds, contours, halves.has_knot, strokes, rod, rig, shifts, is_always_clear, known, on, room, out, usable)
+    both = contours, None if halves.tables is None else halves.tables / rod[0]
+    _fill(kinds, both, halves.has_knot, strokes, rod, rig, shifts, is_always_clear, known, on, room, out, usable)
     return out, usable
 
 
@@ -77,13 +78,20 @@ def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tupl
         return size * length, shape
     if kind == OVAL:
         return size / length, shape / length
+    if kind == TABLE:
+        return size, shape
     return size * length ** (shape - 1.0), shape
+
+
+@compiled
+def _table_of(tables: Floats | None, i: int) -> Floats | None:
+    return None if tables is None else tables[i]
 
 
 @kept
 def _fill(
     kinds: tuple[int, int],
-    contours: Floats,
+    both: tuple[Floats, Floats | None],
     has_knot: bool,
     strokes: Strokes,
     rod: tuple[float, float],
@@ -97,14 +105,16 @@ def _fill(
     usable: NDArray[np.bool_],
 ) -> None:
     left, right = kinds
+    contours, tables = both
     length, standoff = rod
     for i in range(contours.shape[0]):
         l_size, l_shape = _in_rod_lengths(left, contours[i, 0], contours[i, 1], length)
         r_size, r_shape = _in_rod_lengths(right, contours[i, 2], contours[i, 3], length)
+        table = _table_of(tables, i)
         for k in range(strokes.base_x.size):
             x = (contours[i, 4] - strokes.base_x[k] - shifts[i, k, 0]) / length
             y = (contours[i, 5] - strokes.base_y[k] - shifts[i, k, 1]) / length
-            lane = Lane(left, l_size, l_shape, right, r_size, r_shape, x, y, standoff / length)
+            lane = Lane(left, l_size, l_shape, right, r_size, r_shape, x, y, standoff / length, table)
             sign = 1.0
             if strokes.backward[k]:
                 lane, sign = mirrored(lane), -1.0

@@ -11,6 +11,7 @@ from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.points import MeasuredContour, from_points
 from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.contours.shape_free import ShapeFree
+from tactile_bayes.contours.smooth import Smooth
 
 __all__ = [
     "Circle",
@@ -24,6 +25,7 @@ __all__ = [
     "PowerLaw",
     "ShapeFree",
     "Single",
+    "Smooth",
     "check",
     "from_function",
     "from_points",

@@ -35,5 +35,5 @@ class Halves(NamedTuple):
     has_knot: bool
     """Whether the contour may not be smooth at the vertex."""
     tables: Floats | None = None
-    """Of contours that have no formula, shape (n, cells + 1, 6): at slope angles from end to end, equally far apart, the
-    point seen from the vertex, its rates over the width of a cell, and the rates of these."""
+    """Of contours that have no formula, shape (n, cells + 1, 6): at slope angles from −π/2 to π/2, equally far apart,
+    the point seen from the vertex, its rates over the width of a cell, and the rates of these."""

@@ -16,6 +16,10 @@ __all__ = ["scattered_start"]
 
 Floats = NDArray[np.float64]
 
+_CANDIDATES = 8
+"""Draws from the prior from which the optimum is sought, the likeliest first, until one explains the record. A sample at
+an event that is loaded or not holds the search up where it began too far away."""
+
 
 def scattered_start(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Floats:
     """Walkers, shape (ensembles, walkers, parameters), scattered twice as wide as a normal approximation."""
@@ -40,7 +44,7 @@ def scattered_start(model: ContourModel, seed: np.random.SeedSequence, settings:
     rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
     spread = np.where(np.isfinite(spread), spread, rough)
     costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
-    chosen = [candidates[i, :size] for i in np.argsort(costs)[:2]]
+    chosen = [candidates[i, :size] for i in np.argsort(costs)[:_CANDIDATES]]
     by_contacts = _from_contacts(model)
     if by_contacts is not None:
         chosen.insert(0, np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))

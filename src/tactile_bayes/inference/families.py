@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
@@ -62,8 +63,49 @@ class Flank:
     is_always_clear: bool = False
 
 
+class Family(ABC):
+    """Contours that a vector of parameters describes, q and x_c, the vertex, being its last."""
+
+    name: str
+    """What users call it."""
+    length_powers: Mapping[str, int]
+    """For every parameter, by name and in order, the power of length in its unit."""
+    bounds: Mapping[str, tuple[float, float]]
+    """What parameters are at least, and at most, whatever a prior says."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        return tuple(self.length_powers)
+
+    @property
+    @abstractmethod
+    def is_always_clear(self) -> bool:
+        """Whether a rod that has snapped off is past every contour of the family."""
+
+    @abstractmethod
+    def build(self, *values: Any) -> Contour:
+        """Contours from parameters in the order of `parameters`, numbers or arrays."""
+
+    def default_priors(self, base: tuple[float, float], length: float) -> dict[str, Prior]:
+        """Priors by name, from pivot (x, y) and rod length alone.
+
+        The vertex lies within a rod length of the pivot, to the side and in height, anywhere alike.
+        """
+        x, y = base
+        vertex = {"q": stats.uniform(y - length, 2.0 * length), "x_c": stats.uniform(x - length, 2.0 * length)}
+        return self._own_priors(length) | vertex
+
+    @abstractmethod
+    def _own_priors(self, length: float) -> dict[str, Prior]:
+        """Of what is not the vertex."""
+
+    @abstractmethod
+    def fit(self, x: Floats, y: Floats) -> dict[str, float]:
+        """Parameters by name that fit points (x, y) in rod lengths, by least squares that outliers do not rule."""
+
+
 @dataclass(frozen=True)
-class Family:
+class FlankFamily(Family):
     """Contours of one flank on both sides, or of two.
 
     Parameters
@@ -77,9 +119,7 @@ class Family:
     name: str
     flanks: Mapping[str, Flank]
     length_powers: Mapping[str, int] = field(init=False)
-    """For every parameter, by name, the power of length in its unit."""
     bounds: Mapping[str, tuple[float, float]] = field(init=False)
-    """What parameters are at least, and at most, whatever a prior says."""
 
     def __post_init__(self) -> None:
         powers = {f"{side}{name}": p for side, flank in self.flanks.items() for name, p in flank.length_powers.items()}
@@ -88,37 +128,23 @@ class Family:
         object.__setattr__(self, "bounds", bounds)
 
     @property
-    def parameters(self) -> tuple[str, ...]:
-        return tuple(self.length_powers)
-
-    @property
     def is_always_clear(self) -> bool:
-        """Whether a rod that has snapped off is past every contour of the family."""
         return all(flank.is_always_clear for flank in self.flanks.values())
 
     def build(self, *values: Any) -> Contour:
-        """Contours from parameters in the order of `parameters`, numbers or arrays."""
         by_name = dict(zip(self.parameters, values, strict=True))
         halves = [flank.build(self._own(side, by_name)) for side, flank in self.flanks.items()]
         return halves[0] if len(halves) == 1 else Joined(halves[0], halves[1])
 
-    def default_priors(self, base: tuple[float, float], length: float) -> dict[str, Prior]:
-        """Priors by name, from pivot (x, y) and rod length alone.
-
-        The vertex lies within a rod length of the pivot, to the side and in height, anywhere alike.
-        """
-        x, y = base
-        own: dict[str, Prior] = {
+    def _own_priors(self, length: float) -> dict[str, Prior]:
+        return {
             f"{side}{name}": prior
             for side, flank in self.flanks.items()
             for name, prior in flank.priors(length).items()
         }
-        vertex = {"q": stats.uniform(y - length, 2.0 * length), "x_c": stats.uniform(x - length, 2.0 * length)}
-        return own | vertex
 
     def fit(self, x: Floats, y: Floats) -> dict[str, float]:
-        """Parameters by name that fit points (x, y) in rod lengths, by least squares that outliers do not rule."""
-        a, q, x_c = _parabola(x, y)
+        a, q, x_c = parabola_through(x, y)
         names = list(self.parameters[:-2])
 
         def values_at(point: Floats) -> dict[str, float]:
@@ -168,6 +194,10 @@ def family_named(name: str) -> Family:
     >>> family_named("parabola/power-law").parameters
     ('left_a', 'right_w', 'right_n', 'q', 'x_c')
     """
+    if name == "shape-free":
+        from tactile_bayes.inference.shape_free import SHAPE_FREE
+
+        return SHAPE_FREE
     if name not in FAMILIES:
         raise ParameterError(
             f"there is no family {name!r}: choose {', '.join(FLANKS)}, or one for each flank, like parabola/power-law"
@@ -175,7 +205,7 @@ def family_named(name: str) -> Family:
     return FAMILIES[name]
 
 
-def _parabola(x: Floats, y: Floats) -> tuple[float, float, float]:
+def parabola_through(x: Floats, y: Floats) -> tuple[float, float, float]:
     """a, q and x_c of a parabola through points; a positive one."""
     design = np.stack([x * x, x, np.ones_like(x)], axis=1)
     a, b, c = _robust(lambda p: design @ p - y, np.linalg.lstsq(design, y, rcond=None)[0])
@@ -251,9 +281,9 @@ FLANKS: dict[str, Flank] = {
 """By name; any two make a joined family."""
 
 FAMILIES: dict[str, Family] = {
-    **{name: Family(name, {"": flank}) for name, flank in FLANKS.items()},
+    **{name: FlankFamily(name, {"": flank}) for name, flank in FLANKS.items()},
     **{
-        f"{left}/{right}": Family(f"{left}/{right}", {"left_": FLANKS[left], "right_": FLANKS[right]})
+        f"{left}/{right}": FlankFamily(f"{left}/{right}", {"left_": FLANKS[left], "right_": FLANKS[right]})
         for left in FLANKS
         for right in FLANKS
     },

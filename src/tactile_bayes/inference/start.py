@@ -28,7 +28,7 @@ _DEFICIT = 12.0
 
 _ROUNDS = 30
 
-_FITS = 0.7
+_FITS = 0.55
 """Cost per residual that says that the noise explains the record: 0.4 if the noise is guessed right."""
 
 

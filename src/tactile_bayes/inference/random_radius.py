@@ -1,0 +1,125 @@
+"""A random radius of curvature over the slope angle: a Gaussian process in the few directions that matter."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from tactile_bayes.contours import Smooth
+
+__all__ = ["Directions", "RandomRadius", "directions"]
+
+Floats = NDArray[np.float64]
+
+_PLACES = 200
+"""Slope angles at which the process is cut into directions."""
+
+_LARGEST = 50.0
+"""Logarithm of radii that no prior comes near."""
+
+_LENGTHS = 40
+"""Length scales for which that is done, others being interpolated."""
+
+
+class Directions(NamedTuple):
+    """Functions of the slope angle, one after the other the largest that are left, of which the process is the sum."""
+
+    log_lengths: Floats
+    """Of the length scales, shape (lengths,)."""
+    values: Floats
+    """At the nodes of `Smooth`, shape (lengths, nodes, directions); times standard normal numbers, their sum has unit
+    standard deviation on average over slope angles."""
+    left_over: Floats
+    """Share of the variance that further directions would have, shape (lengths,)."""
+
+
+@dataclass(frozen=True)
+class RandomRadius:
+    """log ρ(α) = log r + amplitude · g(α), with g a Gaussian process of which r is the geometric mean.
+
+    The covariance is Matérn's with ν = 5/2 (Rasmussen & Williams 2006, equation 4.17), so that curvature changes
+    smoothly, over slope angles from −π/2 to π/2, with the mean over these taken off.
+
+    Parameters
+    ----------
+    shortest, longest : float
+        Length scales between which g is known [rad].
+    tolerance : float
+        Share of the variance of g that may be left out at the length scale `typical`; the number of directions follows.
+    typical : float
+        Length scale [rad].
+    nodes : int
+        Values by which a contour is given.
+    """
+
+    shortest: float
+    longest: float
+    typical: float
+    tolerance: float
+    nodes: int = 40
+
+    @property
+    def count(self) -> int:
+        """Number of directions."""
+        share = np.cumsum(_spectrum(self.typical)[0])
+        return int(np.searchsorted(share / share[-1], 1.0 - self.tolerance)) + 1
+
+    def log_radius(self, log_r: Floats, amplitude: Floats, length: Floats, weights: Floats) -> Floats:
+        """At the nodes, shape (n, nodes), from arrays of shape (n,) and standard normal weights (n, directions)."""
+        at = np.log(np.clip(length, self.shortest, self.longest))
+        shapes = _spline(self.shortest, self.longest, self.count, self.nodes)(at)
+        sums = (shapes.reshape(*at.shape, self.nodes, self.count) @ weights[..., None])[..., 0]
+        return np.clip(log_r[..., None] + amplitude[..., None] * sums, -_LARGEST, _LARGEST)
+
+
+def _covariance(one: Floats, other: Floats, length: float) -> Floats:
+    distance = np.sqrt(5.0) * np.abs(one[:, None] - other) / length
+    return (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
+
+
+def _places() -> Floats:
+    return np.pi * ((np.arange(_PLACES) + 0.5) / _PLACES - 0.5)
+
+
+@functools.lru_cache(maxsize=64)
+def _spectrum(length: float) -> tuple[Floats, Floats]:
+    """Mean variances of the directions, the largest first, and the directions at the places, a column each."""
+    places = _places()
+    covariance = _covariance(places, places, length)
+    covariance = covariance - covariance.mean(axis=0) - covariance.mean(axis=1)[:, None] + covariance.mean()
+    values, functions = np.linalg.eigh(covariance / _PLACES)
+    return np.maximum(values[::-1], 0.0), functions[:, ::-1] * np.sqrt(_PLACES)
+
+
+@functools.lru_cache(maxsize=8)
+def directions(shortest: float, longest: float, count: int, nodes: int) -> Directions:
+    """The first directions for many length scales."""
+    places, at = _places(), Smooth.nodes(nodes)
+    log_lengths = np.linspace(np.log(shortest), np.log(longest), _LENGTHS)
+    values, left_over = np.empty((_LENGTHS, nodes, count)), np.empty(_LENGTHS)
+    before: Floats | None = None
+    for i, log_length in enumerate(log_lengths):
+        variance, functions = _spectrum(float(np.exp(log_length)))
+        chosen = functions[:, :count]
+        if before is not None:
+            chosen = chosen * np.sign(np.sum(chosen * before, axis=0))
+        before = chosen
+        # The functions between the places, as the covariance continues them (Nyström).
+        across = _covariance(at, places, float(np.exp(log_length)))
+        across = across - across.mean(axis=1)[:, None]
+        mean = _covariance(places, places, float(np.exp(log_length))).mean(axis=0)
+        across = across - (mean - mean.mean())
+        values[i] = across @ chosen / (_PLACES * np.sqrt(variance[:count]))
+        left_over[i] = 1.0 - variance[:count].sum() / variance.sum()
+    return Directions(log_lengths, values, left_over)
+
+
+@functools.lru_cache(maxsize=8)
+def _spline(shortest: float, longest: float, count: int, nodes: int) -> CubicSpline:
+    known = directions(shortest, longest, count, nodes)
+    return CubicSpline(known.log_lengths, known.values)
