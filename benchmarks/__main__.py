@@ -27,7 +27,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.demonstration import CONTOUR as DEMONSTRATED
 from tactile_bayes.demonstration import LOAD_CELL, ROD
-from tactile_bayes.inference.contour_start import scattered_start
+from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import spawn
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.path import trace
@@ -161,7 +161,7 @@ def contour_posterior() -> tuple[Row, str]:
     results: list[xr.DataTree] = []
     ours = best_time(lambda: results.append(tb.infer_contour(measured, nuisances=[], seed=1)), 3)
     model = demonstration()
-    start = scattered_start(model, spawn(1, 1)[0], tb.SamplerSettings())
+    start = walk_of(model, spawn(1, 1)[0], tb.SamplerSettings()).start
     began = time.perf_counter()
     chains = []
     for of_ensemble in start:

@@ -29,7 +29,7 @@ import tactile_bayes as tb
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.inference.contour import default_priors
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_start import scattered_start
+from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import sample, spawn
 from tactile_bayes.inference.ensembles.diagnosis import walker_major
 from tactile_bayes.inference.families import family_named
@@ -60,7 +60,7 @@ def main(evaluations: int = 100_000) -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     with threadpool_limits(1):
         model = demonstration()
-        start = scattered_start(model, spawn(1, 1)[0], tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS))
+        start = walk_of(model, spawn(1, 1)[0], tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS)).start
         model.log_probability(start[0])  # whatever is compiled is compiled here
         print(f"{', '.join(model.names)}: {RUNS} runs of {evaluations // RUNS:,} evaluations\n")
         print(f"{'':<54}{'evaluations':>12}{'CPU':>9}{'R̂':>8}{'ESS':>8}{'ESS/s':>8}{'ESS/1000':>10}{'means off':>11}")

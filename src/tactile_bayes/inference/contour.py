@@ -16,7 +16,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_groups import groups_of, prior_draws
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_start import scattered_start
+from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings, Seed, sample, spawn
 from tactile_bayes.inference.families import Family, Prior, family_named
 from tactile_bayes.inference.noise import noise_of
@@ -180,15 +180,16 @@ def infer_contour(
     }
     seeds = spawn(seed, 4)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        start = scattered_start(model, seeds[0], settings)
+        walk = walk_of(model, seeds[0], settings)
         draws = sample(
             model.log_probability,
-            start,
+            walk.start,
             names=model.names,
             seed=seeds[1],
             settings=settings,
             progress=progress,
             checkpoint=checkpoint,
+            coordinates=walk.coordinates,
             identity=None if checkpoint is None else _identity(about),
         )
         groups = groups_of(model, draws, np.random.default_rng(seeds[2]))

@@ -1,71 +1,109 @@
-"""Where the walkers of a contour posterior start."""
+"""Where the walkers of a contour posterior start, and in which coordinates they walk."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.ensembles import SamplerSettings, scatter_walkers
-from tactile_bayes.inference.start import best_optimum, gather
-from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.inference.contour_optimum import contact_fit, fitted_noise, optimum_of
+from tactile_bayes.inference.ensembles import Coordinates, Plain, SamplerSettings, in_coordinates, scatter_walkers
+from tactile_bayes.inference.shape_free import ShapeFreeFamily
+from tactile_bayes.inference.start import gather
+from tactile_bayes.inference.whitening import whitening_at
 
-__all__ = ["scattered_start"]
+__all__ = ["Walk", "walk_of"]
 
 Floats = NDArray[np.float64]
 
-_CANDIDATES = 8
-"""Draws from the prior from which the optimum is sought, the likeliest first, until one explains the record. A sample at
-an event that is loaded or not holds the search up where it began too far away."""
+_POOR = 2.0
+"""Mean square of what is left of a record, over its own roughness, from which on a search is worth its time."""
+
+_WIDER = 1.3
+"""How many times wider than a standard normal distribution walkers start."""
+
+_DEFICIT = 12.0
+"""Log-probability per coordinate that a walker may start below the best of some."""
 
 
-def scattered_start(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Floats:
-    """Walkers, shape (ensembles, walkers, parameters), scattered twice as wide as a normal approximation."""
+class Walk(NamedTuple):
+    """Where walkers start, and in which coordinates."""
+
+    start: Floats
+    """(ensemble, walker, coordinate)."""
+    coordinates: Coordinates
+
+
+def walk_of(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Walk:
+    """Walkers scattered more widely than the posterior, around an optimum that is sought without help."""
     rng = np.random.default_rng(seed)
-    size = len(model.located)
-    deviation, present = model.deviation, model.present
-    measured = model.likelihood.measured[:, present] / deviation[present]
-    candidates, _ = model.draw_prior(rng, 400)
-    some_noise = candidates[0, size:]
+    if isinstance(model.family, ShapeFreeFamily):
+        return _whitened(model, seed, rng, settings)
+    return Walk(_scattered(model, seed, rng, settings), Plain())
 
-    def residuals(points: Floats) -> Floats:
-        noise = np.broadcast_to(some_noise, (len(points), some_noise.size))
-        allowed = np.isfinite(model.log_prior(np.concatenate([points, noise], axis=1)))
-        out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
-        if allowed.any():
-            expected = model.likelihood.load_cell.expected(model.loads(points[allowed]))
-            out[allowed] = measured - expected[..., present] / deviation[present]
-        return out.reshape(len(points), -1)
 
-    spread = np.array([float(model.priors[name].std()) for name in model.located])
-    percentiles = np.quantile(candidates[:, :size], [0.16, 0.84], axis=0)
-    rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
-    spread = np.where(np.isfinite(spread), spread, rough)
-    costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
-    chosen = [candidates[i, :size] for i in np.argsort(costs)[:_CANDIDATES]]
-    by_contacts = _from_contacts(model)
+def _whitened(
+    model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
+) -> Walk:
+    """Of coordinates that are nearly standard normal it takes no more walkers than span them."""
+    by_contacts = contact_fit(model)
+    noise = fitted_noise(model, np.full((1, np.count_nonzero(model.present)), 1.0 / 1.4826))
+    whitening = None
     if by_contacts is not None:
-        chosen.insert(0, np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))
-    optimum = best_optimum(residuals, np.array(chosen), percentiles.mean(axis=0), spread)
+        rig = [float(model.priors[name].median()) for name in model.nuisances.names]  # type: ignore[attr-defined]
+        whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng)
+    if whitening is None or _misfit(model, whitening.centre) > _POOR:
+        other = whitening_at(model, optimum_of(model, rng).point, rng)
+        if whitening is None or _misfit(model, other.centre) < _misfit(model, whitening.centre):
+            whitening = other
+    own, count = whitening, len(model.names)
 
-    noise = _fitted_noise(model, optimum.residuals.reshape(measured.shape))
-    possible = candidates[:, size:]
-    if not np.isfinite(model.log_prior(np.append(optimum.point, noise)[None]))[0]:
-        noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
-    narrow = np.minimum(0.5 * spread / np.sqrt(np.diag(optimum.covariance)), 1.0)
-    covariance = np.zeros((len(model.names), len(model.names)))
-    covariance[:size, :size] = optimum.covariance * np.outer(narrow, narrow)
-    covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
+    def draw(rng: np.random.Generator, n: int) -> Floats:
+        bent = [np.log(model.priors[name].rvs(n, random_state=rng)) for name in ("amplitude", "length_scale")]
+        of_noise = np.log(own.centre[len(model.located) :]) + 0.1 * rng.normal(size=(n, len(model.noise.names)))
+        normal = _WIDER * rng.normal(size=(n, count - own.bent))
+        return np.concatenate([np.stack(bent, axis=1), of_noise, normal], axis=1)
+
+    log_probability = in_coordinates(model.log_probability, own)
+    floor = np.max(log_probability(draw(rng, 400))) - _DEFICIT * count
+    walkers = settings.walkers or max(48, 2 * count)
+    start = scatter_walkers(
+        lambda points: np.where(log_probability(points) > floor, 0.0, -np.inf),
+        draw,
+        parameters=count,
+        seed=seed,
+        settings=replace(settings, walkers=walkers),
+    )
+    return Walk(start, own)
+
+
+def _misfit(model: ContourModel, point: Floats) -> float:
+    """Mean square of what a point leaves of the record, over the record's own roughness, outliers cut off."""
+    left = model.likelihood.measured - model.likelihood.load_cell.expected(model.loads(point[None]))[0]
+    return float(np.mean(np.minimum(np.abs(left / model.deviation)[:, model.present], 5.0) ** 2))
+
+
+def _scattered(
+    model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
+) -> Floats:
+    """Walkers, shape (ensembles, walkers, parameters), scattered twice as wide as a normal approximation."""
+    size = len(model.located)
+    optimum = optimum_of(model, rng)
 
     def with_logarithms(points: Floats) -> Floats:
         return np.concatenate([points[:, :size], np.exp(points[:, size:])], axis=1)
 
+    def without_logarithms(point: Floats) -> Floats:
+        return np.append(point[:size], np.log(point[size:]))
+
     def log_probability(points: Floats) -> Floats:
         return model.log_probability(with_logarithms(points))
 
-    cloud = gather(log_probability, np.append(optimum.point, np.log(noise)), covariance, rng)
+    cloud = gather(log_probability, without_logarithms(optimum.point), optimum.covariance, rng)
     try:
         return scatter_walkers(
             lambda points: np.where(model.log_probability(points) > cloud.floor, 0.0, -np.inf),
@@ -80,32 +118,3 @@ def scattered_start(model: ContourModel, seed: np.random.SeedSequence, settings:
             f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, rod, "
             "base and family right?"
         ) from error
-
-
-def _fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
-    """Noise parameters that fit the optimum's residuals, shape (samples, present channels), outliers aside."""
-    known = model.likelihood.load_cell.noise
-    fitted = model.deviation[model.present] * np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
-    measured = np.flatnonzero(model.present)
-    ratio = {CHANNELS[i]: value / (known[i] or 1.0) for i, value in zip(measured, fitted, strict=True)}
-    return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in model.noise.channels])
-
-
-def _from_contacts(model: ContourModel) -> Floats | None:
-    """The family fitted to Step 2's contact points."""
-    if len(present_channels(model.measured)) < len(CHANNELS):
-        return None
-    contacts = reconstruct(
-        model.measured,
-        load_cell=model.noise.cell if model.noise.names == ("noise_scale",) else None,
-        friction=model.nuisances.friction,
-    )
-    force = np.hypot(model.measured.force_x.values, model.measured.force_y.values)
-    firm = (contacts.status.values == "ok") & (force > 0.1 * force.max())
-    if np.count_nonzero(firm) < 2 * len(model.family.parameters):
-        return None
-    length = model.likelihood.rod.length
-    values = model.family.fit(contacts.contact_x.values[firm] / length, contacts.contact_y.values[firm] / length)
-    point = np.array([values[name] * length**power for name, power in model.family.length_powers.items()])
-    inside = [np.isfinite(model.priors[n].logpdf(v)) for n, v in zip(model.family.parameters, point, strict=True)]
-    return point if all(inside) else None

@@ -71,10 +71,13 @@ class RandomRadius:
 
     def log_radius(self, log_r: Floats, amplitude: Floats, length: Floats, weights: Floats) -> Floats:
         """At the nodes, shape (n, nodes), from arrays of shape (n,) and standard normal weights (n, directions)."""
-        at = np.log(np.clip(length, self.shortest, self.longest))
-        shapes = _spline(self.shortest, self.longest, self.count, self.nodes)(at)
-        sums = (shapes.reshape(*at.shape, self.nodes, self.count) @ weights[..., None])[..., 0]
+        sums = (self.shapes(length) @ weights[..., None])[..., 0]
         return np.clip(log_r[..., None] + amplitude[..., None] * sums, -_LARGEST, _LARGEST)
+
+    def shapes(self, length: Floats) -> Floats:
+        """The directions at the nodes, shape (n, nodes, directions), for length scales of shape (n,)."""
+        at = np.log(np.clip(length, self.shortest, self.longest))
+        return np.asarray(_spline(self.shortest, self.longest, self.count, self.nodes)(at))
 
 
 def _covariance(one: Floats, other: Floats, length: float) -> Floats:

@@ -20,10 +20,25 @@ the walkers and the states of their random numbers, so that a run that was kille
 not.
 """
 
+from tactile_bayes.inference.ensembles.coordinates import Coordinates, Plain, in_coordinates
 from tactile_bayes.inference.ensembles.draws import Draws
+from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.places import Place
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, spawn
 
-__all__ = ["Draws", "Place", "Progress", "SamplerSettings", "Seed", "sample", "scatter_walkers", "spawn"]
+__all__ = [
+    "Coordinates",
+    "Draws",
+    "Place",
+    "Plain",
+    "Progress",
+    "SamplerSettings",
+    "Seed",
+    "in_coordinates",
+    "sample",
+    "scatter_walkers",
+    "spawn",
+    "whitened_moves",
+]

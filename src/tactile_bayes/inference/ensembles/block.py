@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.inference.ensembles.moves import Moves
 from tactile_bayes.inference.ensembles.target import LogProbability, Together
 from tactile_bayes.inference.ensembles.walkers import RandomState, walking_ensemble
 
@@ -44,12 +45,14 @@ class Block:
 class WalkingEnsembles:
     """All ensembles, each in a thread of its own, in step; a context, at whose end they are gone."""
 
-    def __init__(self, target: LogProbability, points: Floats, values: Floats, randoms: Sequence[RandomState]) -> None:
+    def __init__(
+        self, target: LogProbability, moves: Moves, points: Floats, values: Floats, randoms: Sequence[RandomState]
+    ) -> None:
         """`points`: (chain, walker, parameter), where they go on; `values`: (chain, walker), the target there."""
         self._shape = points.shape
         self._together = Together(target, len(points))
         self._ensembles = [
-            walking_ensemble(place, value, self._together.target_of(k), random)
+            walking_ensemble(place, value, self._together.target_of(k), random, moves())
             for k, (place, value, random) in enumerate(zip(points, values, randoms, strict=True))
         ]
         self._pool = ThreadPoolExecutor(len(points))

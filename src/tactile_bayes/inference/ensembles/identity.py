@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import Seed, seed_sequence
 
@@ -23,7 +24,12 @@ _LONGEST = 60
 
 
 def identity_of_run(
-    identity: Mapping[str, str] | None, start: Floats, names: Sequence[str], seed: Seed, settings: SamplerSettings
+    identity: Mapping[str, str] | None,
+    start: Floats,
+    names: Sequence[str],
+    seed: Seed,
+    settings: SamplerSettings,
+    coordinates: Coordinates,
 ) -> dict[str, str]:
     """What the draws follow from: what the caller says of the log-probability, and the rest.
 
@@ -41,6 +47,7 @@ def identity_of_run(
         "block_steps": str(settings.block_steps),
         "seed of the ensembles": _seed_in_words(seed),
         "starting points": hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
+        "coordinates of the walkers": coordinates.digest,
         "version of emcee": version("emcee"),
     }
     for name, value in entries.items():

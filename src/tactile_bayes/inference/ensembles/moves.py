@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import emcee
@@ -10,15 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-__all__ = ["FittedMove", "standard_moves"]
+__all__ = ["FittedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
 
 Floats = NDArray[np.float64]
+Moves = Callable[[], list[tuple[Any, float]]]
+"""Makes the moves of one ensemble, with their shares."""
 
 _DEGREES_OF_FREEDOM = 10.0
 """Of the t distribution: tails heavier than a normal posterior's, at little cost where it is one."""
 
 _WIDENING = 1.1
 """Scale over that of the walkers it is fitted to: too wide a proposal costs less than too narrow a one."""
+
+
+_LEAST_NEW = 0.5
+"""Share that is new in the shortest step of `NormalMove`."""
 
 
 class FittedMove(emcee.moves.RedBlueMove):
@@ -32,20 +38,50 @@ class FittedMove(emcee.moves.RedBlueMove):
     adapts them to the whole run instead.
     """
 
+    def __init__(self, columns: slice = slice(None)) -> None:
+        """Of the parameters in `columns`, the others staying as they are."""
+        super().__init__()
+        self._columns = columns
+
     def get_proposal(
         self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
         """Places proposed to walkers, (n, parameters), and log of the density back over that of going there, (n,)."""
-        others = np.concatenate(complement)
-        shape = sample.shape
-        normal = random.standard_normal(shape)
-        steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, shape[0]) / _DEGREES_OF_FREEDOM)[:, None]
+        moving, others = sample[:, self._columns], np.concatenate(complement)[:, self._columns]
+        normal = random.standard_normal(moving.shape)
+        steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, len(moving)) / _DEGREES_OF_FREEDOM)[:, None]
+        proposed = sample.copy()
         try:
             mean, root = _fit(others)
         except np.linalg.LinAlgError:
-            return sample.copy(), np.full(shape[0], -np.inf)
-        here = solve_triangular(root, (sample - mean).T, lower=True).T
-        return mean + steps @ root.T, _log_density(here) - _log_density(steps)
+            return proposed, np.full(len(moving), -np.inf)
+        here = solve_triangular(root, (moving - mean).T, lower=True).T
+        proposed[:, self._columns] = mean + steps @ root.T
+        return proposed, _log_density(here) - _log_density(steps)
+
+
+class NormalMove(emcee.moves.RedBlueMove):
+    """Steps that leave a standard normal distribution invariant, of coordinates that the target makes nearly that.
+
+    A step of random length keeps a share of where the walker is and draws the rest anew (Neal 1999; Cotter, Roberts,
+    Stuart & White 2013, doi 10.1214/13-STS421); what the target adds to a standard normal one decides alone.
+    """
+
+    def __init__(self, columns: slice) -> None:
+        """Of the parameters in `columns`, the others staying as they are."""
+        super().__init__()
+        self._columns = columns
+
+    def get_proposal(
+        self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
+    ) -> tuple[Floats, Floats]:
+        """Places proposed to walkers, (n, parameters), and log of the density back over that of going there, (n,)."""
+        moving = sample[:, self._columns]
+        new = random.uniform(_LEAST_NEW, 1.0, len(moving))[:, None]
+        there = np.sqrt(1.0 - new**2) * moving + new * random.standard_normal(moving.shape)
+        proposed = sample.copy()
+        proposed[:, self._columns] = there
+        return proposed, 0.5 * np.sum(there**2 - moving**2, axis=1)
 
 
 def _fit(points: Floats) -> tuple[Floats, Floats]:
@@ -72,3 +108,14 @@ def standard_moves() -> list[tuple[Any, float]]:
     unscaled, where it is not. All cut the ensemble in two halves, which `Together` counts on.
     """
     return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
+
+
+def whitened_moves(bent: int) -> list[tuple[Any, float]]:
+    """Those of an ensemble in coordinates that are nearly standard normal and independent, but for the first ones."""
+    first, rest = slice(0, bent), slice(bent, None)
+    return [
+        (FittedMove(first), 0.35),
+        (NormalMove(rest), 0.5),
+        (emcee.moves.DEMove(), 0.12),
+        (emcee.moves.DEMove(gamma0=1.0), 0.03),
+    ]

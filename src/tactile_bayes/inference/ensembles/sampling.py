@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.block import Block, WalkingEnsembles, next_look
 from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, open_checkpoint
+from tactile_bayes.inference.ensembles.coordinates import Coordinates, Plain, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.identity import identity_of_run
@@ -65,6 +66,7 @@ def sample(
     progress: Callable[[Progress], object] | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     identity: Mapping[str, str] | None = None,
+    coordinates: Coordinates | None = None,
 ) -> Draws:
     """Draw from a posterior with independent ensembles of walkers, which propose from one another.
 
@@ -80,8 +82,8 @@ def sample(
         Takes an array (n, parameters), returns (n,): log of the target density up to a constant, −inf outside its
         support.
     start : array_like, shape (ensembles, walkers, parameters)
-        Where each walker starts, every point with a finite log-probability. Start wider than the posterior, or R̂
-        cannot tell a part of it from the whole; `scatter_walkers` helps.
+        Where each walker starts, in the coordinates, every point with a finite log-probability. Start wider than the
+        posterior, or R̂ cannot tell a part of it from the whole; `scatter_walkers` helps.
     names : sequence of str
         Names of the parameters, for messages.
     seed : int or numpy.random.SeedSequence
@@ -94,6 +96,8 @@ def sample(
     identity : mapping of str to str, optional
         What the log-probability follows from, for the checkpoint: hash of the data, model, priors and the like. What
         `sample` itself is given is added to it.
+    coordinates : Coordinates, optional
+        In which the walkers walk, if not in the parameters; these are what is judged and returned.
 
     Returns
     -------
@@ -136,6 +140,8 @@ def sample(
     points = checked_start(start, names, settings)
     chains, walkers, parameters = points.shape
     target = CheckedTarget(log_probability, names)
+    coordinates = coordinates or Plain()
+    walked = in_coordinates(target, coordinates)
     enough = max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers)
     deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
     steps, evaluations_before, seconds_before = 0, 0, 0.0
@@ -143,20 +149,22 @@ def sample(
     stored: Checkpoint | None = None
     with ExitStack() as stack:
         if checkpoint is not None:
-            about = identity_of_run(identity, points, names, seed, settings)
+            about = identity_of_run(identity, points, names, seed, settings, coordinates)
             stored = stack.enter_context(open_checkpoint(checkpoint, about, (chains, walkers, parameters)))
         if stored is not None and stored.steps:
             steps = stored.steps
             last = stored.read(since=steps // 2)
-            kept, kept_values = last.samples, last.log_probability
+            kept, kept_values = _as_parameters(last, coordinates)
             evaluations_before, seconds_before = chains * walkers * (1 + steps), stored.seconds
             if steps in (stored.judged, next_look(steps - 1, settings.block_steps)) or steps >= settings.max_steps:
                 look = steps  # else it was killed on its way to a look
         else:
-            last = _beginning(points, target, seed)
+            last = _beginning(points, walked, seed)
             kept, kept_values = last.samples[:, 1:], last.log_probability[:, 1:]
         ensembles = stack.enter_context(
-            WalkingEnsembles(target, last.samples[:, -1], last.log_probability[:, -1], last.random_states)
+            WalkingEnsembles(
+                walked, coordinates.moves, last.samples[:, -1], last.log_probability[:, -1], last.random_states
+            )
         )
 
         while not ending:
@@ -178,9 +186,9 @@ def sample(
                 raise KeyboardInterrupt
             look = 0
             later_half = slice(steps // 2 - steps, None)
-            kept = np.concatenate([kept, *(block.samples for block in blocks)], axis=1)[:, later_half]
-            kept_values = np.concatenate([kept_values, *(block.log_probability for block in blocks)], axis=1)
-            kept_values = kept_values[:, later_half]
+            new = [_as_parameters(block, coordinates) for block in blocks]
+            kept = np.concatenate([kept, *(points for points, _ in new)], axis=1)[:, later_half]
+            kept_values = np.concatenate([kept_values, *(values for _, values in new)], axis=1)[:, later_half]
             try:
                 diagnosis = Diagnosis(kept)
             except KeyboardInterrupt:
@@ -235,7 +243,14 @@ def sample(
     )
 
 
-def _beginning(points: Floats, target: CheckedTarget, seed: Seed) -> Block:
+def _as_parameters(block: Block, coordinates: Coordinates) -> tuple[Floats, Floats]:
+    """Parameters of a block, and their log-probability."""
+    shape = block.samples.shape
+    points, growth = coordinates.parameters(block.samples.reshape(-1, shape[-1]))
+    return points.reshape(shape), block.log_probability - growth.reshape(shape[:-1])
+
+
+def _beginning(points: Floats, target: LogProbability, seed: Seed) -> Block:
     """The starting points as if they were a step."""
     values = np.array([target(ensemble) for ensemble in points])
     outside = int(np.count_nonzero(np.isneginf(values)))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles.moves import standard_moves
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.inference.ensembles.target import LogProbability
 
@@ -67,11 +66,10 @@ def walking_ensemble(
     values: Floats,
     target: LogProbability,
     random_state: RandomState,
-    moves: Sequence[tuple[Any, float]] | None = None,
+    moves: Sequence[tuple[Any, float]],
 ) -> Iterator[Any]:
     """Endless states of one ensemble, after the one given."""
     walkers, parameters = points.shape
-    moves = standard_moves() if moves is None else moves
     sampler: Any = emcee.EnsembleSampler(walkers, parameters, target, moves=list(moves), vectorize=True)
     sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
     sampler.random_state = random_state

@@ -1,0 +1,98 @@
+"""Where a contour and all else that is not known fit a record best, sought without help."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.start import best_optimum
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, present_channels
+
+__all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optimum_of"]
+
+Floats = NDArray[np.float64]
+
+_CANDIDATES = 8
+"""Draws from the prior from which the optimum is sought, the likeliest first, until one explains the record. A sample
+at an event that is loaded or not holds the search up where it began too far away."""
+
+
+class ContourOptimum(NamedTuple):
+    """Parameters that explain a record, by robust least squares."""
+
+    point: Floats
+    """All of the model's."""
+    covariance: Floats
+    """Roughly theirs in the posterior, of the logarithms of those of the noise."""
+
+
+def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
+    """The best of several searches, which begin at Step 2's contacts and at draws from the prior."""
+    size = len(model.located)
+    deviation, present = model.deviation, model.present
+    measured = model.likelihood.measured[:, present] / deviation[present]
+    candidates, _ = model.draw_prior(rng, 400)
+    some_noise = candidates[0, size:]
+
+    def residuals(points: Floats) -> Floats:
+        noise = np.broadcast_to(some_noise, (len(points), some_noise.size))
+        allowed = np.isfinite(model.log_prior(np.concatenate([points, noise], axis=1)))
+        out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
+        if allowed.any():
+            expected = model.likelihood.load_cell.expected(model.loads(points[allowed]))
+            out[allowed] = measured - expected[..., present] / deviation[present]
+        return out.reshape(len(points), -1)
+
+    spread = np.array([float(model.priors[name].std()) for name in model.located])
+    percentiles = np.quantile(candidates[:, :size], [0.16, 0.84], axis=0)
+    rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
+    spread = np.where(np.isfinite(spread), spread, rough)
+    costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
+    chosen = [candidates[i, :size] for i in np.argsort(costs)[:_CANDIDATES]]
+    by_contacts = contact_fit(model)
+    if by_contacts is not None:
+        chosen.insert(0, np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))
+    optimum = best_optimum(residuals, np.array(chosen), percentiles.mean(axis=0), spread)
+
+    noise = fitted_noise(model, optimum.residuals.reshape(measured.shape))
+    possible = candidates[:, size:]
+    if not np.isfinite(model.log_prior(np.append(optimum.point, noise)[None]))[0]:
+        noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
+    narrow = np.minimum(0.5 * spread / np.sqrt(np.diag(optimum.covariance)), 1.0)
+    covariance = np.zeros((len(model.names), len(model.names)))
+    covariance[:size, :size] = optimum.covariance * np.outer(narrow, narrow)
+    covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
+    return ContourOptimum(np.append(optimum.point, noise), covariance)
+
+
+def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
+    """Noise parameters that fit the optimum's residuals, shape (samples, present channels), outliers aside."""
+    known = model.likelihood.load_cell.noise
+    fitted = model.deviation[model.present] * np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
+    measured = np.flatnonzero(model.present)
+    ratio = {CHANNELS[i]: value / (known[i] or 1.0) for i, value in zip(measured, fitted, strict=True)}
+    return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in model.noise.channels])
+
+
+def contact_fit(model: ContourModel) -> Floats | None:
+    """The family fitted to Step 2's contact points."""
+    if len(present_channels(model.measured)) < len(CHANNELS):
+        return None
+    contacts = reconstruct(
+        model.measured,
+        load_cell=model.noise.cell if model.noise.names == ("noise_scale",) else None,
+        friction=model.nuisances.friction,
+    )
+    force = np.hypot(model.measured.force_x.values, model.measured.force_y.values)
+    firm = (contacts.status.values == "ok") & (force > 0.1 * force.max())
+    if np.count_nonzero(firm) < 2 * len(model.family.parameters):
+        return None
+    length = model.likelihood.rod.length
+    values = model.family.fit(contacts.contact_x.values[firm] / length, contacts.contact_y.values[firm] / length)
+    point = np.array([values[name] * length**power for name, power in model.family.length_powers.items()])
+    inside = [np.isfinite(model.priors[n].logpdf(v)) for n, v in zip(model.family.parameters, point, strict=True)]
+    return point if all(inside) else None

@@ -1,0 +1,51 @@
+"""Other coordinates than the parameters, for walkers to walk in."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.inference.ensembles.moves import standard_moves
+from tactile_bayes.inference.ensembles.target import LogProbability
+
+__all__ = ["Coordinates", "Plain", "in_coordinates"]
+
+Floats = NDArray[np.float64]
+
+
+class Coordinates(Protocol):
+    """As many as there are parameters, each of which they determine."""
+
+    @property
+    def digest(self) -> str:
+        """What tells them from others."""
+
+    def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        """Parameters, (n, parameters), and the logarithm of by how much a volume grows on the way to them, (n,)."""
+
+    def moves(self) -> list[tuple[Any, float]]:
+        """Moves of one ensemble and their shares, new ones at each call."""
+
+
+class Plain:
+    """The parameters themselves."""
+
+    digest = "the parameters"
+
+    def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        return coordinates, np.zeros(len(coordinates))
+
+    def moves(self) -> list[tuple[Any, float]]:
+        return standard_moves()
+
+
+def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) -> LogProbability:
+    """The density of the coordinates, from that of the parameters."""
+
+    def of_coordinates(points: Floats) -> Floats:
+        parameters, growth = coordinates.parameters(points)
+        return np.asarray(log_probability(parameters) + growth)
+
+    return of_coordinates
