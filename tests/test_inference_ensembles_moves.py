@@ -6,7 +6,7 @@ import emcee
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles.moves import FittedMove, standard_moves
+from tactile_bayes.inference.ensembles.moves import FittedMove, NormalMove, standard_moves, whitened_moves
 from tactile_bayes.inference.ensembles.walkers import first_random_state, walking_ensemble
 
 WALKERS = 40
@@ -49,7 +49,7 @@ class Gaussian:
         return np.where(x[:, 0] > 0.0, value, -np.inf) if self.wall else value
 
 
-def moments(target: Gaussian, moves, *, ensembles: int, steps: int):
+def moments(target: Gaussian, moves, *, ensembles: int, steps: int, watched: int = 0):
     """Mean less the true mean, and mean square about it less 1, in true sd; their standard errors: (2, parameters).
 
     The walkers start from the target itself, exactly, and a move that leaves it invariant keeps them there: every step
@@ -63,7 +63,7 @@ def moments(target: Gaussian, moves, *, ensembles: int, steps: int):
             start, target.log_probability(start), target.log_probability, first_random_state(second), moves()
         )
         samples = np.array([next(states).coords.copy() for _ in range(steps)])
-        moved += float(np.mean(samples[1:, :, 0] != samples[:-1, :, 0])) / ensembles
+        moved += float(np.mean(samples[1:, :, watched] != samples[:-1, :, watched])) / ensembles
         centred = (samples - target.mean) / target.deviation
         totals.append([centred.mean(axis=(0, 1)), (centred**2).mean(axis=(0, 1)) - 1.0])
     assert moved > 0.05  # else nothing would be shown
@@ -87,6 +87,18 @@ def test_each_move_leaves_a_target_invariant(moves, parameters, scale, wall):
     """Within 4 standard errors of 64 ensembles: false alarm 2e-4 a number; 160 numbers, as scales give the same."""
     error, standard = moments(Gaussian(parameters, scale, wall=wall), MOVES[moves], ensembles=64, steps=60)
     assert np.all(standard < 0.05)
+    assert np.all(np.abs(error) < 4.0 * standard)
+
+
+@pytest.mark.parametrize("wall", [False, True])
+@pytest.mark.parametrize(
+    ("parameters", "moves"),
+    [(2, lambda: [(NormalMove(slice(1, None)), 1.0)]), (8, lambda: whitened_moves(2))],
+    ids=["normal", "whitened"],
+)
+def test_moves_of_some_coordinates_leave_a_target_invariant(parameters, moves, wall):
+    """Within 4 standard errors of 32 ensembles, 40 numbers; a coordinate that is not moved stays as it was drawn."""
+    error, standard = moments(Gaussian(parameters, 1.0, wall=wall), moves, ensembles=32, steps=50, watched=1)
     assert np.all(np.abs(error) < 4.0 * standard)
 
 

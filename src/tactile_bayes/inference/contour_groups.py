@@ -92,9 +92,11 @@ def _labelled(model: ContourModel, samples: Floats, draw: NDArray[np.intp]) -> x
 
 def _unit(model: ContourModel, name: str) -> str:
     if model.measured.attrs["units"] == "dimensionless":
-        return "rad" if name == "drive_angle_offset" else "1"
+        return "rad" if name in ("drive_angle_offset", "length_scale") else "1"
     if name in model.nuisances.names:
         return model.nuisances.unit(name)
+    if name == "length_scale":
+        return "rad"
     powers = {0: "1", 1: "m", -1: "1/m"}
     return {"moment_noise": "N m", "force_noise": "N"}.get(name) or powers[model.family.length_powers.get(name, 0)]
 
