@@ -25,13 +25,26 @@ def test_points_are_integrals_of_the_radius(alpha):
     contour = Smooth(wavy(Smooth.nodes(NODES)), q=0.3, x_c=0.1)
     x = 0.1 + quad(lambda a: np.exp(wavy(a)) * np.cos(a), 0.0, alpha, epsabs=1e-13)[0]
     y = 0.3 + quad(lambda a: np.exp(wavy(a)) * np.sin(a), 0.0, alpha, epsabs=1e-13)[0]
-    np.testing.assert_allclose(contour.point(alpha), (x, y), rtol=0.0, atol=1e-9)
-    assert contour.radius_of_curvature(alpha) == pytest.approx(np.exp(wavy(alpha)), rel=1e-7)
+    np.testing.assert_allclose(contour.point(alpha), (x, y), rtol=0.0, atol=1e-11)
+    assert contour.radius_of_curvature(alpha) == pytest.approx(np.exp(wavy(alpha)), rel=1e-8)
 
 
 def test_it_keeps_the_rules_of_a_contour():
     check(Smooth(wavy(Smooth.nodes(NODES)), q=0.3, x_c=0.1))
     check(Smooth(np.stack([wavy(Smooth.nodes(NODES)), np.zeros(NODES)]), q=0.3, x_c=[0.0, 0.2]))
+
+
+def test_places_are_found():
+    contours = Smooth(np.stack([wavy(Smooth.nodes(NODES)), np.zeros(NODES)]), q=0.3, x_c=[0.1, 0.2])
+    alpha = np.array([-1.57, -1.0, -1e-9, 0.0, 0.3, 1.2, 1.57])
+    x, _ = contours.take(np.array([[0], [1]])).point(alpha)
+    np.testing.assert_allclose(contours.take(np.array([[0], [1]])).parameter_of_x(x), np.tile(alpha, (2, 1)), atol=1e-9)
+    low, high = contours.locate(-0.5 * np.pi).x, contours.locate(0.5 * np.pi).x
+    assert np.isfinite(contours.height(low + 1e-12)).all()
+    assert np.isfinite(contours.height(high - 1e-12)).all()
+    assert np.isnan(contours.height(low - 1e-6)).all()
+    assert np.isnan(contours.height(high + 1e-6)).all()
+    assert contours.take(0).height(0.1) == 0.3
 
 
 def test_a_constant_radius_is_a_circle():
@@ -75,4 +88,4 @@ def test_what_is_no_contour_is_refused(log_radius, q, words):
 
 def test_radii_that_run_off_are_refused():
     with pytest.raises(ContourError, match="log_radius runs off to 500"):
-        Smooth(np.full(4, 500.0), 0.3).point(0.1)
+        Smooth(np.full(4, 500.0), 0.3)

@@ -25,6 +25,7 @@ from tactile_bayes.contours.base import (
 )
 from tactile_bayes.contours.halves import TABLE, Half, Halves
 from tactile_bayes.errors import ContourError
+from tactile_bayes.roots import falling_root
 
 __all__ = ["Smooth"]
 
@@ -32,7 +33,7 @@ _UPRIGHT = 0.5 * np.pi
 _LARGEST = 100.0
 """Logarithm of a radius beyond which nothing is gained."""
 
-_CELLS, _ROUGH_CELLS = 512, 128
+_CELLS = 128
 """Of a contour, between whose ends it is a polynomial of fifth degree; even, so that the vertex is one of them."""
 
 
@@ -90,7 +91,7 @@ class Smooth(Contour):
             x_c=np.broadcast_to(given["x_c"], shape),
             _row=np.arange(math.prod(shape)).reshape(shape),
         )
-        self.__dict__["_tables"] = _Tables(self.log_radius.reshape(-1, values.shape[-1]))
+        self.__dict__["_table"] = _tabulated(chebyshev.coefficients(self.log_radius.reshape(-1, values.shape[-1])))
 
     @staticmethod
     def nodes(count: int) -> Floats:
@@ -107,14 +108,14 @@ class Smooth(Contour):
     @property
     def halves(self) -> Halves:
         half = Half(TABLE, np.full(self.shape, _UPRIGHT), np.ones(self.shape))
-        tables = self.__dict__["_tables"].of(_ROUGH_CELLS)[self.__dict__["_row"]]
+        tables = self.__dict__["_table"][self.__dict__["_row"]]
         return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=False, tables=tables)
 
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha, row = np.broadcast_arrays(np.asarray(parameter, dtype=float), self.__dict__["_row"])
         way = (alpha + _UPRIGHT) * (_CELLS / (2.0 * _UPRIGHT))
-        cell = np.clip(way.astype(int), 0, _CELLS - 1)
-        table = self.__dict__["_tables"].of(_CELLS)
+        cell = np.nan_to_num(np.clip(way, 0, _CELLS - 1)).astype(np.intp)
+        table = self.__dict__["_table"]
         x, y, x_rate, y_rate = _between(table[row, cell], table[row, cell + 1], way - cell)
         speed = (x_rate * np.cos(alpha) + y_rate * np.sin(alpha)) * (_CELLS / (2.0 * _UPRIGHT))
         return Locus(self.x_c + x, self.q + y, alpha, speed, np.ones_like(alpha))
@@ -123,6 +124,29 @@ class Smooth(Contour):
         alpha = np.asarray(slope_angle, dtype=float)
         with np.errstate(invalid="ignore"):
             return np.where(np.abs(alpha) <= _UPRIGHT, alpha, np.nan)
+
+    def parameter_of_x(self, x: ArrayLike) -> Floats:
+        shape = np.broadcast_shapes(self.shape, np.shape(x))
+        row = np.broadcast_to(self.__dict__["_row"], shape).ravel()
+        goal = (np.broadcast_to(x, shape) - np.broadcast_to(self.x_c, shape)).ravel()
+        table = self.__dict__["_table"]
+        first, last = np.zeros(row.size, dtype=np.intp), np.full(row.size, _CELLS)
+        for _ in range(_CELLS.bit_length()):
+            middle = (first + last) // 2
+            beyond = table[row, middle, 0] > goal
+            first, last = np.where(beyond, first, middle), np.where(beyond, middle, last)
+        there = np.flatnonzero((table[row, 0, 0] <= goal) & (goal <= table[row, -1, 0]))
+        row, first, goal = row[there], np.minimum(first[there], _CELLS - 1), goal[there]
+        left, right = table[row, first], table[row, first + 1]
+
+        def short_of(i: Index, t: Floats) -> tuple[Floats, Floats]:
+            at, _, rate, _ = _between(left[i], right[i], t)
+            return goal[i] - at, -rate
+
+        found = np.full(beyond.shape, np.nan)
+        way = first + falling_root(short_of, np.zeros(there.size), np.ones(there.size))
+        found[there] = way * (2.0 * _UPRIGHT / _CELLS) - _UPRIGHT
+        return found.reshape(shape)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -141,50 +165,40 @@ class Smooth(Contour):
         return other
 
 
-class _Tables:
-    """Point seen from the vertex, and its first and second rates over the cell, at the ends of every cell."""
+def _tabulated(coefficients: Floats) -> Floats:
+    """At the ends of cells, shape (n, cells + 1, 6): the point seen from the vertex, its rates over a cell, and theirs.
 
-    def __init__(self, log_radius: Floats) -> None:
-        """Of contours, shape (n, k)."""
-        self._coefficients = chebyshev.coefficients(log_radius)
-        self._made: dict[int, Floats] = {}
-
-    def of(self, cells: int) -> Floats:
-        """Shape (n, cells + 1, 6): x, y, their rates and the rates of these."""
-        if cells not in self._made:
-            self._made[cells] = self._make(cells)
-        return self._made[cells]
-
-    def _make(self, cells: int) -> Floats:
-        alpha, values, slopes = _grid(self._coefficients.shape[0], cells)
-        log_radius = self._coefficients.T @ values
-        if np.abs(log_radius).max(initial=0.0) > _LARGEST:
-            raise ContourError(
-                f"Smooth: log_radius runs off to {np.abs(log_radius).max():.3g}: give values that belong to a smooth "
-                "curve, or fewer"
-            )
-        width = 2.0 * _UPRIGHT / cells
-        radius = width * np.exp(log_radius)
-        change = radius * (self._coefficients.T @ slopes) * width
-        cos, sin = np.cos(alpha), np.sin(alpha)
-        table = np.empty((*radius.shape, 6))
-        for axis, (rate, bend) in enumerate(
-            ((radius * cos, change * cos - width * radius * sin), (radius * sin, change * sin + width * radius * cos))
-        ):
-            steps = 0.5 * (rate[:, :-1] + rate[:, 1:]) + (bend[:, :-1] - bend[:, 1:]) / 12.0
-            way = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
-            table[..., axis] = way - way[:, [cells // 2]]
-            table[..., 2 + axis], table[..., 4 + axis] = rate, bend
-        return table
+    From coefficients of log ρ, shape (k, n). The way across a cell is integrated to seventh order of its width.
+    """
+    alpha, values, slopes = _grid(coefficients.shape[0])
+    log_radius = coefficients.T @ values
+    if np.abs(log_radius).max(initial=0.0) > _LARGEST:
+        raise ContourError(
+            f"Smooth: log_radius runs off to {np.abs(log_radius).max():.3g}: give values that belong to a smooth "
+            "curve, or fewer"
+        )
+    width = 2.0 * _UPRIGHT / _CELLS
+    radius = width * np.exp(log_radius)
+    change = radius[:, ::2] * (coefficients.T @ slopes) * width
+    table = np.empty((len(radius), _CELLS + 1, 6))
+    for axis, (along, turn) in enumerate(((np.cos(alpha), -np.sin(alpha)), (np.sin(alpha), np.cos(alpha)))):
+        rate = radius * along
+        bend = change * along[::2] + width * radius[:, ::2] * turn[::2]
+        ends, middles = rate[:, ::2], rate[:, 1::2]
+        steps = (7.0 * (ends[:, :-1] + ends[:, 1:]) + 16.0 * middles) / 30.0 + (bend[:, :-1] - bend[:, 1:]) / 60.0
+        table[:, 0, axis] = 0.0
+        np.cumsum(steps, axis=1, out=table[:, 1:, axis])
+        table[..., axis] -= table[:, [_CELLS // 2], axis]
+        table[..., 2 + axis], table[..., 4 + axis] = ends, bend
+    return table
 
 
 @functools.cache
-def _grid(count: int, cells: int) -> tuple[Floats, Floats, Floats]:
-    """Slope angles at the ends of cells, and there Chebyshev's polynomials and their slopes, (count, cells + 1)."""
-    z = np.linspace(0.0, 1.0, cells + 1)
-    values = chebyshev.basis(count, z)
-    slopes = chebyshev.evaluate(chebyshev.derivative(np.eye(count)), z[:, None]).T
-    return 2.0 * _UPRIGHT * (z - 0.5), values, slopes / (2.0 * _UPRIGHT)
+def _grid(count: int) -> tuple[Floats, Floats, Floats]:
+    """Slope angles at ends and middles of cells, Chebyshev's polynomials there, and their slopes at the ends."""
+    z = np.linspace(0.0, 1.0, 2 * _CELLS + 1)
+    slopes = chebyshev.evaluate(chebyshev.derivative(np.eye(count)), z[::2, None]).T
+    return 2.0 * _UPRIGHT * (z - 0.5), chebyshev.basis(count, z), slopes / (2.0 * _UPRIGHT)
 
 
 def _between(left: Floats, right: Floats, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 _PLACES = 200
 """Slope angles at which the process is cut into directions."""
 
-_LARGEST = 50.0
+_LARGEST = 25.0
 """Logarithm of radii that no prior comes near."""
 
 _LENGTHS = 40
