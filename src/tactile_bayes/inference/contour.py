@@ -120,14 +120,14 @@ def infer_contour(
     ellipse's semi-axes a (sideways) and b: log-normal around L/2, all with standard deviation 1 of the logarithm. The
     power law is (y − q)/w = (|x − x_c|/w)ⁿ, so that w is where the contour is as high as it is wide: log-normal around
     L, standard deviation 1 of the logarithm; n − 1: log-normal around 1, standard deviation 0.7 of the logarithm, n
-    from 1.1 to 50. Shape-free contours have a radius of curvature whose logarithm is a random function of the slope angle:
-    r, its geometric mean from −π/2 to π/2, log-normal like a circle's; amplitude, its standard deviation, log-normal
-    around 0.7, standard deviation 0.6 of the logarithm; length_scale, the angle in which it changes [rad], log-normal
-    around 0.7, standard deviation 0.35 of the logarithm, from 0.15 to 4 (Matérn's covariance, ν = 5/2); z_1, z_2 …,
-    standard normal, in the directions that make 99 % of its variance at a length scale that is shorter in 1 of 20
-    contours. It is smooth: a corner that is sharper than the length scale lets, or a radius that jumps, is smoothed.
-    noise_scale: log-normal around 1, standard deviation 0.5 of the logarithm. Unknown noises:
-    log-uniform from 1e-6 to 10, in EI/L and EI/L². Of the nuisances: rigidity_scale log-normal around 1 with 5 %,
+    from 1.1 to 50. Shape-free contours have a radius of curvature whose logarithm is a random function of the slope
+    angle: r, its geometric mean from −π/2 to π/2, log-normal like a circle's; amplitude, by how much the logarithm goes
+    up and down, log-normal around 0.7, standard deviation 0.6 of the logarithm; length_scale, the angle in which it
+    does so [rad], log-normal around 0.7, standard deviation 0.35 of the logarithm, from 0.15 to 4 (Matérn's covariance,
+    ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at a length scale that is
+    shorter in 1 of 20 contours. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale:
+    log-normal around 1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L
+    and EI/L². Of the nuisances: rigidity_scale log-normal around 1 with 5 %,
     drive_angle_offset normal with 1°, biases and drifts normal with 0.1 EI/L and EI/L² (a bias of which the load cell
     states a bias_uncertainty is integrated out instead), gains normal around 1 with 2 %, friction half-normal with
     scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, pivots normal with 1 % of L. Contours out of

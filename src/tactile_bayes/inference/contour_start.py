@@ -23,12 +23,6 @@ Floats = NDArray[np.float64]
 _POOR = 2.0
 """Mean square of what is left of a record, over its own roughness, from which on a search is worth its time."""
 
-_WIDER = 1.3
-"""How many times wider than a standard normal distribution walkers start."""
-
-_DEFICIT = 12.0
-"""Log-probability per coordinate that a walker may start below the best of some."""
-
 
 class Walk(NamedTuple):
     """Where walkers start, and in which coordinates."""
@@ -60,25 +54,19 @@ def _whitened(
         other = whitening_at(model, optimum_of(model, rng).point, rng)
         if whitening is None or _misfit(model, other.centre) < _misfit(model, whitening.centre):
             whitening = other
-    own, count = whitening, len(model.names)
-
-    def draw(rng: np.random.Generator, n: int) -> Floats:
-        bent = [np.log(model.priors[name].rvs(n, random_state=rng)) for name in ("amplitude", "length_scale")]
-        of_noise = np.log(own.centre[len(model.located) :]) + 0.1 * rng.normal(size=(n, len(model.noise.names)))
-        normal = _WIDER * rng.normal(size=(n, count - own.bent))
-        return np.concatenate([np.stack(bent, axis=1), of_noise, normal], axis=1)
-
-    log_probability = in_coordinates(model.log_probability, own)
-    floor = np.max(log_probability(draw(rng, 400))) - _DEFICIT * count
-    walkers = settings.walkers or max(48, 2 * count)
+    log_probability = in_coordinates(model.log_probability, whitening)
+    bent = [np.std(np.log(model.priors[name].rvs(400, random_state=rng))) for name in ("amplitude", "length_scale")]
+    spread = [*bent, *[0.1] * len(model.noise.names), *np.ones(whitening.middle.size)]
+    cloud = gather(log_probability, whitening.middle_of_coordinates, np.diag(np.square(spread)), rng)
+    count = len(spread)
     start = scatter_walkers(
-        lambda points: np.where(log_probability(points) > floor, 0.0, -np.inf),
-        draw,
+        lambda points: np.where(log_probability(points) > cloud.floor, 0.0, -np.inf),
+        cloud.draw,
         parameters=count,
         seed=seed,
-        settings=replace(settings, walkers=walkers),
+        settings=replace(settings, walkers=settings.walkers or max(48, 2 * count)),
     )
-    return Walk(start, own)
+    return Walk(start, whitening)
 
 
 def _misfit(model: ContourModel, point: Floats) -> float:

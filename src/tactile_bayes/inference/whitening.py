@@ -68,9 +68,13 @@ class Whitening:
         return hashlib.sha256(b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)).hexdigest()
 
     @property
+    def middle_of_coordinates(self) -> Floats:
+        return np.append(np.log(self.at), np.zeros(self.middle.size))
+
+    @property
     def centre(self) -> Floats:
         """The model's parameters at the middle of the coordinates, where loads were made linear."""
-        return self.parameters(np.append(np.log(self.at), np.zeros(self.middle.size))[None])[0][0]
+        return self.parameters(self.middle_of_coordinates[None])[0][0]
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """The model's parameters, (n, parameters), and the logarithm of by how much a volume grows, (n,)."""
