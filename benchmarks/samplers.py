@@ -55,7 +55,7 @@ class Counted:
         return self.log_probability(points)
 
 
-def main(evaluations: int = 100_000) -> None:
+def main(evaluations: int = 40_000) -> None:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     with threadpool_limits(1):
