@@ -23,7 +23,7 @@ from helpers.contour_posteriors import (
 )
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.contour import contours_of, default_priors
+from tactile_bayes.inference.contour import contours_of, default_priors, infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
@@ -380,3 +380,21 @@ def test_samples_without_load_tell_where_contact_begins_and_ends():
         draws = result["posterior"][name]
         assert abs(draws.mean() - value) < 4.5 * draws.std(), name
         assert draws.std() > 0.8 * whole[name].std()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"priors": {"a": stats.norm}}, r"the prior of a is <.*>: give a frozen distribution"),
+        ({"settings": {"min_ess": 3}}, r"settings is {'min_ess': 3}: give SamplerSettings"),
+        ({"load_cell": 0.05}, r"load_cell is 0.05: give LoadCell\(force_noise"),
+        ({"events": "no"}, "events is 'no': give True or False"),
+        ({"checkpoint": 3}, "checkpoint is 3: give the path of a folder"),
+        ({"checkpoint": ""}, "checkpoint is '': give the path of a folder"),
+        ({"friction": -0.1}, "friction is -0.1: give a coefficient from 0 to 0.84"),
+        ({"priors": {"gain": stats.norm(1.0, 0.1)}}, "there is no parameter 'gain' .* moment_gain, friction and so on"),
+    ],
+)
+def test_what_is_of_another_kind_is_refused(given, words):
+    with pytest.raises(ParameterError, match=words):
+        infer_contour(measured(), **{"seed": 1, **given})

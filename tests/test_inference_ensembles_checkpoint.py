@@ -319,7 +319,7 @@ def test_another_run_is_refused_with_what_differs(begun):
     refuse(begun, r"differs in names of parameters \(was 'a, b', now 'a, c'\):", identity=same, names=("a", "c"))
     refuse(begun, "differs in starting points", identity=same, scale=3.0)
     refuse(begun, "block_steps", identity=same, settings=replace(SMALL, block_steps=20))
-    walkers = r"walkers of an ensemble \(was '8', now '10'\); starting points"
+    walkers = r"walkers of an ensemble \(was '8', now '10'\): give another"
     refuse(begun, walkers, identity=same, settings=replace(SMALL, walkers=10))
     refuse(begun, r"number of ensembles \(was '2', now '3'\)", identity=same, settings=replace(SMALL, ensembles=3))
     draw(begun, identity=same, seed=np.random.SeedSequence(3))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, sample
 from tactile_bayes.inference.ensembles.places import places_of
+from tactile_bayes.inference.result import sample_stats
 
 MODES = np.array([[-50.0, 3.0], [50.0, 3.0]])
 
@@ -36,6 +39,8 @@ def test_modes_that_no_proposal_crosses_are_told():
     assert second.values["x0"] == pytest.approx(50.0, abs=0.5)
     assert second.log_probability - first.log_probability == pytest.approx(np.log(2.0), abs=0.5)
     assert "ensembles sit in 2 places" in draws.message
+    stored = json.loads(sample_stats(draws).attrs["places"])
+    assert [place["ensembles"] for place in stored] == [list(place.ensembles) for place in draws.places]
     assert "ensembles 0, 3 near x0 = -" in draws.message
 
 

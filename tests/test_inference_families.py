@@ -19,9 +19,7 @@ def test_any_two_flanks_make_a_family():
 
 
 def test_an_unknown_family_is_refused_with_those_that_there_are():
-    with pytest.raises(
-        ParameterError, match="no family 'blob': choose parabola, circle, ellipse, power-law, or one for"
-    ):
+    with pytest.raises(ParameterError, match="no family 'blob': choose parabola, circle, ellipse, power-law, one for"):
         family_named("blob")
 
 

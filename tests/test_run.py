@@ -63,8 +63,9 @@ def test_the_summary_begins_with_the_verdicts(analysed):
     lines = run.files["verdicts"].read_text(encoding="utf-8").splitlines()
     assert tuple(lines[: lines.index("")]) == run.verdicts
     assert run.verdicts[0].startswith("NOT CONVERGED, the steps allowed ran out after 30 steps: largest R̂ ")
-    table = lines[lines.index("") + 1 :]
+    table = lines[lines.index("") + 1 : -2]
     assert [line.split()[0] for line in table] == ["median", "quantity", "a", "q", "x_c", "noise_scale", "gap"]
+    assert lines[-1] == run.posterior.attrs["message"]
 
 
 def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path, monkeypatch):
@@ -180,6 +181,6 @@ def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_
 
 def test_an_unknown_family_is_refused(measured, tmp_path):
     with pytest.raises(
-        ParameterError, match="there is no family 'blob': choose parabola, circle, ellipse, power-law, or one"
+        ParameterError, match="there is no family 'blob': choose parabola, circle, ellipse, power-law, one"
     ):
         analyse(measured, tmp_path, family="blob")

@@ -47,7 +47,7 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     assert "Do not use this contour: try another family" in found[0]
     assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 40 steps")
     assert found[2].startswith("The noise is ")
-    assert found[2].endswith("times as much as stated: the rest is misfit, no noise.")
+    assert found[2].endswith(" as stated: the rest is misfit, no noise.")
 
 
 def test_a_forgotten_tare_is_told_with_its_size():
@@ -84,7 +84,7 @@ def test_what_has_not_converged_is_said_even_where_there_is_nothing_to_compare_w
     [
         (4.0, 4.0, "The noise is 4 times what the load cell states, and neighbouring samples scatter alike: state the"),
         (0.25, 0.25, "The noise is 0.25 times what the load cell states, and neighbouring samples scatter alike: st"),
-        (4.0, 1.0, "The noise is 4 times what the load cell states, but neighbouring samples scatter 0.9"),
+        (4.0, 1.0, "The noise is 4 times what the load cell states, but neighbouring samples scatter as stated: the"),
     ],
 )
 def test_noise_that_is_not_as_stated(factor, scatter, words):
@@ -104,6 +104,15 @@ def test_loads_that_contradict_one_another_unless_noise_does_it():
     found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0}))
     assert found[0].startswith("The loads of single samples contradict one another, whatever the contour (noise expl")
     assert "below 1e-99" in found[0]
+
+
+def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():
+    rng = np.random.default_rng(5)
+    tree = predicted()
+    shape = tree["posterior"].noise_scale.shape
+    tree = changed(tree, "posterior", friction=np.abs(rng.normal(0.0003, 0.0001, shape)))
+    tree = changed(tree, "prior", friction=np.abs(rng.normal(0.0, 0.3, (1, 1000))))
+    assert verdicts(tree)[0].startswith("All is well")
 
 
 def test_what_the_prior_forbids_and_what_it_says_alone():

@@ -16,6 +16,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
+from tactile_bayes.inference.families import family_named
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
@@ -135,7 +136,8 @@ def analyse(
     numbers = summary(result, probability).to_dataframe()
     files["verdicts"] = folder / "summary.txt"
     with write_atomically(files["verdicts"]) as temporary:
-        temporary.write_text("\n".join((*found, "", numbers.to_string(), "")), encoding="utf-8")
+        text = (*found, "", numbers.to_string(), "", str(result.attrs["message"]), "")
+        temporary.write_text("\n".join(text), encoding="utf-8")
     files["summary"] = folder / "summary.csv"
     _write_table(numbers, files["summary"])
     files |= _draw(measured, result, contacts, band, folder, truth=truth, friction=friction)
@@ -261,11 +263,12 @@ def _draw(
         figure, axes = panels(1, 1, 7.0, 3.6)
         plotting.gap(edges, truth=truth, ax=axes[0, 0])
         save("gap", figure)
-    names = list(draws.data_vars)
+    mute = family_named(result.attrs["family"]).roughness
+    names = [str(name) for name in draws.data_vars if name not in mute]
     figure, axes = panels(len(names), 2, 7.0, 1.6 * len(names))
-    plotting.trace(result, axes=axes)
+    plotting.trace(result, names=names, axes=axes)
     save("trace", figure)
     figure, axes = panels(len(names), len(names), 1.6 * len(names) + 0.6, 1.6 * len(names) + 0.6)
-    plotting.pairs(result, axes=axes)
+    plotting.pairs(result, names=names, axes=axes)
     save("pairs", figure)
     return files

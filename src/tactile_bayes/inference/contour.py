@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
 import xarray as xr
+from scipy.stats import rv_continuous, rv_histogram
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours import Contour
@@ -100,7 +102,9 @@ def infer_contour(
         In ArviZ's layout and the record's units, a chain being an ensemble: `posterior`, `sample_stats`, `prior`,
         `posterior_predictive` and `log_likelihood` (by sample; of some of the draws), `events` (first contact and
         snap-off of each sweep, of the same draws), `observed_data`, `constant_data`. Attributes: version, seed,
-        settings, hash of the data, `converged` and a `message` in words.
+        settings, hash of the data, `converged` and a `message` in words. A KeyboardInterrupt (Ctrl-C) while walkers
+        walk ends the run, and what they have drawn is returned, with `converged` 0 and a message that says so; before
+        that it is passed on.
 
     Raises
     ------
@@ -146,6 +150,7 @@ def infer_contour(
     """
     measured = with_rod(validate(measured), rod)
     settings = settings or SamplerSettings()
+    _refuse_other_kinds(settings, load_cell, events, checkpoint)
     chosen = family_named(family)
     noise = noise_of(measured, load_cell)
     rig = nuisances_of(measured, nuisances, priors or {}, noise.cell, friction)
@@ -153,9 +158,10 @@ def infer_contour(
     for name, prior in (priors or {}).items():
         if name not in chosen_priors:
             raise ParameterError(
-                f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}"
+                f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}, and of what is "
+                "not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
             )
-        if not isinstance(prior, Prior):
+        if not isinstance(prior, Prior) or isinstance(prior, rv_continuous):
             raise ParameterError(
                 f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
             )
@@ -205,6 +211,17 @@ def infer_contour(
     return tree
 
 
+def _refuse_other_kinds(settings: object, load_cell: object, events: object, checkpoint: object) -> None:
+    if not isinstance(settings, SamplerSettings):
+        raise ParameterError(f"settings is {settings!r}: give SamplerSettings(min_ess=400) and the like")
+    if load_cell is not None and not isinstance(load_cell, LoadCell):
+        raise ParameterError(f"load_cell is {load_cell!r}: give LoadCell(force_noise=0.05, moment_noise=0.02), or None")
+    if not isinstance(events, bool | np.bool_):
+        raise ParameterError(f"events is {events!r}: give True or False")
+    if checkpoint is not None and (not isinstance(checkpoint, str | os.PathLike) or not os.fspath(checkpoint)):
+        raise ParameterError(f"checkpoint is {checkpoint!r}: give the path of a folder, or None")
+
+
 def default_priors(
     measured: xr.Dataset,
     family: str = "parabola",
@@ -239,12 +256,18 @@ def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
 
 def _identity(about: Mapping[str, object]) -> dict[str, str]:
     """What a run that goes on must have in common with the one that was stopped."""
-    return {name: str(value) for name, value in about.items()} | {"version of tactile-bayes": version("tactile-bayes")}
+    words = {"data_sha256": "record (its SHA-256)"}
+    return {words.get(name, name): str(value) for name, value in about.items()} | {
+        "version of tactile-bayes": version("tactile-bayes")
+    }
 
 
 def _in_words(prior: Prior) -> str:
     law = getattr(prior, "dist", None)
     if law is None:
         return repr(prior)
+    if isinstance(law, rv_histogram):
+        counts, edges = law._histogram  # type: ignore[attr-defined]
+        return f"histogram of {len(counts)} bins ({zlib.crc32(np.concatenate([counts, edges]).tobytes()):08x})"
     arguments = [f"{a:g}" for a in prior.args] + [f"{k}={v:g}" for k, v in prior.kwds.items()]  # type: ignore[attr-defined]
     return f"{law.name}({', '.join(arguments)})"

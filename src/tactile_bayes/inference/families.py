@@ -78,6 +78,11 @@ class Family(ABC):
         return tuple(self.length_powers)
 
     @property
+    def roughness(self) -> tuple[str, ...]:
+        """Parameters that say nothing by themselves, of which a record need not tell anything."""
+        return ()
+
+    @property
     @abstractmethod
     def is_always_clear(self) -> bool:
         """Whether a rod that has snapped off is past every contour of the family."""
@@ -200,7 +205,8 @@ def family_named(name: str) -> Family:
         return SHAPE_FREE
     if name not in FAMILIES:
         raise ParameterError(
-            f"there is no family {name!r}: choose {', '.join(FLANKS)}, or one for each flank, like parabola/power-law"
+            f"there is no family {name!r}: choose {', '.join(FLANKS)}, one for each flank, like parabola/power-law, or "
+            "shape-free"
         )
     return FAMILIES[name]
 

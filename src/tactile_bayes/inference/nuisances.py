@@ -177,6 +177,9 @@ def nuisances_of(
                 )
             names.append(member)
     names = list(dict.fromkeys(names))
+    most = _KINDS["friction"].high
+    if not 0.0 <= friction < most:
+        raise ParameterError(f"friction is {friction!r}: give a coefficient from 0 to {most:.2f}")
     if "friction" in names and friction:
         raise ParameterError(f"friction is {friction!r} and to be inferred as well: leave one of the two")
     every_gain = [f"{name}_gain" for name in present]

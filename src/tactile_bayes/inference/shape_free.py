@@ -52,6 +52,10 @@ class ShapeFreeFamily(Family):
         object.__setattr__(self, "bounds", bounds)
 
     @property
+    def roughness(self) -> tuple[str, ...]:
+        return ("amplitude", "length_scale", *(f"z_{k + 1}" for k in range(self.radius.count)))
+
+    @property
     def is_always_clear(self) -> bool:
         return False
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Container, Mapping
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.inference.families import family_named
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.record import CHANNELS
@@ -32,6 +34,10 @@ _CONTRADICTION = 1e-4
 """Probability of the misfit of single samples below which it is told."""
 
 _FEWEST_PRIOR_DRAWS = 500
+
+_BEYOND = 0.5
+"""Of the way from the 5 % quantile of a prior's draws to the last, how much further the posterior must be to be told:
+of a normal prior that is some four standard deviations, of one that is largest at its end nothing is beyond it."""
 
 _PRIOR_DOMINATED = 0.7
 """Width of the posterior over that of the prior above which the record is said to tell little."""
@@ -87,13 +93,14 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     if not posterior.attrs["converged"]:
         against.append(posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1) + ".")
     noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
-    against += [*_noise(posterior, noisier), *_contradictions(record, contacts, noisier), *_beyond_prior(posterior)]
+    beyond = _beyond_prior(posterior)
+    against += [*_noise(posterior, noisier), *_contradictions(record, contacts, noisier), *_told_beyond(beyond)]
     if not against:
         p_value = math.nan if check is None else float(check.overall_p_value)
         against.append(
             f"All is well: the ensembles agree, and the record looks like what they predict (p = {p_value:.2g})."
         )
-    return (*against, *_prior_dominated(posterior))
+    return (*against, *_prior_dominated(posterior, known=beyond))
 
 
 def _off_zero(record: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
@@ -162,10 +169,8 @@ def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
         return []
     said = f"The noise is {factor:.3g} times what the load cell states"
     if noisier < 0.5 * factor and factor > _FACTOR:
-        return [
-            f"{said}, but neighbouring samples scatter {noisier:.2g} times as much as stated: the rest is misfit, no "
-            "noise."
-        ]
+        alike = f"{noisier:.2g} times as much as stated" if abs(math.log(noisier)) > 0.2 else "as stated"
+        return [f"{said}, but neighbouring samples scatter {alike}: the rest is misfit, no noise."]
     return [f"{said}, and neighbouring samples scatter alike: state the noise that it has, or are the units right?"]
 
 
@@ -185,32 +190,38 @@ def _contradictions(record: xr.Dataset, contacts: xr.Dataset | None, noisier: fl
     ]
 
 
-def _beyond_prior(posterior: xr.DataTree) -> list[str]:
-    """Parameters whose prior has next to nothing where the posterior is."""
+def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
+    """Parameters whose prior has next to nothing where the posterior is, with that in words."""
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
-    said = []
+    said = {}
     for name in draws.data_vars:
         believed = prior[name].values.ravel()
         if name in _NOISES or believed.size < _FEWEST_PRIOR_DRAWS:
             continue
         median = float(draws[name].median())
-        if not believed.min() <= median <= believed.max():
-            said.append(f"{name} = {median:.3g} (prior: {believed.min():.3g} to {believed.max():.3g})")
-    if not said:
+        least, low, high, most = np.quantile(believed, [0.0, 0.05, 0.95, 1.0])
+        if not least - _BEYOND * (low - least) <= median <= most + _BEYOND * (most - high):
+            said[str(name)] = f"{name} = {median:.3g} (prior: {least:.3g} to {most:.3g})"
+    return said
+
+
+def _told_beyond(beyond: Mapping[str, str]) -> list[str]:
+    if not beyond:
         return []
     return [
-        f"The record wants what the prior hardly allows: {', '.join(said)}. Check what is stated of rod, drive angle "
-        "and tare, or give a wider prior."
+        f"The record wants what the prior hardly allows: {', '.join(beyond.values())}. Check what is stated of rod, "
+        "drive angle and tare, or give a wider prior."
     ]
 
 
-def _prior_dominated(posterior: xr.DataTree) -> list[str]:
+def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[str]:
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
-    names = [name for name in draws.data_vars if name not in _NOISES]
+    mute = {*_NOISES, *family_named(posterior.attrs["family"]).roughness}
+    names = [str(name) for name in draws.data_vars if name not in mute and name not in known]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
     if not names:
         return []
-    return [f"The record tells little more than the prior of {', '.join(map(str, names))}."]
+    return [f"The record tells little more than the prior of {', '.join(names)}."]
 
 
 def _width(values: Floats) -> float:

@@ -19,6 +19,9 @@ __all__ = ["changes", "identity_of_run"]
 
 Floats = NDArray[np.float64]
 
+_START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
+"""They follow from the rest, if that is all told."""
+
 _LONGEST = 60
 """Characters of an entry that a refusal shows."""
 
@@ -46,8 +49,8 @@ def identity_of_run(
         "walkers of an ensemble": str(walkers),
         "block_steps": str(settings.block_steps),
         "seed of the ensembles": _seed_in_words(seed),
-        "starting points": hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
-        "coordinates of the walkers": coordinates.digest,
+        _START: hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
+        _COORDINATES: coordinates.digest,
         "version of emcee": version("emcee"),
     }
     for name, value in entries.items():
@@ -67,11 +70,11 @@ def _seed_in_words(seed: Seed) -> str:
 def changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
     """What differs, an entry a string: which, from what, to what."""
     found = []
-    for name in {**now, **before}:
+    differing = [name for name in {**now, **before} if before.get(name) != now.get(name)]
+    for name in [name for name in differing if name not in _CONSEQUENCES] or differing:
         was, has_become = before.get(name), now.get(name)
-        if was != has_become:
-            first = _first_difference(was or "", has_become or "")
-            found.append(f"{name} (was {_shown(was, first)}, now {_shown(has_become, first)})")
+        first = _first_difference(was or "", has_become or "")
+        found.append(f"{name} (was {_shown(was, first)}, now {_shown(has_become, first)})")
     return found
 
 

@@ -32,7 +32,8 @@ class SamplerSettings:
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
-        Every parameter's effective sample size, in the bulk and in the tails, must reach this.
+        Every parameter's effective sample size, in the bulk and in the tails, must reach this, and five for every
+        walker: fewer would mean that walkers have not forgotten where they started.
     max_steps : int
         Steps after which each ensemble stops, converged or not.
     max_seconds : float, optional
