@@ -20,7 +20,7 @@ from scipy import stats
 import tactile_bayes as tb
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import family_named
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.record import CHANNELS

@@ -32,7 +32,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import sample, spawn
 from tactile_bayes.inference.ensembles.diagnosis import walker_major
-from tactile_bayes.inference.families import family_named
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
 

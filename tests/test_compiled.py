@@ -7,7 +7,7 @@ import pytest
 
 from tactile_bayes.compiled import compiler
 from tactile_bayes.contours import Joined, Parabola, ShapeFree
-from tactile_bayes.inference.families import family_named
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import in_frame

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactile_bayes.errors import ContourError, ParameterError
-from tactile_bayes.inference.families import FAMILIES, FLANKS, family_named
+from tactile_bayes.inference.families import FAMILIES, FLANKS
+from tactile_bayes.inference.family_names import family_named
 
 OWN = {"parabola": (0.8,), "circle": (0.7,), "ellipse": (0.9, 0.6), "power-law": (1.2, 2.5)}
 CASES = {name: (*(v for flank in name.split("/") for v in OWN[flank]), 0.3, -0.2) for name in FAMILIES}

@@ -11,7 +11,7 @@ from tactile_bayes.inference.contour import default_priors, infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import family_named
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.inference.random_radius import RandomRadius

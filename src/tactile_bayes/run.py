@@ -16,7 +16,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
-from tactile_bayes.inference.families import family_named
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell

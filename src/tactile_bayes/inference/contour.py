@@ -20,7 +20,8 @@ from tactile_bayes.inference.contour_groups import groups_of, prior_draws
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings, Seed, sample, spawn
-from tactile_bayes.inference.families import Family, Prior, family_named
+from tactile_bayes.inference.families import Family, Prior
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.inference.result import provenance

@@ -13,9 +13,8 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw
-from tactile_bayes.errors import ParameterError
 
-__all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior", "family_named"]
+__all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior"]
 
 _MOST_STEPS = 100
 
@@ -182,33 +181,6 @@ class FlankFamily(Family):
     def _unfold(self, name: str, value: float) -> float:
         low, high = self.bounds[name]
         return float(min(low + np.exp(np.clip(value, -20.0, 20.0)), high))
-
-
-def family_named(name: str) -> Family:
-    """The family of a name.
-
-    Raises
-    ------
-    ParameterError
-        If there is none.
-
-    Examples
-    --------
-    >>> family_named("circle").parameters
-    ('r', 'q', 'x_c')
-    >>> family_named("parabola/power-law").parameters
-    ('left_a', 'right_w', 'right_n', 'q', 'x_c')
-    """
-    if name == "shape-free":
-        from tactile_bayes.inference.shape_free import SHAPE_FREE
-
-        return SHAPE_FREE
-    if name not in FAMILIES:
-        raise ParameterError(
-            f"there is no family {name!r}: choose {', '.join(FLANKS)}, one for each flank, like parabola/power-law, or "
-            "shape-free"
-        )
-    return FAMILIES[name]
 
 
 def parabola_through(x: Floats, y: Floats) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import DriftWarning, InferenceError
-from tactile_bayes.inference.families import family_named
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.record import CHANNELS
