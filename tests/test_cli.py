@@ -210,7 +210,7 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
         (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity beside it: give all three"),
         (["--length", "-1", "--flexural-rigidity", "1"], "the rod's length is -1.0: give a positive number [m]"),
         (["--length", "0.3", "--flexural-rigidity", "1"], "but Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0) w"),
-        (["--family", "blob"], "there is no family 'blob': choose parabola, circle, ellipse, power-law, or"),
+        (["--family", "blob"], "there is no family 'blob': choose parabola, circle, ellipse, power-law, one"),
         (["--probability", "1"], "probability is 1.0: give a number between 0 and 1, like 0.95"),
         (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise as well, above zero, or leave"),
         (["--moment-noise", "0.1"], "force_x is measured too: give --force-noise as well, above zero, or leave both"),

@@ -107,6 +107,7 @@ def integrals(function, stops):
     return found.integral, 2.0 * found.error + 1e-14
 
 
+@pytest.mark.slow
 @every
 def test_the_radius_adds_up_to_the_contour(family, data):
     """ξ' = ρ cos α and η' = ρ sin α, integrated over α wherever ρ is finite.

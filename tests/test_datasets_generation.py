@@ -64,6 +64,7 @@ RIGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "spec",
     [
@@ -228,6 +229,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 def test_numbers_are_drawn_by_their_laws():
     """Those of the load cell decide nothing about reach, so that none is drawn again for their sake."""
     cell = {name: law for name, (law, _) in LAWS.items()}
@@ -305,6 +307,7 @@ FAR = {
 }
 
 
+@pytest.mark.slow
 def test_draws_in_vain_are_counted_with_their_reasons():
     """Against a count of one's own: the same random numbers, judged one by one by scan_many."""
     shares = np.empty((60, 40, 4))  # family, r, q, x_c

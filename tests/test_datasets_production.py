@@ -69,6 +69,7 @@ def many(tmp_path_factory):
 # ---- the same numbers
 
 
+@pytest.mark.slow
 def test_neither_workers_nor_order_change_a_byte(tmp_path):
     for workers in (1, 2):
         assert generate(RICH, tmp_path / str(workers), workers=workers) == tmp_path / str(workers) / "manifest.json"

@@ -24,6 +24,7 @@ def made(request, tmp_path_factory):
     return request.param, folder
 
 
+@pytest.mark.slow
 def test_read_or_made_again_it_is_the_same_to_the_last_bit(made, tmp_path):
     spec, folder = made
     (tmp_path / "spec.toml").write_text(toml_of(spec), encoding="utf-8")

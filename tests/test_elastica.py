@@ -292,6 +292,7 @@ def test_contact_to_wrench_loses_no_digits(states):
         assert max(ratios.values()) <= MOST, (contact, ratios)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("states", CONTACT_REGIONS)
 def test_derivatives_lose_no_digits(states):
     for contact in states:

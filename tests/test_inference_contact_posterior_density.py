@@ -55,6 +55,7 @@ def compare(kind, i, **sum_options):
 
 
 # Ten numbers a sample, normal errors: false alarm 6e-4 a sample.
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "i"), listed(FEW))
 def test_the_posterior_is_that_of_a_sum_over_all_contacts(kind, i):
     compare(kind, i)

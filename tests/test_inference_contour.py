@@ -398,3 +398,18 @@ def test_samples_without_load_tell_where_contact_begins_and_ends():
 def test_what_is_of_another_kind_is_refused(given, words):
     with pytest.raises(ParameterError, match=words):
         infer_contour(measured(), **{"seed": 1, **given})
+
+
+@pytest.mark.slow
+def test_the_way_to_the_optimum_may_lead_where_the_prior_is_nothing():
+    """A stiff rod, close to the least height that the prior allows: searches that stopped there ended far off."""
+    truth = Circle(0.66, 0.313, -0.126)
+    record = scan(truth, drive_angles=np.radians(np.arange(0.0, 200.0, 2.0))).record
+    stiff = record.assign({name: 1.108 * record[name] for name in CHANNELS})
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.03, 0.02, -0.14))
+    priors = {"r": stats.lognorm(s=0.4, scale=0.7), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
+    for seed in range(4):
+        noisy = cell.measure(stiff, seed=seed)
+        result = infer_contour(noisy, family="circle", load_cell=CELL, priors=priors, seed=seed)
+        assert result.attrs["converged"], result.attrs["message"]
+        assert abs(result["posterior"].q.mean() - 0.313) < 0.01

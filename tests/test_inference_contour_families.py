@@ -41,6 +41,7 @@ def test_posteriors_lie_about_the_truth(name):
     assert many.clear.all()
 
 
+@pytest.mark.slow
 def test_contours_that_the_rod_would_cut_after_snap_off_are_not_usable():
     """The same as `scan_many` says, of ellipses of which some are not clear."""
     rng = np.random.default_rng(5)

@@ -41,6 +41,7 @@ def draw_from(log_probability, parameters, *, settings=None, seed=1, scale=2.0, 
     return sample(log_probability, start, names=names, seed=seed, settings=settings, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 @pytest.mark.parametrize("parameters", [2, 5])
 def test_mean_and_sd_of_a_gaussian(parameters, scale):
@@ -60,6 +61,7 @@ def test_mean_and_sd_of_a_gaussian(parameters, scale):
     assert np.all(np.abs((values - mean).var(axis=0) / sd**2 - 1.0) < 4.0 * np.sqrt(2.0 / ess))
 
 
+@pytest.mark.slow
 def test_moments_of_a_truncated_gaussian():
     """A hard wall: moments of scipy's truncated normal within 4 standard errors; false alarm 3e-4."""
     low, high = np.array([0.0, -0.5]), np.array([np.inf, 0.25])
@@ -84,6 +86,7 @@ def test_moments_of_a_truncated_gaussian():
     assert np.all(np.abs(((values - mean) ** 2).mean(axis=0) - sd**2) < 4.0 * np.sqrt((fourth - sd**4) / ess))
 
 
+@pytest.mark.slow
 def test_a_lost_walker_is_noticed():
     """One of 128 sits in a mode of weight e⁻⁵⁰ that it cannot leave: R̂ alone would let it pass."""
 

@@ -191,6 +191,7 @@ def test_a_run_that_has_ended_is_not_made_again(tmp_path):
     assert content(tmp_path) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [30, 35, 57])
 def test_a_run_out_of_steps_goes_on_with_more_of_them(tmp_path, steps):
     few = replace(SMALL, max_steps=steps)

@@ -12,7 +12,7 @@ from tactile_bayes.inference.ensembles.walkers import first_random_state, walkin
 WALKERS = 40
 """Of an ensemble; 5 for each of 8 parameters, and the default has 6."""
 
-CASES = [(2, 1e-6, True), (8, 1.0, False)]
+CASES = [(8, 1.0, False)]
 
 MOVES = {
     "scaled": lambda: [(emcee.moves.DEMove(), 1.0)],
@@ -73,7 +73,7 @@ def moments(target: Gaussian, moves, *, ensembles: int, steps: int, watched: int
 
 @pytest.mark.parametrize(("parameters", "scale", "wall"), CASES)
 def test_the_mix_leaves_a_target_invariant(parameters, scale, wall):
-    """Within 4 standard errors of 32 ensembles: false alarm 4e-4 a number (Student's t), 20 numbers in all."""
+    """Within 4 standard errors of 32 ensembles: false alarm 4e-4 a number (Student's t), 16 numbers."""
     error, standard = moments(Gaussian(parameters, scale, wall=wall), standard_moves, ensembles=32, steps=50)
     assert np.all(standard < 0.05)
     assert np.all(np.abs(error) < 4.0 * standard)

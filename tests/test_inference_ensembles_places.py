@@ -44,6 +44,7 @@ def test_modes_that_no_proposal_crosses_are_told():
     assert "ensembles 0, 3 near x0 = -" in draws.message
 
 
+@pytest.mark.slow
 def test_one_mode_is_one_place():
     draws = run(two_modes, MODES[0], scale=1.0, steps=400)
     assert draws.places == ()

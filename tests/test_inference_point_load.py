@@ -193,6 +193,7 @@ def test_the_sensor_is_integrated_out_exactly():
     assert np.all(np.isneginf(model.log_probability(bad)))
 
 
+@pytest.mark.slow
 def test_known_parameters_are_left_out_and_seeds_count():
     settings = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=20)
     known = {"compliance": RIG["compliance"], "noise_sd": NOISE}

@@ -230,6 +230,7 @@ def interpolation_errors(family, options, count=150, samples=20):
     return error.max(axis=(1, 2)), paths.distance[lanes], 1 - lanes.size / count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["parabola", "circle"])
 def test_what_the_likelihood_interpolates(family):
     """Against exact states over a wide prior, relative to the greatest load of the path. The worst are pivots a few
@@ -245,6 +246,7 @@ def test_what_the_likelihood_interpolates(family):
     assert fine[distance > 0.1].max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_many_lanes_at_once_equal_one_at_a_time(family):
     contour, mirrored = wide(family, 40, 30)

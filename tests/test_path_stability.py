@@ -116,6 +116,7 @@ def test_at_a_corner_the_lowest_eigenvalue_jumps_below_zero(contour, base, befor
         assert np.all(found[:, 1] > FAR)
 
 
+@pytest.mark.slow
 def test_at_the_vertex_of_profile_four():
     """It falls to zero like the distance x from the vertex, where the radius 1/(12 x²) grows beyond all bounds: there
     the form is that of a rod which cannot turn at its contact, with a half wave from pivot to contact.

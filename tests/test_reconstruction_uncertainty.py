@@ -311,6 +311,7 @@ def test_a_weak_load_is_nonlinear(method):
     assert strong.status.item() == ("ok" if method == "raw" else "does not fit")  # the four numbers are arbitrary
 
 
+@pytest.mark.slow
 def test_samples_near_the_edge_are_at_the_edge(swept):
     """About the change from tip to tangential contact, and nowhere else."""
     record = in_contact(swept)

@@ -159,6 +159,7 @@ def test_a_grid_after_a_snap_off_that_is_not_clear_is_refused():
     np.testing.assert_array_equal(record.drive_angle, [1.0])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(
     st.sampled_from(["I", "II", "III", "IV"]),

@@ -164,6 +164,7 @@ def test_all_contacts_of_a_draw_lie_on_its_contour():
     np.testing.assert_allclose(found.slope_angle, slope, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_contact_begins_and_ends_with_the_events_of_the_same_draw():
     tree = implied_contacts(posterior())
     events = posterior()["events"].to_dataset()

@@ -220,6 +220,8 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
     for head in heads:
         table.add_column(head, justify="left" if head in ("quantity", "unit") else "right")
     for name in numbers.quantity.values:
+        if name.startswith("z_"):  # a direction of a random function, which says nothing by itself
+            continue
         row: Any = numbers.sel(quantity=name)
         digits = _digits(float(row["upper"] - row["lower"]))
         shown = [f"{float(row[column]):.{digits}f}" for column in ("median", "lower", "upper")]
