@@ -332,6 +332,7 @@ def test_defaults_that_are_written_out_are_no_other_data_set(tmp_path):
     assert hashes(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_run_that_made_nothing_stands_in_nobodys_way(tmp_path):
     """Nor do shards that its manifest did not come to state."""
     wrong = changed(PLAIN, contours=[{"family": "parabola", "a": 1.0, "q": -0.5}])

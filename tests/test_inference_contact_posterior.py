@@ -80,6 +80,7 @@ def test_emcee_and_importance_sampling_agree(i, k, walked):
             assert abs(float(one[name].mean() - other[name].mean())) < 4.0 * error, name
 
 
+@pytest.mark.slow
 def test_chains_of_emcee_agree(walked):
     for k in (1, 2, 3):
         for name in NAMES:
@@ -102,6 +103,7 @@ def test_chains_of_importance_sampling_agree_where_one_phase_is_certain(contacts
 # --- Small errors -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle_noise", [0.0, 5e-4])
 def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(angle_noise):
     """Mean, standard deviation and correlation within 4.5 standard errors of 4000 draws, and 1 % for curvature."""

@@ -243,6 +243,7 @@ def test_moment_only_in_brief():
     assert float(result["posterior"].noise_scale.max()) < 3.0
 
 
+@pytest.mark.slow
 def test_several_pivots():
     record = coarse(bases=((0.0, 0.0), (0.3, 0.1)))
     result = infer_as_stated(record, seed=1, settings=BRIEF)

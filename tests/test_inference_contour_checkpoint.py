@@ -29,6 +29,7 @@ def test_a_run_that_goes_on_gives_the_draws_of_one_that_was_not_stopped(tmp_path
             np.testing.assert_array_equal(rest[group][name].values, values.values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [

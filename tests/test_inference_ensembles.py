@@ -182,6 +182,7 @@ def test_a_run_out_of_time_says_so():
     assert draws.steps_run == 50  # a block
 
 
+@pytest.mark.slow
 def test_separated_modes_are_not_declared_converged():
     def log_probability(x):
         return np.logaddexp(-0.5 * (x[:, 0] + 50.0) ** 2, -0.5 * (x[:, 0] - 50.0) ** 2)

@@ -179,6 +179,7 @@ def test_processes_that_are_killed_at_random_moments_end_as_one_that_is_not(tmp_
     assert_same(draw(folder), draw())
 
 
+@pytest.mark.slow
 def test_a_run_that_has_ended_is_not_made_again(tmp_path):
     first = draw(tmp_path, settings=STEADY)
     assert first.converged
@@ -382,6 +383,7 @@ def test_a_lost_description_is_refused(begun):
     refuse(begun, "holds 'block-00000000-00000010.npz' and no checkpoint.json")
 
 
+@pytest.mark.slow
 def test_a_gap_is_refused_and_its_remedy_works(tmp_path):
     draw(tmp_path)
     (tmp_path / "block-00000030-00000040.npz").unlink()

@@ -236,6 +236,7 @@ def shot_at(scene, paths, angle, states, k):
     raise AssertionError("no shot hit an equilibrium on the path")
 
 
+@pytest.mark.slow
 @settings(FEW, max_examples=8)
 @given(scenes(), st.floats(0.05, 0.6), st.floats(0.02, 0.98))
 def test_against_shooting_with_friction(scene, friction, share):

@@ -241,6 +241,7 @@ def test_the_misfit_tells_of_a_rod_that_is_stiffer_than_stated():
 # --- Constrained against raw --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", ["tip", "tangential"])
 @pytest.mark.parametrize(("profile", "q"), [("II", 0.6), ("II", 0.5), ("III", 0.5)])
 def test_the_constrained_contact_is_nearer_to_the_true_one(profile, q, phase):
