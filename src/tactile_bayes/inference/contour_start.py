@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit, fitted_noise, optimum_of
-from tactile_bayes.inference.ensembles import Coordinates, Plain, SamplerSettings, in_coordinates, scatter_walkers
+from tactile_bayes.inference.ensembles import Coordinates, Logarithms, SamplerSettings, in_coordinates, scatter_walkers
+from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free import ShapeFreeFamily
 from tactile_bayes.inference.start import gather
 from tactile_bayes.inference.whitening import whitening_at
@@ -37,7 +38,8 @@ def walk_of(model: ContourModel, seed: np.random.SeedSequence, settings: Sampler
     rng = np.random.default_rng(seed)
     if isinstance(model.family, ShapeFreeFamily):
         return _whitened(model, seed, rng, settings)
-    return Walk(_scattered(model, seed, rng, settings), Plain())
+    coordinates = Logarithms((model.low == 0.0) & ~np.isin(model.names, MAY_VANISH))
+    return Walk(coordinates.of(_scattered(model, seed, rng, settings)), coordinates)
 
 
 def _whitened(

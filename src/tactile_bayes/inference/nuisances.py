@@ -20,12 +20,15 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import present_channels, rod_of
 from tactile_bayes.rod import Rod
 
-__all__ = ["STANDARD", "Nuisances", "nuisances_of"]
+__all__ = ["MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 
 Floats = NDArray[np.float64]
 
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias")
 """What is inferred unless something else is asked for."""
+
+MAY_VANISH = ("friction", "suspension_compliance")
+"""What is not negative, and likely none."""
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}

@@ -20,7 +20,7 @@ the walkers and the states of their random numbers, so that a run that was kille
 not.
 """
 
-from tactile_bayes.inference.ensembles.coordinates import Coordinates, Plain, in_coordinates
+from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithms, Plain, in_coordinates
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.places import Place
@@ -31,6 +31,7 @@ from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, spa
 __all__ = [
     "Coordinates",
     "Draws",
+    "Logarithms",
     "Place",
     "Plain",
     "Progress",

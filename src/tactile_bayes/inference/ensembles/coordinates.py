@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tactile_bayes.inference.ensembles.moves import standard_moves
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["Coordinates", "Plain", "in_coordinates"]
+__all__ = ["Coordinates", "Logarithms", "Plain", "in_coordinates"]
 
 Floats = NDArray[np.float64]
 
@@ -32,13 +32,35 @@ class Coordinates(Protocol):
 class Plain:
     """The parameters themselves."""
 
-    digest = "the parameters"
+    digest: str = "the parameters"
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         return coordinates, np.zeros(len(coordinates))
 
     def moves(self) -> list[tuple[Any, float]]:
         return standard_moves()
+
+
+class Logarithms(Plain):
+    """The logarithms of some parameters, which are positive, and the others themselves.
+
+    Where a record tells a ratio of powers of two sizes, and hardly the sizes, their logarithms lie along a line.
+    """
+
+    def __init__(self, positive: NDArray[np.bool_]) -> None:
+        self._positive = positive
+        self.digest = f"logarithms of parameters {', '.join(map(str, np.flatnonzero(positive)))}"
+
+    def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        points = coordinates.copy()
+        points[:, self._positive] = np.exp(coordinates[:, self._positive])
+        return points, np.sum(coordinates[:, self._positive], axis=1)
+
+    def of(self, points: Floats) -> Floats:
+        """Coordinates of points, shape (..., parameters)."""
+        coordinates = points.copy()
+        coordinates[..., self._positive] = np.log(points[..., self._positive])
+        return coordinates
 
 
 def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) -> LogProbability:
