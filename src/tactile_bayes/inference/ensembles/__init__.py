@@ -15,6 +15,8 @@ Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11): the difference of two other
 shape there is, and now and then unscaled, which lets a walker jump between separated modes. The snooker proposal of
 emcee 3.1.6 does not leave the target invariant and is not used.
 
+Walkers may walk in other coordinates than the parameters, which then are what is judged and returned.
+
 With a checkpoint, every block of steps is on disk before the next begins. A block's file holds the last positions of
 the walkers and the states of their random numbers, so that a run that was killed makes the same draws as one that was
 not.
