@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from tactile_bayes import chebyshev
 from tactile_bayes.contours.base import (
-    Contour,
     Floats,
-    Index,
     Locus,
     Parameter,
     as_parameter,
@@ -23,6 +20,7 @@ from tactile_bayes.contours.base import (
     finite,
     refuse_unless,
 )
+from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
 
 __all__ = ["ShapeFree"]
@@ -35,7 +33,7 @@ _ORDER = 32
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeFree(Contour):
+class ShapeFree(Tabled):
     """Any strictly convex contour whose curvature is finite: log ρ(α) is a cubic spline, and one point is known.
 
     The contour follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle. It is
@@ -64,6 +62,8 @@ class ShapeFree(Contour):
     >>> circle.point(1.0)[0].round(12), np.sin(1.0).round(12)
     (np.float64(0.841470984808), np.float64(0.841470984808))
     """
+
+    _by_contour: ClassVar = ("log_radius", "x", "y", "_row")
 
     slope_angles: Floats
     log_radius: Floats
@@ -151,19 +151,3 @@ class ShapeFree(Contour):
         alpha = np.asarray(slope_angle, dtype=float)
         with np.errstate(invalid="ignore"):
             return np.where((alpha >= self.slope_angles[0]) & (alpha <= self.slope_angles[-1]), alpha, np.nan)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return np.shape(self.x)
-
-    def broadcast_to(self, shape: tuple[int, ...]) -> ShapeFree:
-        return self._each(lambda value: np.broadcast_to(value, (*shape, *value.shape[len(self.shape) :])))
-
-    def take(self, index: Index) -> ShapeFree:
-        return self._each(lambda value: value[index])
-
-    def _each(self, change: Callable[[Floats], Floats]) -> ShapeFree:
-        other = object.__new__(type(self))  # the table stays one for all
-        other.__dict__.update(self.__dict__)
-        other.__dict__.update((name, change(self.__dict__[name])) for name in ("log_radius", "x", "y", "_row"))
-        return other

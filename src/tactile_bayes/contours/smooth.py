@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes import chebyshev
 from tactile_bayes.contours.base import (
-    Contour,
     Floats,
     Index,
     Locus,
@@ -24,6 +22,7 @@ from tactile_bayes.contours.base import (
     refuse_unless,
 )
 from tactile_bayes.contours.halves import TABLE, Half, Halves
+from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
 from tactile_bayes.roots import falling_root
 
@@ -38,7 +37,7 @@ _CELLS = 128
 
 
 @dataclass(frozen=True, eq=False)
-class Smooth(Contour):
+class Smooth(Tabled):
     """Any smooth, strictly convex contour between vertical ends: log ρ(α) is a polynomial, and the vertex is known.
 
     The contour follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle. It is
@@ -66,6 +65,8 @@ class Smooth(Contour):
     >>> circle.point(1.0)[0].round(12), np.sin(1.0).round(12)
     (np.float64(0.841470984808), np.float64(0.841470984808))
     """
+
+    _by_contour: ClassVar = ("log_radius", "q", "x_c", "_row")
 
     log_radius: Floats
     q: Parameter
@@ -147,22 +148,6 @@ class Smooth(Contour):
         way = first + falling_root(short_of, np.zeros(there.size), np.ones(there.size))
         found[there] = way * (2.0 * _UPRIGHT / _CELLS) - _UPRIGHT
         return found.reshape(shape)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return np.shape(self.q)
-
-    def broadcast_to(self, shape: tuple[int, ...]) -> Smooth:
-        return self._each(lambda value: np.broadcast_to(value, (*shape, *value.shape[len(self.shape) :])))
-
-    def take(self, index: Index) -> Smooth:
-        return self._each(lambda value: value[index])
-
-    def _each(self, change: Callable[[Floats], Floats]) -> Smooth:
-        other = object.__new__(type(self))  # the tables stay one for all
-        other.__dict__.update(self.__dict__)
-        other.__dict__.update((name, change(self.__dict__[name])) for name in ("log_radius", "q", "x_c", "_row"))
-        return other
 
 
 def _tabulated(coefficients: Floats) -> Floats:

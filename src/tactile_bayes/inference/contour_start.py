@@ -84,20 +84,19 @@ def _scattered(
     size = len(model.located)
     optimum = optimum_of(model, rng)
 
-    def with_logarithms(points: Floats) -> Floats:
-        return np.concatenate([points[:, :size], np.exp(points[:, size:])], axis=1)
+    with_noise_in_logarithms = Logarithms(np.arange(len(model.names)) >= size)
 
-    def without_logarithms(point: Floats) -> Floats:
-        return np.append(point[:size], np.log(point[size:]))
+    def parameters(coordinates: Floats) -> Floats:
+        return with_noise_in_logarithms.parameters(coordinates)[0]
 
-    def log_probability(points: Floats) -> Floats:
-        return model.log_probability(with_logarithms(points))
+    def log_probability(coordinates: Floats) -> Floats:
+        return model.log_probability(parameters(coordinates))
 
-    cloud = gather(log_probability, without_logarithms(optimum.point), optimum.covariance, rng)
+    cloud = gather(log_probability, with_noise_in_logarithms.of(optimum.point), optimum.covariance, rng)
     try:
         return scatter_walkers(
             lambda points: np.where(model.log_probability(points) > cloud.floor, 0.0, -np.inf),
-            lambda rng, count: with_logarithms(cloud.draw(rng, count)),
+            lambda rng, count: parameters(cloud.draw(rng, count)),
             parameters=len(model.names),
             seed=seed,
             settings=settings,
