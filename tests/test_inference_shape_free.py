@@ -15,7 +15,7 @@ from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.inference.random_radius import RandomRadius
-from tactile_bayes.inference.whitening import whitening_at
+from tactile_bayes.inference.shape_free_optimum import whitening_at
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
@@ -23,7 +23,7 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.record_check import check_record
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
-RADIUS = RandomRadius(shortest=0.15, longest=4.0, typical=0.4, tolerance=0.01)
+RADIUS = RandomRadius(shortest=0.4, longest=4.0, tolerance=0.01)
 
 
 def matern(distance, length, nu=2.5):
@@ -46,9 +46,9 @@ def test_directions_add_up_to_the_covariance_less_its_means(length):
 
 
 def test_their_number_follows_from_the_tolerance():
-    counts = [RandomRadius(0.15, 4.0, 0.4, tolerance).count for tolerance in (0.1, 0.01, 0.001)]
+    counts = [RandomRadius(0.4, 4.0, tolerance).count for tolerance in (0.1, 0.01, 0.001)]
     assert counts == sorted(set(counts))
-    assert RandomRadius(0.15, 4.0, 0.8, 0.01).count < RADIUS.count
+    assert RandomRadius(0.8, 4.0, 0.01).count < RADIUS.count
 
 
 def test_the_radius_is_a_geometric_mean():
@@ -88,7 +88,7 @@ def test_a_volume_grows_as_the_whitening_says(rod):
     model = model_of(rod=rod, cell=LoadCell(force_noise=0.05 * unit[0], moment_noise=0.02 * unit[1]))
     whitening = whitened(model)
     rng = np.random.default_rng(2)
-    point = np.append(np.log(whitening.at) + 0.2 * rng.normal(size=3), rng.normal(size=whitening.middle.size))
+    point = np.append(np.log(whitening.scales) + 0.2 * rng.normal(size=3), rng.normal(size=whitening.middle.size - 3))
     steps = 1e-5 * np.eye(point.size)
     ahead, behind = (whitening.parameters(point + sign * steps)[0] for sign in (1.0, -1.0))
     sign, determinant = np.linalg.slogdet((ahead - behind) / 2e-5)
@@ -100,8 +100,8 @@ def test_in_its_coordinates_the_posterior_is_nearly_standard_normal():
     """At one noise, amplitude and length scale: what is left of the log-probability varies by less than 1."""
     model = model_of()
     whitening = whitened(model)
-    normal = np.random.default_rng(3).normal(size=(200, whitening.middle.size))
-    points, growth = whitening.parameters(np.hstack([np.tile(np.log(whitening.at), (200, 1)), normal]))
+    normal = np.random.default_rng(3).normal(size=(200, whitening.middle.size - whitening.bent))
+    points, growth = whitening.parameters(np.hstack([np.tile(np.log(whitening.scales), (200, 1)), normal]))
     left = model.log_probability(points) + growth + 0.5 * np.sum(normal**2, axis=1)
     assert np.std(left) < 1.0
 

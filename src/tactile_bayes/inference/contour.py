@@ -128,9 +128,9 @@ def infer_contour(
     from 1.1 to 50. Shape-free contours have a radius of curvature whose logarithm is a random function of the slope
     angle: r, its geometric mean from −π/2 to π/2, log-normal like a circle's; amplitude, by how much the logarithm goes
     up and down, log-normal around 0.7, standard deviation 0.6 of the logarithm; length_scale, the angle in which it
-    does so [rad], log-normal around 0.7, standard deviation 0.35 of the logarithm, from 0.15 to 4 (Matérn's covariance,
-    ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at a length scale that is
-    shorter in 1 of 20 contours. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale:
+    does so [rad], log-normal around 0.7, standard deviation 0.4 of the logarithm, from 0.15 to 4 (Matérn's covariance,
+    ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at the shortest length
+    scale. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale:
     log-normal around 1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L
     and EI/L². Of the nuisances: rigidity_scale log-normal around 1 with 5 %,
     drive_angle_offset normal with 1°, biases and drifts normal with 0.1 EI/L and EI/L² (a bias of which the load cell

@@ -51,6 +51,11 @@ class ContourModel:
         bounds = [family.bounds.get(name, anything) for name in family.parameters]
         bounds += [nuisances.bounds(name) for name in nuisances.names]
         self.low, self.high = np.array([*bounds, *[(0.0, np.inf)] * len(noise.names)]).T
+        # Parameters that share a prior are asked for at once: a call takes longer than many numbers.
+        columns: dict[int, list[int]] = {}
+        for i, name in enumerate(self.names):
+            columns.setdefault(id(priors[name]), []).append(i)
+        self._columns = [(priors[self.names[which[0]]], which) for which in columns.values()]
         rubs = bool(nuisances.friction) or "friction" in nuisances.names
         self.likelihood = RecordLikelihood(
             measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
@@ -93,9 +98,11 @@ class ContourModel:
         return scale
 
     def log_prior(self, points: Floats) -> Floats:
-        logs = [self.priors[name].logpdf(points[:, i]) for i, name in enumerate(self.names)]
-        possible = ((points > self.low) & (points < self.high)).all(axis=1)
-        return np.where(possible, np.sum(logs, axis=0), -np.inf)
+        values = np.zeros(len(points))
+        for prior, columns in self._columns:
+            values += prior.logpdf(points[:, columns]).sum(axis=1)
+        values[~((points > self.low) & (points < self.high)).all(axis=1)] = -np.inf
+        return values
 
     def log_probability(self, points: Floats) -> Floats:
         """Up to the prior's normalisation over contours within reach; −inf outside its support or reach."""

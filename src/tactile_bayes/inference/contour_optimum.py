@@ -88,7 +88,8 @@ def contact_fit(model: ContourModel) -> Floats | None:
     )
     force = np.hypot(model.measured.force_x.values, model.measured.force_y.values)
     firm = (contacts.status.values == "ok") & (force > 0.1 * force.max())
-    if np.count_nonzero(firm) < 2 * len(model.family.parameters):
+    said = len(model.family.parameters) - len(model.family.roughness)
+    if np.count_nonzero(firm) < 2 * said:
         return None
     length = model.likelihood.rod.length
     values = model.family.fit(contacts.contact_x.values[firm] / length, contacts.contact_y.values[firm] / length)

@@ -14,12 +14,16 @@ from tactile_bayes.inference.contour_optimum import contact_fit, fitted_noise, o
 from tactile_bayes.inference.ensembles import Coordinates, Logarithms, SamplerSettings, in_coordinates, scatter_walkers
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free import ShapeFreeFamily
+from tactile_bayes.inference.shape_free_optimum import whitening_at
 from tactile_bayes.inference.start import gather
-from tactile_bayes.inference.whitening import whitening_at
 
 __all__ = ["Walk", "walk_of"]
 
 Floats = NDArray[np.float64]
+
+_OF_ROUGHNESS, _OF_NOISE, _OF_REST = 0.3, 0.1, 0.7
+"""Standard deviations, half those of the walkers, of the logarithms of amplitude, length scale and noise, and of
+coordinates whose posterior is nearly standard normal: wider in all of those at once is far out."""
 
 _POOR = 2.0
 """Mean square of what is left of a record, over its own roughness, from which on a search is worth its time."""
@@ -57,9 +61,9 @@ def _whitened(
         if whitening is None or _misfit(model, other.centre) < _misfit(model, whitening.centre):
             whitening = other
     log_probability = in_coordinates(model.log_probability, whitening)
-    bent = [np.std(np.log(model.priors[name].rvs(400, random_state=rng))) for name in ("amplitude", "length_scale")]
-    spread = [*bent, *[0.1] * len(model.noise.names), *np.ones(whitening.middle.size)]
-    cloud = gather(log_probability, whitening.middle_of_coordinates, np.diag(np.square(spread)), rng)
+    spread = np.full(whitening.middle.size, _OF_REST)
+    spread[: whitening.bent] = [_OF_ROUGHNESS] * 2 + [_OF_NOISE] * len(model.noise.names)
+    cloud = gather(log_probability, whitening.middle, np.diag(np.square(spread)), rng)
     count = len(spread)
     start = scatter_walkers(
         lambda points: np.where(log_probability(points) > cloud.floor, 0.0, -np.inf),

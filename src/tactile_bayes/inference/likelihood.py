@@ -140,6 +140,24 @@ class RecordLikelihood:
             exact_events=exact_events,
         )
 
+    def snap_offs(self, contours: Contour, rig: Rig | None = None) -> Floats:
+        """Drive angles at which contact ends, as read and as seen in forward sweeps, shape (n, strokes)."""
+        rig = self._rig_of(rig, contours.shape[0])
+        signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
+        ends = self.paths(contours, rig).snap_angle.reshape(len(self.strokes), -1).T
+        return np.asarray(ends + signs * rig.drive_angle_offset[:, None])
+
+    def snap_offs_between(self, loaded: NDArray[np.bool_]) -> Floats:
+        """Last drive angle with a load, and the next without, seen likewise, shape (strokes, 2); NaN without one."""
+        between = np.full((len(self.strokes), 2), np.nan)
+        for k, (stroke, angles) in enumerate(zip(self.strokes, self._angles, strict=True)):
+            own, is_loaded = angles[: stroke.samples.size], loaded[stroke.samples]
+            last = own[is_loaded].max(initial=-np.inf)
+            after = own[~is_loaded & (own > last)]
+            if is_loaded.any() and after.size:
+                between[k] = last, after.min()
+        return between
+
     def usable(self, contours: Contour, rig: Rig | None = None) -> NDArray[np.bool_]:
         """Contours that every stroke can reach, and that the rod is past after snap-off, shape (n,)."""
         return self._usable(self.paths(contours, rig), contours.shape[0])

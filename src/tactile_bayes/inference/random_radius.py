@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from tactile_bayes.contours import Smooth
 
-__all__ = ["Directions", "RandomRadius", "directions"]
+__all__ = ["Directions", "RandomRadius"]
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _PLACES = 200
 _LARGEST = 25.0
 """Logarithm of radii that no prior comes near."""
 
-_LENGTHS = 40
+_LENGTHS = 64
 """Length scales for which that is done, others being interpolated."""
 
 
@@ -50,24 +50,26 @@ class RandomRadius:
     shortest, longest : float
         Length scales between which g is known [rad].
     tolerance : float
-        Share of the variance of g that may be left out at the length scale `typical`; the number of directions follows.
-    typical : float
-        Length scale [rad].
+        Share of the variance of g that may be left out at the shortest length scale; the number of directions follows.
     nodes : int
         Values by which a contour is given.
     """
 
     shortest: float
     longest: float
-    typical: float
     tolerance: float
-    nodes: int = 40
+    nodes: int = 64
 
     @property
     def count(self) -> int:
         """Number of directions."""
-        share = np.cumsum(_spectrum(self.typical)[0])
+        share = np.cumsum(_spectrum(self.shortest)[0])
         return int(np.searchsorted(share / share[-1], 1.0 - self.tolerance)) + 1
+
+    @property
+    def directions(self) -> Directions:
+        """In which the process is cut, at length scales from the shortest to the longest."""
+        return _directions(self.shortest, self.longest, self.count, self.nodes)
 
     def log_radius(self, log_r: Floats, amplitude: Floats, length: Floats, weights: Floats) -> Floats:
         """At the nodes, shape (n, nodes), from arrays of shape (n,) and standard normal weights (n, directions)."""
@@ -100,7 +102,7 @@ def _spectrum(length: float) -> tuple[Floats, Floats]:
 
 
 @functools.lru_cache(maxsize=8)
-def directions(shortest: float, longest: float, count: int, nodes: int) -> Directions:
+def _directions(shortest: float, longest: float, count: int, nodes: int) -> Directions:
     """The first directions for many length scales."""
     places, at = _places(), Smooth.nodes(nodes)
     log_lengths = np.linspace(np.log(shortest), np.log(longest), _LENGTHS)
@@ -124,5 +126,5 @@ def directions(shortest: float, longest: float, count: int, nodes: int) -> Direc
 
 @functools.lru_cache(maxsize=8)
 def _spline(shortest: float, longest: float, count: int, nodes: int) -> CubicSpline:
-    known = directions(shortest, longest, count, nodes)
+    known = _directions(shortest, longest, count, nodes)
     return CubicSpline(known.log_lengths, known.values)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
+from scipy.optimize import least_squares
 
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.inference.families import Family, Prior, parabola_through
@@ -18,10 +19,15 @@ __all__ = ["SHAPE_FREE", "ShapeFreeFamily"]
 
 Floats = NDArray[np.float64]
 
-_AMPLITUDE, _LENGTH = stats.lognorm(s=0.6, scale=0.7), stats.lognorm(s=0.35, scale=0.7)
+_AMPLITUDE, _LENGTH = stats.lognorm(s=0.6, scale=0.7), stats.lognorm(s=0.4, scale=0.7)
 """Priors of the standard deviation of log ρ, and of the length over which it changes [rad]."""
 
-_RADIUS = RandomRadius(shortest=0.15, longest=4.0, typical=float(_LENGTH.ppf(0.05)), tolerance=0.01)
+_RADIUS = RandomRadius(shortest=0.15, longest=4.0, tolerance=0.01)
+
+_SCATTER, _BRAVE = 0.01, 2.0
+"""Of points to be fitted, in rod lengths, as a first guess; and from how many times that on they pull less."""
+
+_STEP = 1e-5
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,8 @@ class ShapeFreeFamily(Family):
         return Smooth(log_radius, q=q, x_c=x_c)
 
     def _own_priors(self, length: float) -> dict[str, Prior]:
-        weights = {f"z_{k + 1}": stats.norm() for k in range(self.radius.count)}
+        standard = stats.norm()
+        weights = {f"z_{k + 1}": standard for k in range(self.radius.count)}
         return {
             "r": stats.lognorm(s=1.0, scale=0.5 * length),
             "amplitude": _AMPLITUDE,
@@ -74,11 +81,41 @@ class ShapeFreeFamily(Family):
         }
 
     def fit(self, x: Floats, y: Floats) -> dict[str, float]:
-        """Those of a circle that is as bent as the points."""
+        """From a circle that is as bent as the points, by distances along the normal and the directions' prior."""
         a, q, x_c = parabola_through(x, y)
-        weights = {f"z_{k + 1}": 0.0 for k in range(self.radius.count)}
-        middle = {"amplitude": float(_AMPLITUDE.median()), "length_scale": float(_LENGTH.median())}
-        return {"r": 0.5 / a, **middle, **weights, "q": q, "x_c": x_c}
+        middle = np.array([np.log(0.5 / a), *np.zeros(self.radius.count), q, x_c])
+        amplitude, length = float(_AMPLITUDE.ppf(0.9)), float(_LENGTH.median())
+
+        def residuals(points: Floats, scatter: float) -> Floats:
+            """Of points (n, d): (n, points + d)."""
+            ones = np.ones(len(points))
+            contours = self.build(np.exp(points[:, 0]), amplitude * ones, length * ones, *points[:, 1:].T)
+            return np.hstack([_distances(contours, x, y) / scatter, points - middle])
+
+        def of_one(point: Floats, scatter: float) -> Floats:
+            return np.asarray(residuals(point[None], scatter)[0])
+
+        def jacobian(point: Floats, scatter: float) -> Floats:
+            moved = residuals(point + _STEP * np.vstack([np.eye(point.size), -np.eye(point.size)]), scatter)
+            return (moved[: point.size] - moved[point.size :]).T / (2.0 * _STEP)
+
+        point, scatter = middle, _SCATTER
+        for _ in range(2):
+            found = least_squares(of_one, point, jacobian, loss="soft_l1", f_scale=_BRAVE, args=(scatter,), max_nfev=40)
+            point = found.x
+            left = residuals(point[None], 1.0)[0, : x.size]
+            scatter = max(1.4826 * float(np.median(np.abs(left))), 0.1 * _SCATTER)
+        weights = {f"z_{k + 1}": float(z) for k, z in enumerate(point[1:-2])}
+        sizes = {"r": float(np.exp(point[0])), "amplitude": amplitude, "length_scale": length}
+        return {**sizes, **weights, "q": float(point[-2]), "x_c": float(point[-1])}
+
+
+def _distances(contours: Contour, x: Floats, y: Floats) -> Floats:
+    """Of points from contours, along the normal where they are above or below them, shape (n, points)."""
+    left, right = (contours.locate(end).x for end in contours.domain)
+    margin = 1e-9 * (right - left)
+    at = contours.locate(contours.parameter_of_x(np.clip(x[:, None], left + margin, right - margin)))
+    return ((y[:, None] - at.y) * np.cos(at.slope_angle) - (x[:, None] - at.x) * np.sin(at.slope_angle)).T
 
 
 SHAPE_FREE = ShapeFreeFamily("shape-free", _RADIUS)

@@ -16,6 +16,7 @@ from tactile_bayes.load_cell.correction import corrected
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance
 from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.load_cell.left_out import log_density_left_out
 from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_likelihood
 from tactile_bayes.load_cell.measurement import measured, stated_entries
 from tactile_bayes.load_cell.surprise import surprise
@@ -403,6 +404,43 @@ class LoadCell(DataSheet):
         array([2.8681, 2.9931])
         """
         return log_likelihood(self, measured, predicted, noise_scale, pointwise)
+
+    def log_density_left_out(
+        self, measured: ArrayLike, predicted: ArrayLike, *, noise_scale: ArrayLike = 1.0
+    ) -> Floats:
+        """Log-density of each sample given all the others: what leave-one-out cross-validation asks for.
+
+        The channels of a sample are taken together. Independent samples know nothing of one another, and this is the
+        pointwise `log_likelihood`; of drift and an unknown bias the samples before and after tell, exactly.
+
+        Parameters
+        ----------
+        measured : array, shape (n_samples, 3)
+            As in `log_likelihood`.
+        predicted : array, shape (..., n_samples, 3)
+            As in `log_likelihood`.
+        noise_scale : array, broadcastable to shape (..., 3)
+            As in `log_likelihood`.
+
+        Returns
+        -------
+        array, shape (..., n_samples)
+            Normalised; 0 where every channel is missing. They do not sum to the log-likelihood where samples know of
+            one another.
+
+        Raises
+        ------
+        ParameterError
+            As in `log_likelihood`.
+
+        Examples
+        --------
+        >>> cell = LoadCell(moment_noise=0.02, bias_uncertainty=(1.0, 0.0, 0.0))
+        >>> moment_only = [[0.5, np.nan, np.nan], [0.5, np.nan, np.nan], [0.6, np.nan, np.nan]]
+        >>> cell.log_density_left_out(moment_only, np.zeros((3, 3))).round(1)  # the last is off by 0.1
+        array([ 0.7,  0.7, -5.6])
+        """
+        return log_density_left_out(self, measured, predicted, noise_scale)
 
 
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:

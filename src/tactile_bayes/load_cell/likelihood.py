@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +13,12 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["approximations", "checked_noise_scale", "log_likelihood", "refuse_silent"]
+__all__ = ["approximations", "checked_noise_scale", "filtered", "given_before", "log_likelihood", "refuse_silent"]
 
 Floats = NDArray[np.float64]
+
+Given = Callable[[Floats, Floats, Floats, float, Floats, Floats], tuple[Floats, Floats]]
+"""What is new in each sample given others, and its variance, as `given_before`."""
 
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -29,9 +33,15 @@ _AT_LIMIT = 1e-9
 
 
 def log_likelihood(
-    sheet: DataSheet, measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike = 1.0, pointwise: bool = False
+    sheet: DataSheet,
+    measured: ArrayLike,
+    predicted: ArrayLike,
+    noise_scale: ArrayLike = 1.0,
+    pointwise: bool = False,
+    given: Given | None = None,
 ) -> Floats:
-    """Log-density of readings; see `LoadCell.log_likelihood`."""
+    """Log-density of readings; see `LoadCell.log_likelihood`. Samples that know of others are `given` those before."""
+    given = given or given_before
     readings, loads, scale = _checked(measured, predicted, noise_scale)
     present = _present(sheet, readings)
     if not present.size:
@@ -54,9 +64,9 @@ def log_likelihood(
         _refuse_inexact(sheet, readings, step, limit, present, wanders, correlated)
         steps = step**2 / 12.0
         if not correlated:
-            by_sample = _wandering(sheet, readings - expected, deviation**2 + steps, present)
+            by_sample = _wandering(sheet, readings - expected, deviation**2 + steps, present, given)
         elif wanders:
-            by_sample = _wandering_together(sheet, readings - expected, deviation, steps, present, correlation)
+            by_sample = _wandering_together(sheet, readings - expected, deviation, steps, present, correlation, given)
         else:
             by_sample = _correlated(readings - expected, deviation, steps, correlation)
     elif outliers or np.any(step) or np.any(np.isfinite(limit)):
@@ -206,22 +216,13 @@ def _wandering_sizes(sheet: DataSheet) -> Floats:
     return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
 
 
-def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: NDArray[np.intp]) -> Floats:
-    """Log-density of each sample given those before it, the noise of the channels being independent."""
+def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: NDArray[np.intp], given: Given) -> Floats:
+    """Log-density of each sample given others, the noise of the channels being independent."""
     bias = np.array(sheet.bias_uncertainty)[present] ** 2
     if sheet.drift is None:
-        return _normal(*_filtered(residual, noise, bias, 1.0, np.zeros_like(bias)))
+        return _normal(*given(residual, noise, np.zeros_like(bias), 1.0, np.zeros_like(bias), bias))
     drift = sheet.drift.sizes[present] ** 2
-    first, kept, step = sheet.drift.first * drift, sheet.drift.kept, sheet.drift.step * drift
-    if kept == 1.0 or not np.any(bias):
-        return _normal(*_filtered(residual, noise, bias + first, kept, step))
-    # A bias beside a drift that forgets is regressed on: what the filter makes of 1 in every sample, it has that often.
-    residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-    (new, of_one), total = _filtered(np.stack([residual, ones]), noise, first, kept, step)
-    with np.errstate(divide="ignore"):
-        known = 1.0 / bias + _sum_before(of_one**2 / total)
-    new = new - of_one * _sum_before(of_one * new / total) / known
-    return _normal(new, total + of_one**2 / known)
+    return _normal(*given(residual, noise, sheet.drift.first * drift, sheet.drift.kept, sheet.drift.step * drift, bias))
 
 
 def _wandering_together(
@@ -231,6 +232,7 @@ def _wandering_together(
     steps: Floats,
     present: NDArray[np.intp],
     correlation: Floats,
+    given: Given,
 ) -> Floats:
     """The same for noise that is correlated between the channels, and the same in all samples."""
     # Coordinates in which white noise is one, and the wandering of each is independent of the others'.
@@ -243,10 +245,29 @@ def _wandering_together(
     first, kept, step = (
         (1.0, 1.0, 0.0) if sheet.drift is None else (sheet.drift.first, sheet.drift.kept, sheet.drift.step)
     )
-    return _normal(*_filtered(residual, np.ones(present.size), first * share, kept, step * share)) - volume
+    ones, none = np.ones(present.size), np.zeros(present.size)
+    return _normal(*given(residual, ones, first * share, kept, step * share, none)) - volume
 
 
-def _filtered(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
+def given_before(
+    residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats, bias: Floats
+) -> tuple[Floats, Floats]:
+    """What is new in each sample given those before it, shape (..., samples, channels), and its variance.
+
+    What wanders is the zero of `filtered`, with a constant of variance `bias` beside it.
+    """
+    if kept == 1.0 or not np.any(bias):
+        return filtered(residual, noise, bias + first, kept, step)
+    # A bias beside a drift that forgets is regressed on: what the filter makes of 1 in every sample, it has that often.
+    residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
+    (new, of_one), total = filtered(np.stack([residual, ones]), noise, first, kept, step)
+    with np.errstate(divide="ignore"):
+        known = 1.0 / bias + _sum_before(of_one**2 / total)
+    new = new - of_one * _sum_before(of_one * new / total) / known
+    return new, total + of_one**2 / known
+
+
+def filtered(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
     """What is new in each sample, shape (..., samples, channels), and its variance: Kalman's filter by channel.
 
     What is filtered is a zero of variance `first` at the first sample, with white noise on top of it.

@@ -23,7 +23,7 @@ _WIDENING = 1.1
 """Scale over that of the walkers it is fitted to: too wide a proposal costs less than too narrow a one."""
 
 
-_LEAST_NEW = 0.5
+_LEAST_NEW = 0.2
 """Share that is new in the shortest step of `NormalMove`."""
 
 

@@ -1,0 +1,346 @@
+"""The evidence of a model: the integral of an unnormalised density, from draws of it, by bridge sampling."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from arviz_stats.base.array import array_stats
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import brentq
+from scipy.special import expit, ndtr
+
+from tactile_bayes.errors import InferenceError
+
+__all__ = ["Evidence", "bridge_evidence"]
+
+Floats = NDArray[np.float64]
+
+_KNOTS = np.linspace(-2.0, 2.0, 7)
+"""Normal scores between which a parameter's score is linear: more would follow noise, fewer would miss walls."""
+
+_PROPOSALS = 4000
+
+_LEAST_PROPOSALS = 20
+
+_MOST_DRAWS = 50_000
+"""Draws that are used, at even distances: beyond ten times the proposals, they add hardly anything."""
+
+_LEAST_PER_CHAIN = 8
+"""Draws that ArviZ needs for an effective sample size."""
+
+_LEAST_PER_PARAMETER = 5
+"""Draws in a half, per parameter: the covariance that is fitted to them would be worth nothing with fewer."""
+
+_FLAT = 1e-13
+"""Variance of standardised parameters in one direction over that in another, from which on rounding makes it."""
+
+_LEAST_TERMS = 5.0
+"""Effective number of draws, and of proposals, that the estimate must rest on."""
+
+_ROUNDS = 2
+"""Times that the number of effective draws is found: it hardly depends on the threshold, nor this on it."""
+
+_PROBES = 2
+"""Draws per chain whose density is computed again."""
+
+_AGREES = 0.01
+"""Difference from the log-density that was given up to which they are the same."""
+
+
+class Evidence(NamedTuple):
+    """The logarithm of an integral, and how far to trust it."""
+
+    log_evidence: float
+    standard_error: float
+    """Of `log_evidence`."""
+    overlap: float
+    """∫ p q/(s p + (1 − s) q) of the density p and what it is compared with, q, both normalised, s the share of draws
+    of p: 1 if both are the same, 0 if they have nothing in common. Below some 0.1, do not trust the standard error."""
+
+
+def bridge_evidence(
+    log_density: Callable[[Floats], Floats],
+    draws: Floats,
+    log_densities: Floats,
+    rng: np.random.Generator,
+    *,
+    proposals: int | None = None,
+) -> Evidence:
+    """Logarithm of the integral of a density, from draws of it.
+
+    With density f = Z p and draws of p and of a normalised density q like it,
+
+        Z = E_q[f h]/E_p[q h],  h = 1/(s f/Z + (1 − s) q),  s = n/(n + m),
+
+    for n draws of p, counted as effective ones, and m of q; this h has the least error (Meng & Wong 1996, Statistica
+    Sinica 6, 831; Gronau et al. 2017, doi 10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and
+    compared with the other, since draws that it is fitted to would look too much like it (Overstall & Forster 2010,
+    doi 10.1016/j.csda.2010.03.008); the same with the halves exchanged, and the mean of both is the result.
+
+    Parameters
+    ----------
+    log_density : callable
+        Takes points (m, d), returns (m,): log of the density, −inf where it is zero.
+    draws : ndarray, shape (chains, n, d)
+        From the density; chains are independent of each other, two at least, and within a chain draws are in the order
+        in which they were made, walker-major if there are walkers.
+    log_densities : ndarray, shape (chains, n)
+        `log_density` of them.
+    rng : np.random.Generator
+    proposals : int, optional
+        Points, half of them from each fit, at which `log_density` is computed, by default 4000. To these come two draws
+        per chain, at which it must be what `log_densities` says.
+
+    Returns
+    -------
+    Evidence
+        Its standard error has both parts of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with the
+        autocorrelation of the terms, and the correlation of the two results that are averaged (see Notes).
+
+    Raises
+    ------
+    InferenceError
+        If shapes do not agree, there are too few draws, or these are not finite, do not vary, or lie in a plane; if
+        `log_density` is NaN or +inf somewhere, or not what `log_densities` says; if fit and density do not overlap.
+
+    Notes
+    -----
+    q is a normal distribution of normal scores, each piecewise linear in one parameter, so that walls and skewness of
+    single parameters cost little; or in one of the axes nearest to the parameters that are not correlated, if the draws
+    are more probable so. For normal densities in 40 dimensions and 500 independent draws in each half the error is a
+    sixth larger than with a plain normal fit, for 15 half-normal ones among them half. A t distribution and a density
+    made symmetric (Warp-III of Meng & Schilling 2002, at equal evaluations) gained nothing. Of more than 50 000 draws
+    every second, third, … is used.
+
+    The two results share what comes from the errors of the fits: to first order that is Σ k(x, y) over x in one half
+    and y in the other, with the same symmetric k for both, and does not average out. Only the error that another fit
+    would not change does. Its share is taken to be the correlation of the terms under one fit with those under the
+    other, which in tens of dimensions is a little too small, and the standard error up to a quarter too large.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> draws = rng.normal(size=(4, 500, 2))
+    >>> result = bridge_evidence(lambda x: -0.5 * np.sum(x**2, axis=-1), draws, -0.5 * np.sum(draws**2, axis=-1), rng)
+    >>> abs(result.log_evidence - np.log(2.0 * np.pi)) < 4.0 * result.standard_error < 0.02
+    True
+    """
+    count = (_PROPOSALS if proposals is None else proposals) // 2
+    _refuse(draws, log_densities, count)
+    thinned = slice(None, None, -(-log_densities.size // _MOST_DRAWS))
+    draws, log_densities = draws[:, thinned], log_densities[:, thinned]
+    cut, size = len(draws) // 2, draws.shape[-1]
+    halves = slice(None, cut), slice(cut, None)
+    fits = [_fitted(draws[half].reshape(-1, size)) for half in halves]
+    proposed = [fit.draw(rng, count) for fit in fits]
+    again = slice(None, None, -(-draws.shape[1] // _PROBES))
+    values = _values(log_density, np.concatenate([*proposed, draws[:, again].reshape(-1, size)]))
+    _refuse_other_density(values[2 * count :], log_densities[:, again].ravel())
+    ratios = [log_densities - fit.log_density(draws.reshape(-1, size)).reshape(log_densities.shape) for fit in fits]
+    first, second = (
+        _bridge(ratios[k][halves[1 - k]], values[k * count :][:count] - fits[k].log_density(proposed[k]))
+        for k in (0, 1)
+    )
+    terms = expit(first.threshold - ratios[0]), expit(second.threshold - ratios[1])
+    shared = np.sqrt(first.of_draws * second.of_draws) * (1.0 - _correlation(terms, halves))
+    variance = first.of_draws + second.of_draws + 2.0 * shared + first.of_proposals + second.of_proposals
+    return Evidence(
+        0.5 * (first.log_evidence + second.log_evidence),
+        0.5 * float(np.sqrt(variance)),
+        0.5 * (first.overlap + second.overlap),
+    )
+
+
+def _fitted(points: Floats) -> _Fit:
+    """The fit to points (n, d) along the axes that make them more probable.
+
+    Along those of the parameters it follows walls. Where these depend on each other so much that errors of their scores
+    are larger than what is left free, it cannot, and follows the axes that are nearest to them and not correlated.
+    """
+    deviation = points.std(axis=0)
+    same = np.flatnonzero(deviation <= 0.0)
+    if same.size:
+        raise InferenceError(f"parameter {same[0]} is the same in a half of the draws: give draws that vary")
+    sizes, directions = np.linalg.eigh(_covariance(points / deviation))
+    try:
+        if not sizes[0] > _FLAT * sizes[-1]:
+            raise np.linalg.LinAlgError
+        uncorrelated = directions / np.sqrt(sizes) @ directions.T / deviation[:, None]
+        fits = [_Fit(points, axes) for axes in (np.diag(1.0 / deviation), uncorrelated)]
+    except np.linalg.LinAlgError:
+        raise InferenceError(
+            "a half of the draws lies in a plane: give more draws, or fewer parameters if one follows from others"
+        ) from None
+    return max(fits, key=lambda fit: fit.log_density(points).mean())
+
+
+def _covariance(points: Floats) -> Floats:
+    return np.atleast_2d(np.cov(points.T))
+
+
+class _Fit:
+    """A normal distribution of normal scores along some axes."""
+
+    def __init__(self, points: Floats, axes: Floats) -> None:
+        """`points`: (n, d); `axes`: a column for each."""
+        self._centre, self._axes, self._back = points.mean(axis=0), axes, np.linalg.inv(axes)
+        self._knots = np.quantile(self._along(points), ndtr(_KNOTS), axis=0).T
+        if not np.all(np.diff(self._knots, axis=1) > 0.0):
+            raise InferenceError("a half of the draws has too few different points: give more draws")
+        self._slopes = (_KNOTS[1] - _KNOTS[0]) / np.diff(self._knots, axis=1)
+        scores, _ = self._scores(points)
+        self._mean = scores.mean(axis=0)
+        self._root = np.linalg.cholesky(_covariance(scores))
+        self._scale = (
+            np.sum(np.log(np.diag(self._root)))
+            - np.linalg.slogdet(axes).logabsdet
+            + 0.5 * self._mean.size * np.log(2.0 * np.pi)
+        )
+
+    def _along(self, points: Floats) -> Floats:
+        along: Floats = (points - self._centre) @ self._axes
+        return along
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        """Points, (count, d)."""
+        scores: Floats = self._mean + rng.standard_normal((count, self._mean.size)) @ self._root.T
+        along = np.empty_like(scores)
+        for j, (knots, slopes) in enumerate(zip(self._knots, self._slopes, strict=True)):
+            i = _piece(_KNOTS, scores[:, j])
+            along[:, j] = knots[i] + (scores[:, j] - _KNOTS[i]) / slopes[i]
+        points: Floats = self._centre + along @ self._back
+        return points
+
+    def log_density(self, points: Floats) -> Floats:
+        """At points (n, d), (n,)."""
+        scores, log_growth = self._scores(points)
+        standard = solve_triangular(self._root, (scores - self._mean).T, lower=True)
+        density: Floats = log_growth - self._scale - 0.5 * np.sum(standard**2, axis=0)
+        return density
+
+    def _scores(self, points: Floats) -> tuple[Floats, Floats]:
+        """Normal scores (n, d), and the logarithm of by how much they grow along the axes, (n,)."""
+        along, log_growth = self._along(points), np.zeros(len(points))
+        scores = np.empty_like(along)
+        for j, (knots, slopes) in enumerate(zip(self._knots, self._slopes, strict=True)):
+            i = _piece(knots, along[:, j])
+            scores[:, j] = _KNOTS[i] + slopes[i] * (along[:, j] - knots[i])
+            log_growth += np.log(slopes)[i]
+        return scores, log_growth
+
+
+def _piece(knots: Floats, values: Floats) -> NDArray[np.intp]:
+    """Of which knot a value is right, the outer pieces going on without end."""
+    piece: NDArray[np.intp] = np.clip(np.searchsorted(knots, values) - 1, 0, knots.size - 2)
+    return piece
+
+
+class _Bridge(NamedTuple):
+    """One fit compared with the draws of the other half."""
+
+    log_evidence: float
+    threshold: float
+    """Of log f − log q, at which draw and proposal are equally likely."""
+    of_draws: float
+    """Part of the variance."""
+    of_proposals: float
+    overlap: float
+
+
+def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
+    """From log f − log q at draws of f, (chains, n), and of q, (m,).
+
+    Draws and proposals enter by logistic functions, whose sums over the ones and the others are equal at the threshold
+    log Z + log(m/n), one growing with it and one falling (Bennett 1976, doi 10.1016/0021-9991(76)90078-4).
+    """
+    if not np.any(np.isfinite(proposed)):
+        raise InferenceError(
+            "density and fit do not overlap: the density is zero at all proposals; its walls may leave little of the "
+            "box around the draws"
+        )
+    effective = float(drawn.size)
+    for _ in range(_ROUNDS):
+        threshold = _threshold(drawn, proposed, effective)
+        from_draws, from_proposals = expit(threshold - drawn), expit(proposed - threshold)
+        if min(_terms_that_count(from_draws), _terms_that_count(from_proposals)) < _LEAST_TERMS:
+            raise InferenceError(
+                "density and fit do not overlap: a handful of points would decide; do all chains sample the same place?"
+            )
+        used, effective = effective, _effective_size(from_draws)
+    return _Bridge(
+        threshold + float(np.log(used / proposed.size)),
+        threshold,
+        float(from_draws.var() / from_draws.mean() ** 2 / effective),
+        float(from_proposals.var() / from_proposals.mean() ** 2 / proposed.size),
+        float(from_draws.mean() * (1.0 + used / proposed.size)),
+    )
+
+
+def _threshold(drawn: Floats, proposed: Floats, effective: float) -> float:
+    def difference(threshold: float) -> float:
+        return float(effective * expit(threshold - drawn).mean() - proposed.size * expit(proposed - threshold).mean())
+
+    finite = np.append(drawn, proposed[np.isfinite(proposed)])
+    margin = 5.0 + np.log(drawn.size) + np.log(proposed.size)
+    return float(brentq(difference, finite.min() - margin, finite.max() + margin, maxiter=1000))
+
+
+def _effective_size(terms: Floats) -> float:
+    """Of terms (chains, n), with their autocorrelation."""
+    ess: Callable[..., float] = array_stats.ess
+    return float(min(ess(terms, chain_axis=0, draw_axis=1, method="mean"), terms.size))
+
+
+def _terms_that_count(terms: Floats) -> float:
+    """Kish's effective number of weights."""
+    total, squares = terms.sum(), np.sum(terms**2)
+    return float(total**2 / squares) if squares > 0.0 else 0.0
+
+
+def _correlation(both: tuple[Floats, Floats], halves: tuple[slice, slice]) -> float:
+    """Of terms (chains, n) with others of the same draws, within halves of the chains; 0 if negative."""
+    a, b = (np.concatenate([(terms[half] - terms[half].mean()).ravel() for half in halves]) for terms in both)
+    scale = np.linalg.norm(a) * np.linalg.norm(b)
+    return float(np.clip(a @ b / scale, 0.0, 1.0)) if scale > 0.0 else 0.0
+
+
+def _values(log_density: Callable[[Floats], Floats], points: Floats) -> Floats:
+    values = np.asarray(log_density(points), dtype=float)
+    if values.shape != (len(points),):
+        raise InferenceError(f"log_density of points {points.shape} has shape {values.shape}: return ({len(points)},)")
+    bad = np.flatnonzero(np.isnan(values) | (values == np.inf))
+    if bad.size:
+        raise InferenceError(
+            f"log_density is {values[bad[0]]} at {points[bad[0]]}: return a number, or −inf where the density is zero"
+        )
+    return values
+
+
+def _refuse_other_density(values: Floats, given: Floats) -> None:
+    worst = float(np.max(np.abs(values - given)))
+    if not worst < _AGREES:
+        raise InferenceError(
+            f"log_density and log_densities differ by {worst:.3g} at a draw: give both of the same density, constants "
+            "and change of variables included"
+        )
+
+
+def _refuse(draws: Floats, log_densities: Floats, count: int) -> None:
+    if draws.ndim != 3 or not draws.shape[-1] or log_densities.shape != draws.shape[:2]:
+        raise InferenceError(
+            f"draws have shape {draws.shape}, log_densities {log_densities.shape}: give (chains, n, d) and (chains, n)"
+        )
+    if not (np.all(np.isfinite(draws)) and np.all(np.isfinite(log_densities))):
+        raise InferenceError("draws or log_densities are not finite: a draw has a finite density")
+    chains, each, size = draws.shape
+    least = max(_LEAST_PER_CHAIN, -(-_LEAST_PER_PARAMETER * size // max(chains // 2, 1)))
+    if chains < 2 or each < least:
+        raise InferenceError(
+            f"{chains} chains of {each} draws of {size} parameters: give at least 2 chains, and of {max(chains, 2)} "
+            f"chains at least {least} draws each, many more if they are correlated"
+        )
+    if 2 * count < _LEAST_PROPOSALS:
+        raise InferenceError(f"{2 * count} proposals: give at least {_LEAST_PROPOSALS}")
