@@ -25,6 +25,9 @@ _STEP = 1e-4
 _TELLING = 0.03
 """Change of residuals, in standard deviations for a prior's or a radius' logarithm of one, below which all is noise."""
 
+_SURE = 0.01
+"""Standard deviation of a snap-off, over half a step of the drive, below which nothing more is asked of it."""
+
 _BRAVE = 4.0
 """Residual in standard deviations from which on a reading pulls less than by its square."""
 
@@ -70,8 +73,9 @@ class Observer:
         stated = np.asarray(model.likelihood.load_cell.noise)
         self.noise = np.where(stated > 0.0, stated, model.deviation)
         between = model.likelihood.snap_offs_between(self.loaded)
-        self.end, self.width = between.mean(axis=1), np.diff(between, axis=1)[:, 0] / np.sqrt(12.0)
         self.ends = np.isfinite(between).all(axis=1)
+        self._end, self._within = between.mean(axis=1), 0.5 * np.diff(between, axis=1)[:, 0]
+        self._width = self._within / np.sqrt(3.0)
 
     def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, NDArray[np.bool_], Floats]:
         """Expected readings less measured ones, in `noise`; which are loaded as measured; and snap-offs less measured
@@ -82,8 +86,17 @@ class Observer:
         agree = (loads != 0.0).any(axis=2) == self.loaded
         cell = model.likelihood.load_cell
         beyond = cell.expected(model.nuisances.sensed(loads, values, cell)) - model.likelihood.measured
-        late = (model.likelihood.snap_offs(contours, rig) - self.end) / self.width
+        late = (model.likelihood.snap_offs(contours, rig) - self._end) / self._width
         return beyond / self.noise, agree, late[:, self.ends]
+
+    def insist(self, point: Floats) -> bool:
+        """Take snap-offs for better known that a point, (1, parameters), has where the record has none; any there?"""
+        _, _, late = self(self.model.contours(point), self.model.values(point))
+        off = np.zeros(self._width.size, dtype=bool)
+        off[self.ends] = np.abs(late[0]) * self._width[self.ends] > self._within[self.ends]
+        off &= self._width > _SURE * self._within
+        self._width = np.where(off, self._width / 3.0, self._width)
+        return bool(off.any())
 
     def log_density(self, points: Floats) -> Floats:
         """Roughly the log-likelihood, shape (n,), for a search: samples that are loaded where the record's are not cost

@@ -21,7 +21,7 @@ __all__ = ["whitening_at"]
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 12
+_ROUNDS = 20
 """Times that the place where loads are made linear moves, at most."""
 
 _GAINED = 0.5
@@ -44,7 +44,7 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator) -
     """Coordinates that belong to the posterior's centre, which is sought from a point, shape (parameters,).
 
     Gauss's and Newton's steps, shortened as long as they lead down, alternate with the likeliest scales, of which
-    linear loads give the evidence in closed form.
+    linear loads give the evidence in closed form. A snap-off that is not where the record has it is insisted upon.
     """
     observer, prior = Observer(model), _linear_prior(model, rng)
     (scales,), (linear,) = split(model, point[None])
@@ -57,7 +57,9 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator) -
         density -= 0.5 * (np.square(tried - prior.mean) * prior.precision).sum(axis=1)
         linear, before, best = tried[np.argmax(density)], best, float(density.max())
         if best - before < _GAINED:
-            break
+            if not observer.insist(joined(scales[None], linear[None])):
+                break
+            best = -np.inf
     return Whitening(NormalApproximation(observer, prior, scales, linear), scales)
 
 

@@ -16,8 +16,11 @@ __all__ = ["Whitening"]
 
 Floats = NDArray[np.float64]
 
-_FAR = 50.0
-"""Logarithm of scales that no prior comes near."""
+_FAR = 4.0
+"""Logarithm of how far from where walkers start a scale may be: beyond, all is taken for impossible."""
+
+_LARGEST = 50.0
+"""Logarithm of a radius that no prior comes near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +70,12 @@ class Whitening:
 
     def _moved(self, coordinates: Floats) -> tuple[Floats, Floats]:
         bent = self.bent
-        scales: Floats = np.exp(np.clip(coordinates[:, :bent], -_FAR, _FAR))
+        middle = np.log(self.scales)
+        away = coordinates[:, :bent] - middle
+        scales: Floats = np.exp(middle + np.clip(away, -_FAR, _FAR))
         pulled, root = self.approximation.conditional(scales)
         linear = np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + coordinates[:, bent:])[..., None])[..., 0]
-        linear[:, 0] = np.clip(linear[:, 0], -_FAR, _FAR)
+        linear[:, 0] = np.clip(linear[:, 0], -_LARGEST, _LARGEST)
         volume = np.log(scales).sum(axis=1) - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+        volume[(np.abs(away) > _FAR).any(axis=1)] = -np.inf
         return joined(scales, np.asarray(linear)), linear[:, 0] + volume

@@ -1,0 +1,142 @@
+"""Prints how good shape-free contours are: coverage of their bands in the gap and out, and width beside a known family.
+
+The truths are not drawn from the prior: parabola, circle, ellipse, x⁴, profile IV of Merker et al. 2018, whose radius
+of curvature jumps, a rounded corner whose radius varies a hundredfold, and a contour through points that scatter.
+Pivots and noise are drawn anew for every record, and everything that is not known of the rig by default is inferred.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+import tactile_bayes as tb
+from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw, Smooth, from_points, paper_profile
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.tasks import run_tasks
+
+Floats = NDArray[np.float64]
+
+NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.06)}
+"""Of forces [EI/L²] and of the moment [EI/L]."""
+
+ANGLES = np.radians(np.arange(0.0, 200.0, 1.0))
+SETTINGS = SamplerSettings(max_seconds=60.0)
+PROBABILITY, PLACES = 0.9, 9
+
+
+def _corner(q: float, x_c: float) -> Contour:
+    """Sides of radius 2, a corner of 0.02 between slopes of ±0.6, and a fifth of a radian for each change."""
+    slopes = Smooth.nodes(64)
+    blunt = 0.5 * (1.0 + np.tanh((np.abs(slopes) - 0.6) / 0.1))
+    return Smooth(np.log(0.02) + np.log(100.0) * blunt, q=q, x_c=x_c)
+
+
+def _measured(q: float, x_c: float) -> Contour:
+    """Points of an oval that is not one of the families, with a scatter of 0.002."""
+    x = np.linspace(-1.0, 1.0, 80)
+    y = 0.45 * x**2 + 0.12 * x**3 + 0.15 * x**4 + 0.002 * np.random.default_rng(7).normal(size=x.size)
+    return from_points(x + x_c, y + q)
+
+
+class Truth(NamedTuple):
+    """A contour, and the family that knows what shape it has, if there is one."""
+
+    build: Callable[[float, float], Contour]
+    family: str | None
+
+
+TRUTHS = {
+    "parabola": Truth(lambda q, x_c: Parabola(0.5, q, x_c), "parabola"),
+    "circle": Truth(lambda q, x_c: Circle(0.8, q, x_c), "circle"),
+    "ellipse": Truth(lambda q, x_c: Ellipse(0.9, 0.5, q, x_c), "ellipse"),
+    "x⁴": Truth(lambda q, x_c: PowerLaw(1.0, 4.0, q, x_c), "power-law"),
+    "points": Truth(_measured, None),
+    "corner": Truth(_corner, None),
+    "profile IV": Truth(lambda q, _: paper_profile("IV", q=q), "parabola/power-law"),
+}
+
+
+class Outcome(NamedTuple):
+    """Of one record."""
+
+    in_gap: float
+    """Share of the places in the gap at which the band holds the truth."""
+    out_of_gap: float
+    width: float
+    """Mean of the band in the gap."""
+    error: float
+    """Largest distance of the truth from the band's median there."""
+    known_width: float
+    """Mean of the band of the family that knows the shape; NaN without one."""
+    seconds: float
+    converged: bool
+    passed: bool
+    """Whether the check of the record finds nothing."""
+
+
+def main(replicates: int = 4, workers: int = 2, *names: str) -> None:
+    chosen = names or tuple(TRUTHS)
+    tasks = [(name, noise, k) for name in chosen for noise in NOISES for k in range(replicates)]
+    outcomes: dict[tuple[str, str], list[Outcome]] = {(name, noise): [] for name in chosen for noise in NOISES}
+    for done, ((name, noise, _), outcome) in enumerate(run_tasks(record, tasks, workers=workers)):
+        outcomes[name, noise].append(outcome)
+        if sys.stderr.isatty():
+            print(f"\r{done + 1} of {len(tasks)}", end="", file=sys.stderr)
+    heads = ("in the gap", "out of it", "width [L]", "off [L]", "over known", "time", "longest", "converged", "check")
+    print(f"{'truth':<12}{'noise':<10}" + "".join(f"{head:>12}" for head in heads))
+    for (name, noise), of_kind in outcomes.items():
+        table = np.array(of_kind, dtype=float)
+        in_gap, out_of_gap, width, off, known, seconds, converged, passed = np.mean(table, axis=0)
+        print(f"{name:<12}{noise:<10}{in_gap:>12.2f}{out_of_gap:>12.2f}{width:>12.5f}{off:>12.5f}", end="")
+        print(f"{width / known:>12.2f}{seconds:>10.1f} s{table[:, 5].max():>10.1f} s{converged:>12.0%}", end="")
+        print(f"{f'passes {passed:.0%}':>12}")
+
+
+def record(task: tuple[str, str, int]) -> Outcome:
+    """Simulate a record, infer, and compare."""
+    name, noise, number = task
+    rng = np.random.default_rng([2027, list(TRUTHS).index(name), number])
+    truth = TRUTHS[name]
+    contour = truth.build(float(rng.uniform(0.45, 0.6)), float(rng.normal(0.0, 0.05)))
+    cell = tb.LoadCell(force_noise=NOISES[noise][0], moment_noise=NOISES[noise][1])
+    scan = tb.scan(contour, drive_angles=ANGLES + rng.uniform(0.0, np.radians(1.0)))
+    measured = cell.measure(scan.record, seed=rng)
+    began = time.perf_counter()
+    result = tb.infer_contour(measured, family="shape-free", load_cell=cell, seed=number, settings=SETTINGS)
+    seconds = time.perf_counter() - began
+    forward, backward = scan.events["forward"], scan.events["backward"]
+    left, right = sorted([backward.snap_off.contact_x, forward.snap_off.contact_x])
+    gap = np.linspace(left, right, PLACES + 2)[1:-1]
+    sides = [
+        np.linspace(event.snap_off.contact_x, event.first_contact.contact_x, PLACES + 1)[1:]
+        for event in (forward, backward)
+    ]
+    in_gap, width, off = compared(result, contour, gap)
+    out_of_gap, _, _ = compared(result, contour, np.concatenate(sides))
+    known_width = np.nan
+    if truth.family is not None:
+        known = tb.infer_contour(measured, family=truth.family, load_cell=cell, seed=number, settings=SETTINGS)
+        _, known_width, _ = compared(known, contour, gap)
+    passed = bool(tb.check_record(result).attrs["passed"])
+    return Outcome(in_gap, out_of_gap, width, off, known_width, seconds, bool(result.attrs["converged"]), passed)
+
+
+def compared(result: xr.DataTree, contour: Contour, x: Floats) -> tuple[float, float, float]:
+    """Share of places at which the band holds the contour, its mean width, and how far off its median is at most."""
+    band = tb.contour_band(result, x, PROBABILITY)
+    height = contour.height(x)
+    inside = (band.lower.values <= height) & (height <= band.upper.values)
+    width, off = (band.upper - band.lower).mean(), np.abs(band["median"] - height).max()
+    return float(np.mean(inside)), float(width), float(off)
+
+
+if __name__ == "__main__":
+    counts, names = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
+    main(*map(int, counts or ["4"]), *([2] if len(counts) < 2 else []), *names)
