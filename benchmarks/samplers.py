@@ -27,8 +27,8 @@ from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.inference.contour import default_priors
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import sample, spawn
 from tactile_bayes.inference.ensembles.diagnosis import walker_major

@@ -23,7 +23,8 @@ from helpers.contour_posteriors import (
 )
 from tactile_bayes.contours import Circle, Ellipse, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
-from tactile_bayes.inference.contour import contours_of, default_priors, infer_contour
+from tactile_bayes.inference.contour import contours_of, infer_contour
+from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
 from tactile_bayes.load_cell import LoadCell

@@ -7,9 +7,10 @@ import pytest
 from scipy.special import gamma, kv
 
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
-from tactile_bayes.inference.contour import default_priors, infer_contour
+from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit
+from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of

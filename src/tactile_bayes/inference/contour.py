@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import os
-import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from importlib.metadata import version
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.stats import rv_continuous, rv_histogram
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_groups import groups_of, prior_draws
-from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import walk_of
-from tactile_bayes.inference.ensembles import Progress, SamplerSettings, Seed, sample, spawn
-from tactile_bayes.inference.families import Family, Prior
+from tactile_bayes.inference.ensembles import Coordinates, Draws, Progress, SamplerSettings, Seed, sample, spawn
+from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.family_names import family_named
-from tactile_bayes.inference.noise import noise_of
-from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import loaded_samples
-from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 
-__all__ = ["contours_of", "default_priors", "infer_contour"]
+__all__ = ["Sampled", "contours_of", "infer_contour", "sampled"]
 
 
 def infer_contour(
@@ -149,49 +142,42 @@ def infer_contour(
     >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
-    measured = with_rod(validate(measured), rod)
     settings = settings or SamplerSettings()
-    _refuse_other_kinds(settings, load_cell, events, checkpoint)
-    chosen = family_named(family)
-    noise = noise_of(measured, load_cell)
-    rig = nuisances_of(measured, nuisances, priors or {}, noise.cell, friction)
-    chosen_priors = {**_contour_priors(measured, chosen), **rig.priors, **noise.priors}
-    for name, prior in (priors or {}).items():
-        if name not in chosen_priors:
-            raise ParameterError(
-                f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}, and of what is "
-                "not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
-            )
-        if not isinstance(prior, Prior) or isinstance(prior, rv_continuous):
-            raise ParameterError(
-                f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
-            )
-    data_sha256 = record_hash(measured)
-    loaded = loaded_samples(measured, noise.cell if noise.names == ("noise_scale",) else None)
-    if not loaded.any():
-        raise InferenceError(
-            "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
-            "in the record's units?"
-        )
-    if not events:
-        measured = measured.isel(sample=np.flatnonzero(loaded))
-        rig = replace(rig, way=rig.way[loaded])
-    chosen_priors.update(priors or {})
-    model = ContourModel(measured, chosen, rig, noise, chosen_priors)
-    about = {
-        "data_sha256": data_sha256,
-        "family": family,
-        "friction": friction,
-        "nuisances": json.dumps(rig.names),
-        "events": int(events),
-        "priors": json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
-        "units": measured.attrs["units"],
-        "load_cell_frame": frame_of(measured),
-        **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
-        "approximations": "; ".join(noise.cell.approximations),
-        **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name not in noise.inferred},
-    }
-    seeds = spawn(seed, 4)
+    if not isinstance(settings, SamplerSettings):
+        raise ParameterError(f"settings is {settings!r}: give SamplerSettings(min_ess=400) and the like")
+    if checkpoint is not None and (not isinstance(checkpoint, str | os.PathLike) or not os.fspath(checkpoint)):
+        raise ParameterError(f"checkpoint is {checkpoint!r}: give the path of a folder, or None")
+    problem = contour_problem(
+        measured,
+        family=family,
+        load_cell=load_cell,
+        priors=priors,
+        rod=rod,
+        friction=friction,
+        nuisances=nuisances,
+        events=events,
+    )
+    return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress).tree
+
+
+class Sampled(NamedTuple):
+    """A posterior, as it is handed out, and as it was drawn."""
+
+    tree: xr.DataTree
+    draws: Draws
+    coordinates: Coordinates
+
+
+def sampled(
+    problem: ContourProblem,
+    *,
+    seed: Seed,
+    settings: SamplerSettings,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> Sampled:
+    """The posterior of a problem; see `infer_contour`."""
+    model, seeds = problem.model, spawn(seed, 4)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         walk = walk_of(model, seeds[0], settings)
         draws = sample(
@@ -203,72 +189,16 @@ def infer_contour(
             progress=progress,
             checkpoint=checkpoint,
             coordinates=walk.coordinates,
-            identity=None if checkpoint is None else _identity(about),
+            identity=None if checkpoint is None else problem.identity,
         )
         groups = groups_of(model, draws, np.random.default_rng(seeds[2]))
         groups["prior"] = prior_draws(model, np.random.default_rng(seeds[3]))
     tree = xr.DataTree.from_dict(groups)
-    tree.attrs = provenance(draws, seed=seed, settings=settings, **about)
-    return tree
-
-
-def _refuse_other_kinds(settings: object, load_cell: object, events: object, checkpoint: object) -> None:
-    if not isinstance(settings, SamplerSettings):
-        raise ParameterError(f"settings is {settings!r}: give SamplerSettings(min_ess=400) and the like")
-    if load_cell is not None and not isinstance(load_cell, LoadCell):
-        raise ParameterError(f"load_cell is {load_cell!r}: give LoadCell(force_noise=0.05, moment_noise=0.02), or None")
-    if not isinstance(events, bool | np.bool_):
-        raise ParameterError(f"events is {events!r}: give True or False")
-    if checkpoint is not None and (not isinstance(checkpoint, str | os.PathLike) or not os.fspath(checkpoint)):
-        raise ParameterError(f"checkpoint is {checkpoint!r}: give the path of a folder, or None")
-
-
-def default_priors(
-    measured: xr.Dataset,
-    family: str = "parabola",
-    load_cell: LoadCell | None = None,
-    nuisances: Sequence[str] = STANDARD,
-) -> dict[str, Prior]:
-    """The priors that `infer_contour` takes where it is given none, in the record's units; its notes say which.
-
-    Examples
-    --------
-    >>> from tactile_bayes import scan
-    >>> from tactile_bayes.contours import paper_profile
-    >>> list(default_priors(scan(paper_profile("II", q=0.5)).record, nuisances=["friction"]))
-    ['a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise']
-    """
-    measured = validate(measured)
-    noise = noise_of(measured, load_cell)
-    rig = nuisances_of(measured, nuisances, {}, noise.cell, friction=0.0)
-    return {**_contour_priors(measured, family_named(family)), **rig.priors, **noise.priors}
+    tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
+    return Sampled(tree, draws, walk.coordinates)
 
 
 def contours_of(draws: xr.Dataset, family: str) -> Contour:
     """The contours of posterior or prior draws, with parameters of shape (all draws,)."""
     chosen = family_named(family)
     return chosen.build(*(draws[name].values.ravel() for name in chosen.parameters))
-
-
-def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
-    base = float(measured.base_x.mean()), float(measured.base_y.mean())
-    return family.default_priors(base, rod_of(measured).length)
-
-
-def _identity(about: Mapping[str, object]) -> dict[str, str]:
-    """What a run that goes on must have in common with the one that was stopped."""
-    words = {"data_sha256": "record (its SHA-256)"}
-    return {words.get(name, name): str(value) for name, value in about.items()} | {
-        "version of tactile-bayes": version("tactile-bayes")
-    }
-
-
-def _in_words(prior: Prior) -> str:
-    law = getattr(prior, "dist", None)
-    if law is None:
-        return repr(prior)
-    if isinstance(law, rv_histogram):
-        counts, edges = law._histogram  # type: ignore[attr-defined]
-        return f"histogram of {len(counts)} bins ({zlib.crc32(np.concatenate([counts, edges]).tobytes()):08x})"
-    arguments = [f"{a:g}" for a in prior.args] + [f"{k}={v:g}" for k, v in prior.kwds.items()]  # type: ignore[attr-defined]
-    return f"{law.name}({', '.join(arguments)})"

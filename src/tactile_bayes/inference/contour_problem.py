@@ -1,0 +1,148 @@
+"""A contour to be inferred from a record: what is asked, checked and put together."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.stats import rv_continuous, rv_histogram
+
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.families import Family, Prior
+from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.noise import noise_of
+from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import loaded_samples
+from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
+from tactile_bayes.rod import Rod
+
+__all__ = ["ContourProblem", "contour_problem", "default_priors"]
+
+
+class ContourProblem(NamedTuple):
+    """Prior times likelihood, and in words what they are made from."""
+
+    model: ContourModel
+    about: Mapping[str, Any]
+    loaded: NDArray[np.bool_]
+    """Which of the record's samples carry a load that noise does not explain."""
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """What a run that goes on must have in common with the one that was stopped."""
+        words = {"data_sha256": "record (its SHA-256)"}
+        return {words.get(name, name): str(value) for name, value in self.about.items()} | {
+            "version of tactile-bayes": version("tactile-bayes")
+        }
+
+    def without(self, samples: NDArray[np.bool_]) -> ContourModel:
+        """The model of the record without some of its samples."""
+        model, kept = self.model, ~samples
+        rig = replace(model.nuisances, way=model.nuisances.way[kept])
+        measured = model.measured.isel(sample=np.flatnonzero(kept))
+        return ContourModel(measured, model.family, rig, model.noise, model.priors)
+
+
+def contour_problem(
+    measured: xr.Dataset,
+    *,
+    family: str,
+    load_cell: LoadCell | None,
+    priors: Mapping[str, Prior] | None,
+    rod: Rod | None,
+    friction: float,
+    nuisances: Sequence[str],
+    events: bool,
+) -> ContourProblem:
+    """What `infer_contour` is asked for, as it says."""
+    measured = with_rod(validate(measured), rod)
+    if load_cell is not None and not isinstance(load_cell, LoadCell):
+        raise ParameterError(f"load_cell is {load_cell!r}: give LoadCell(force_noise=0.05, moment_noise=0.02), or None")
+    if not isinstance(events, bool | np.bool_):
+        raise ParameterError(f"events is {events!r}: give True or False")
+    chosen = family_named(family)
+    noise = noise_of(measured, load_cell)
+    rig = nuisances_of(measured, nuisances, priors or {}, noise.cell, friction)
+    chosen_priors = {**_contour_priors(measured, chosen), **rig.priors, **noise.priors}
+    for name, prior in (priors or {}).items():
+        if name not in chosen_priors:
+            raise ParameterError(
+                f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}, and of what is "
+                "not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
+            )
+        if not isinstance(prior, Prior) or isinstance(prior, rv_continuous):
+            raise ParameterError(
+                f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            )
+    data_sha256 = record_hash(measured)
+    loaded = loaded_samples(measured, noise.cell if noise.names == ("noise_scale",) else None)
+    if not loaded.any():
+        raise InferenceError(
+            "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
+            "in the record's units?"
+        )
+    if not events:
+        measured = measured.isel(sample=np.flatnonzero(loaded))
+        rig = replace(rig, way=rig.way[loaded])
+        loaded = loaded[loaded]
+    chosen_priors.update(priors or {})
+    about = {
+        "data_sha256": data_sha256,
+        "family": family,
+        "friction": friction,
+        "nuisances": json.dumps(rig.names),
+        "events": int(events),
+        "priors": json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
+        "units": measured.attrs["units"],
+        "load_cell_frame": frame_of(measured),
+        **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
+        "approximations": "; ".join(noise.cell.approximations),
+        **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name not in noise.inferred},
+    }
+    return ContourProblem(ContourModel(measured, chosen, rig, noise, chosen_priors), about, loaded)
+
+
+def default_priors(
+    measured: xr.Dataset,
+    family: str = "parabola",
+    load_cell: LoadCell | None = None,
+    nuisances: Sequence[str] = STANDARD,
+) -> dict[str, Prior]:
+    """The priors that `infer_contour` takes where it is given none, in the record's units; its notes say which.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> list(default_priors(scan(paper_profile("II", q=0.5)).record, nuisances=["friction"]))
+    ['a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise']
+    """
+    measured = validate(measured)
+    noise = noise_of(measured, load_cell)
+    rig = nuisances_of(measured, nuisances, {}, noise.cell, friction=0.0)
+    return {**_contour_priors(measured, family_named(family)), **rig.priors, **noise.priors}
+
+
+def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
+    base = float(measured.base_x.mean()), float(measured.base_y.mean())
+    return family.default_priors(base, rod_of(measured).length)
+
+
+def _in_words(prior: Prior) -> str:
+    law = getattr(prior, "dist", None)
+    if law is None:
+        return repr(prior)
+    if isinstance(law, rv_histogram):
+        counts, edges = law._histogram  # type: ignore[attr-defined]
+        return f"histogram of {len(counts)} bins ({zlib.crc32(np.concatenate([counts, edges]).tobytes()):08x})"
+    arguments = [f"{a:g}" for a in prior.args] + [f"{k}={v:g}" for k, v in prior.kwds.items()]  # type: ignore[attr-defined]
+    return f"{law.name}({', '.join(arguments)})"
