@@ -26,6 +26,7 @@ _HOMES = {
     "Rod": "rod",
     "SamplerSettings": "inference.ensembles",
     "check_record": "uncertainty.record_check",
+    "compare_families": "uncertainty.family_comparison",
     "contact_moments": "uncertainty.contact_moments",
     "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
     from tactile_bayes.uncertainty.band import contour_band as contour_band
     from tactile_bayes.uncertainty.contact_moments import contact_moments as contact_moments
     from tactile_bayes.uncertainty.contact_region import contact_region as contact_region
+    from tactile_bayes.uncertainty.family_comparison import compare_families as compare_families
     from tactile_bayes.uncertainty.gap import gap as gap
     from tactile_bayes.uncertainty.implied_contacts import implied_contacts as implied_contacts
     from tactile_bayes.uncertainty.normal_band import normal_band as normal_band

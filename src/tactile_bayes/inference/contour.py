@@ -14,7 +14,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_groups import groups_of, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
-from tactile_bayes.inference.contour_start import walk_of
+from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import Coordinates, Draws, Progress, SamplerSettings, Seed, sample, spawn
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.family_names import family_named
@@ -175,11 +175,12 @@ def sampled(
     settings: SamplerSettings,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
+    walk: Walk | None = None,
 ) -> Sampled:
-    """The posterior of a problem; see `infer_contour`."""
+    """The posterior of a problem; see `infer_contour`. Walkers walk as they would anyway, or as is said."""
     model, seeds = problem.model, spawn(seed, 4)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        walk = walk_of(model, seeds[0], settings)
+        walk = walk or walk_of(model, seeds[0], settings)
         draws = sample(
             model.log_probability,
             walk.start,

@@ -147,16 +147,27 @@ class RecordLikelihood:
         ends = self.paths(contours, rig).snap_angle.reshape(len(self.strokes), -1).T
         return np.asarray(ends + signs * rig.drive_angle_offset[:, None])
 
-    def snap_offs_between(self, loaded: NDArray[np.bool_]) -> Floats:
-        """Last drive angle with a load, and the next without, seen likewise, shape (strokes, 2); NaN without one."""
-        between = np.full((len(self.strokes), 2), np.nan)
-        for k, (stroke, angles) in enumerate(zip(self.strokes, self._angles, strict=True)):
-            own, is_loaded = angles[: stroke.samples.size], loaded[stroke.samples]
-            last = own[is_loaded].max(initial=-np.inf)
-            after = own[~is_loaded & (own > last)]
-            if is_loaded.any() and after.size:
-                between[k] = last, after.min()
-        return between
+    def event_samples(self, loaded: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """Of each stroke the samples between which events lie: the last before contact, the first and the last in it,
+        and the next after, shape (strokes, 4); −1 where there is none.
+        """
+        out = np.full((len(self.strokes), 4), -1)
+        for row, stroke, angles in zip(out, self.strokes, self._angles, strict=True):
+            order = np.argsort(angles[: stroke.samples.size], kind="stable")
+            inside = np.flatnonzero(loaded[stroke.samples[order]])
+            if inside.size:
+                places = np.array([inside[0] - 1, inside[0], inside[-1], inside[-1] + 1])
+                known = (places >= 0) & (places < order.size)
+                row[known] = stroke.samples[order[places[known]]]
+        return out
+
+    def event_angles(self, loaded: NDArray[np.bool_]) -> Floats:
+        """Drive angles of `event_samples`, as seen in forward sweeps; NaN where there is none."""
+        samples = self.event_samples(loaded)
+        by_sample = np.empty(len(self.measured))
+        for stroke, angles in zip(self.strokes, self._angles, strict=True):
+            by_sample[stroke.samples] = angles[: stroke.samples.size]
+        return np.where(samples >= 0, by_sample[samples], np.nan)
 
     def usable(self, contours: Contour, rig: Rig | None = None) -> NDArray[np.bool_]:
         """Contours that every stroke can reach, and that the rod is past after snap-off, shape (n,)."""

@@ -72,7 +72,7 @@ class Observer:
         self.loaded = loaded_samples(model.measured, cell)
         stated = np.asarray(model.likelihood.load_cell.noise)
         self.noise = np.where(stated > 0.0, stated, model.deviation)
-        between = model.likelihood.snap_offs_between(self.loaded)
+        between = model.likelihood.event_angles(self.loaded)[:, 2:]
         self.ends = np.isfinite(between).all(axis=1)
         self._end, self._within = between.mean(axis=1), 0.5 * np.diff(between, axis=1)[:, 0]
         self._width = self._within / np.sqrt(3.0)
@@ -126,7 +126,7 @@ class NormalApproximation:
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
-        self.prior = prior
+        self.prior, self.model = prior, observer.model
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
         known, self._count = family.radius.directions, family.radius.count

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.inference.ensembles import whitened_moves
-from tactile_bayes.inference.normal_approximation import NormalApproximation, joined
+from tactile_bayes.inference.normal_approximation import NormalApproximation, joined, split
 
 __all__ = ["Whitening"]
 
@@ -64,6 +64,12 @@ class Whitening:
         for part in np.array_split(np.arange(len(coordinates)), max(1, len(coordinates) // 500)):
             points[part], growth[part] = self._moved(coordinates[part])
         return points, growth
+
+    def of(self, points: Floats) -> Floats:
+        """Coordinates of the model's parameters, (n, parameters)."""
+        scales, linear = split(self.approximation.model, points)
+        pulled, root = self.approximation.conditional(scales)
+        return np.hstack([np.log(scales), (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled])
 
     def moves(self) -> list[tuple[Any, float]]:
         return whitened_moves(self.bent)

@@ -25,6 +25,9 @@ class Coordinates(Protocol):
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Parameters, (n, parameters), and the logarithm of by how much a volume grows on the way to them, (n,)."""
 
+    def of(self, points: Floats) -> Floats:
+        """Coordinates of parameters, (n, parameters)."""
+
     def moves(self) -> list[tuple[Any, float]]:
         """Moves of one ensemble and their shares, new ones at each call."""
 
@@ -36,6 +39,9 @@ class Plain:
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         return coordinates, np.zeros(len(coordinates))
+
+    def of(self, points: Floats) -> Floats:
+        return points
 
     def moves(self) -> list[tuple[Any, float]]:
         return standard_moves()
