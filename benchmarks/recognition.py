@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import sys
 import time
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,10 @@ from tactile_bayes.tasks import run_tasks
 Floats = NDArray[np.float64]
 
 FAMILIES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
-NONE = "none of them"
+NONE = "edge"
+"""Two arcs that meet at an angle."""
+
+KINDS = (*FAMILIES, NONE)
 NOISES = {"quiet": (0.02, 0.008), "strong": (0.15, 0.06)}
 """Of forces [EI/L²] and of the moment [EI/L]."""
 
@@ -47,19 +51,29 @@ class Outcome(NamedTuple):
 
 
 def main(objects: int = 200, workers: int = 2) -> None:
-    kinds = [*FAMILIES, NONE]
-    tasks = [(kinds[k // 2 % len(kinds)], list(NOISES)[k % 2], k) for k in range(objects)]
-    outcomes: dict[tuple[str, str], list[Outcome]] = {(kind, noise): [] for noise in NOISES for kind in kinds}
-    for done, ((kind, noise, _), outcome) in enumerate(run_tasks(recognised, tasks, workers=workers)):
-        outcomes[kind, noise].append(outcome)
+    outcomes = []
+    for (kind, noise, _), outcome in run_tasks(recognised, tasks(objects), workers=workers):
+        outcomes.append((kind, noise, outcome))
         if sys.stderr.isatty():
-            print(f"\r{done + 1} of {objects}", end="", file=sys.stderr)
+            print(f"\r{len(outcomes)} of {objects}", end="", file=sys.stderr)
+    report(outcomes)
+
+
+def tasks(objects: int) -> list[tuple[str, str, int]]:
+    """Kinds and noises by turns."""
+    return [(KINDS[k // 2 % len(KINDS)], list(NOISES)[k % 2], k) for k in range(objects)]
+
+
+def report(found: Sequence[tuple[str, str, Outcome]]) -> None:
+    outcomes: dict[tuple[str, str], list[Outcome]] = {(kind, noise): [] for noise in NOISES for kind in KINDS}
+    for kind, noise, outcome in found:
+        outcomes[kind, noise].append(outcome)
     for noise in NOISES:
         print(
             f"\n{noise}: rows what it was, columns the most probable, or that none fits; then mean of its probability"
         )
         print(f"{'':<22}" + "".join(f"{head:>21}" for head in (*FAMILIES, "none fits", "no answer", "mean time")))
-        for kind in kinds:
+        for kind in KINDS:
             print(f"{kind:<22}" + "".join(f"{cell:>21}" for cell in _row(kind, outcomes[kind, noise])))
     print("\nProbability stated, how often, and how often it was this family:")
     stated, true = [], []

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 WIDTHS = (0.5, 1.0, 2.0)
 """Of the priors of sizes, exponents, amplitude and length scale: factors on what is stated."""
 
-_DRAWS = 12_000
+_DRAWS = 8000
 """Of the posterior that are used, evenly spread: what neighbours add is little."""
 
 _PRIOR_DRAWS, _OTHER_DRAWS = 4000, 1000
