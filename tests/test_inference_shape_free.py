@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.special import gamma, kv
 
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
@@ -133,3 +134,64 @@ def test_a_run_is_made_again_from_its_seed_and_has_units():
         np.testing.assert_array_equal(draws, other["posterior"][name])
     units = {name: one["posterior"][name].attrs["units"] for name in ("r", "amplitude", "length_scale", "z_1", "q")}
     assert units == {"r": "m", "amplitude": "1", "length_scale": "rad", "z_1": "1", "q": "m"}
+
+
+def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
+    measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, seed=1)
+
+    def run(steps, **options):
+        settings = SamplerSettings(ensembles=2, block_steps=10, max_steps=steps)
+        return infer_contour(
+            measured, family="shape-free", load_cell=CELL, nuisances=[], seed=1, settings=settings, **options
+        )
+
+    run(10, checkpoint=tmp_path / "run")
+    resumed, whole = run(20, checkpoint=tmp_path / "run"), run(20)
+    for name, draws in whole["posterior"].data_vars.items():
+        np.testing.assert_array_equal(draws, resumed["posterior"][name])
+
+
+def test_coordinates_lead_back():
+    whitening = whitened(model_of())
+    there = np.hstack([whitening.middle[: whitening.bent], 0.3 * np.ones(whitening.middle.size - whitening.bent)])[None]
+    points, _ = whitening.parameters(there)
+    np.testing.assert_allclose(whitening.of(points), there, atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["moment alone", "friction", "drift", "two pivots", "without events", "SI"])
+def test_other_rigs(what):
+    """The truth within the band of 95 % at eight of nine places."""
+    truth, cell, options = paper_profile("II", q=0.5), CELL, {}
+    record = scan(truth, drive_step=np.radians(2.0)).record
+    if what == "friction":
+        truth = Parabola(0.5, 0.5)
+        record = scan(truth, drive_step=np.radians(2.0), friction=0.2).record
+        options = {"nuisances": ["friction"], "settings": SamplerSettings(max_steps=150)}
+    if what == "drift":
+        options = {"nuisances": ["bias", "drift"]}
+    if what == "two pivots":
+        other = scan(truth, drive_step=np.radians(2.0), base=(0.25, 0.0)).record
+        other["sweep"] = other.sweep + 2
+        record = xr.concat([record, other], "sample", combine_attrs="override")
+        options = {"nuisances": ["base"]}
+    measured_with = 2 if what == "without events" else 1
+    if what == "without events":
+        options = {"events": False}
+    scale = 1.0
+    if what == "SI":
+        truth, scale = Parabola(0.5 / SI.length, 0.5 * SI.length), SI.length
+        record = scan(truth, rod=SI, drive_step=np.radians(2.0)).record
+        cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
+    measured = cell.measure(record, seed=measured_with)
+    if what == "moment alone":
+        for name in ("force_x", "force_y"):
+            measured[name] = measured[name] * np.nan
+        options = {"nuisances": []}
+    result = infer_contour(measured, family="shape-free", load_cell=cell, seed=1, **options)
+    x = scale * np.linspace(-0.6, 0.6, 9)
+    band = contour_band(result, x)
+    inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
+    assert inside.sum() >= 8, band
+    assert float((band.upper - band.lower).max()) < 0.1 * scale
+    assert check_record(result).passed

@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from tactile_bayes.cli.analysis import demo, infer
+from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
 
 __all__ = ["app", "main"]
@@ -42,6 +43,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")(infer)
+app.command(epilog="Example: tactile-bayes compare record.csv --out run/")(compare)
 app.command(epilog="Example: tactile-bayes demo --out results/demo")(demo)
 app.add_typer(dataset, name="dataset")
 

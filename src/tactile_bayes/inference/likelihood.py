@@ -154,9 +154,9 @@ class RecordLikelihood:
         out = np.full((len(self.strokes), 4), -1)
         for row, stroke, angles in zip(out, self.strokes, self._angles, strict=True):
             order = np.argsort(angles[: stroke.samples.size], kind="stable")
-            inside = np.flatnonzero(loaded[stroke.samples[order]])
-            if inside.size:
-                places = np.array([inside[0] - 1, inside[0], inside[-1], inside[-1] + 1])
+            first, last = _longest(loaded[stroke.samples[order]])
+            if first <= last:
+                places = np.array([first - 1, first, last, last + 1])
                 known = (places >= 0) & (places < order.size)
                 row[known] = stroke.samples[order[places[known]]]
         return out
@@ -319,6 +319,14 @@ class RecordLikelihood:
                 f"the likelihood of {np.count_nonzero(np.isnan(values))} contours is not a number: please report this"
             )
         return values
+
+
+def _longest(loaded: NDArray[np.bool_]) -> tuple[int, int]:
+    """First and last of the stretch in which loaded samples outnumber the others the most."""
+    sums = np.concatenate([[0], np.cumsum(np.where(loaded, 1, -1))])
+    lowest = np.minimum.accumulate(sums)
+    end = int(np.argmax(sums - lowest))
+    return int(np.argmin(sums[: end + 1])), end - 1
 
 
 def bases_of(measured: xr.Dataset) -> list[tuple[float, float]]:

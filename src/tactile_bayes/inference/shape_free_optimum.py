@@ -48,7 +48,7 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator) -
     """
     observer, prior = Observer(model), _linear_prior(model, rng)
     (scales,), (linear,) = split(model, point[None])
-    best = -np.inf
+    best, found = -np.inf, (-np.inf, scales, linear)
     for _ in range(_ROUNDS):
         approximation = NormalApproximation(observer, prior, scales, linear)
         scales = _likeliest(model, approximation, scales)
@@ -57,9 +57,14 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator) -
         density -= 0.5 * (np.square(tried - prior.mean) * prior.precision).sum(axis=1)
         linear, before, best = tried[np.argmax(density)], best, float(density.max())
         if best - before < _GAINED:
-            if not observer.insist(joined(scales[None], linear[None])):
+            here = joined(scales[None], linear[None])
+            probability = float(model.log_probability(here)[0])
+            if probability <= found[0]:
                 break
-            best = -np.inf
+            found, best = (probability, scales, linear), -np.inf
+            if not observer.insist(here):
+                break
+    _, scales, linear = found
     return Whitening(NormalApproximation(observer, prior, scales, linear), scales)
 
 

@@ -8,8 +8,10 @@ made; its settings are left alone, and nothing is shown.
 from tactile_bayes.plotting.axes import PALETTE
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
 from tactile_bayes.plotting.contour_map import band_detail, contour
+from tactile_bayes.plotting.family_bars import families
 from tactile_bayes.plotting.gap_map import gap
 from tactile_bayes.plotting.posteriors import pairs, trace
+from tactile_bayes.plotting.prior_contours import prior_contours
 from tactile_bayes.plotting.records import observables, predictive
 from tactile_bayes.plotting.rod_map import rods
 from tactile_bayes.plotting.tightening import tightening
@@ -21,10 +23,12 @@ __all__ = [
     "contact_ellipses",
     "contact_regions",
     "contour",
+    "families",
     "gap",
     "observables",
     "pairs",
     "predictive",
+    "prior_contours",
     "rods",
     "tightening",
     "touched",

@@ -1,0 +1,224 @@
+"""Families of contours side by side: how probable each is, and how well it foretells what it has not seen."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.axes import PALETTE, AxesArray, number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["families", "panel_count", "panel_height"]
+
+_WIDTHS = {0.5: ("v", -0.26, "priors half as wide"), 2.0: ("^", 0.26, "priors twice as wide")}
+"""Marker, place beside the bar's middle, and what it says."""
+
+_LITTLE = 4.0
+"""A difference of elpd below which little is to be concluded."""
+
+_FAR = -100.0
+"""Differences from which on the axis is logarithmic."""
+
+_LEGEND_BELOW = 34.0
+"""Points between the panel and its legend, in which ticks and label are."""
+
+_WARNING = "#D55E00"
+
+
+def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
+    """Families of contours compared: the probability of each, and its elpd difference where there is one.
+
+    Over both panels stands the verdict. A family whose check fails has a grey, hatched bar and says "does not fit"; one
+    that was not sampled, being far from fitting, says so.
+
+    Parameters
+    ----------
+    comparison : xr.Dataset
+        From `tactile_bayes.compare_families`.
+    axes : array_like of Axes, shape (2,), optional
+        For probabilities and elpd differences; of shape (1,) where the comparison is without leave-one-out densities.
+
+    Returns
+    -------
+    ndarray of Axes, shape (2,) or (1,)
+
+    Raises
+    ------
+    ParameterError
+        If this is no comparison, or the axes have another shape.
+
+    Examples
+    --------
+    >>> found = xr.Dataset(
+    ...     {
+    ...         "probability": ("family", [0.9, 0.1]),
+    ...         "probability_by_width": (("prior_width", "family"), [[0.85, 0.15], [0.9, 0.1], [0.95, 0.05]]),
+    ...         "fits": ("family", [True, True]),
+    ...         "sampled": ("family", [True, True]),
+    ...         "converged": ("family", [True, True]),
+    ...     },
+    ...     coords={"family": ["circle", "ellipse"], "prior_width": [0.5, 1.0, 2.0]},
+    ...     attrs={"verdict": "circle with probability 0.9, ellipse with probability 0.1", "none_fits": 0},
+    ... )
+    >>> families(found).shape
+    (1,)
+    """
+    if not (isinstance(comparison, xr.Dataset) and {"probability", "fits", "sampled"} <= set(comparison)):
+        raise ParameterError("this is no comparison of families: give what compare_families returned")
+    panels = _panels(comparison, axes)
+    places = np.arange(comparison.sizes["family"], dtype=float)
+    _draw_probabilities(panels[0], comparison, places)
+    if len(panels) == 2:
+        _draw_differences(panels[1], comparison, places)
+    for ax in panels:
+        ax.set_ylim(places[-1] + 0.6, places[0] - 0.6)
+        ax.spines[["top", "right"]].set_visible(False)
+    _write_verdict(panels, comparison)
+    return panels
+
+
+def panel_count(comparison: xr.Dataset) -> int:
+    return 2 if "elpd_difference" in comparison else 1
+
+
+def panel_height(comparison: xr.Dataset) -> float:
+    """Height of a figure that holds the panels [inches]."""
+    return 1.9 + 0.48 * comparison.sizes["family"]
+
+
+def _panels(comparison: xr.Dataset, axes: Any) -> AxesArray:
+    wanted = panel_count(comparison)
+    if axes is None:
+        from matplotlib import pyplot as plt
+
+        size = (7.0, panel_height(comparison))
+        axes = plt.subplots(1, wanted, figsize=size, layout="constrained", sharey=True, squeeze=False)[1][0]
+    panels = np.atleast_1d(np.asarray(axes, dtype=object))
+    if panels.shape != (wanted,):
+        raise ParameterError(
+            f"axes have shape {panels.shape}, and ({wanted},) is wanted: for probabilities"
+            + (" and elpd differences" if wanted == 2 else "; there are no leave-one-out densities")
+        )
+    return panels
+
+
+def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
+    from matplotlib.transforms import ScaledTranslation
+
+    probability = comparison["probability"].values
+    for place, share, fits, sampled in zip(
+        places, probability, comparison["fits"].values, comparison["sampled"].values, strict=True
+    ):
+        style: dict[str, Any] = {"color": PALETTE["median"]}
+        if not fits:
+            style = {"facecolor": "0.9", "edgecolor": "0.55", "hatch": "////", "linewidth": 0.8}
+        if np.isfinite(share):
+            ax.barh(place, share, height=0.5, **style)
+            _write_share(ax, place, share, inside_colour="white" if fits else "black", sampled=bool(sampled))
+    if np.isnan(probability).any():
+        ax.text(0.5, 0.5, "no probabilities to be had", transform=ax.transAxes, ha="center", va="center")
+    else:
+        for width, (marker, beside, label) in _WIDTHS.items():
+            sampled = comparison["sampled"].values
+            shares = comparison["probability_by_width"].sel(prior_width=width).values
+            ax.plot(
+                shares[sampled],
+                places[sampled] + beside,
+                linestyle="none",
+                marker=marker,
+                markersize=5.0,
+                color="black",
+                markerfacecolor="white",
+                clip_on=False,
+                zorder=3,
+                label=label,
+            )
+        below = ax.transAxes + ScaledTranslation(0.0, -_LEGEND_BELOW / 72.0, ax.figure.dpi_scale_trans)
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": below}
+        ax.legend(fontsize="small", frameon=False, ncols=2, columnspacing=1.0, handletextpad=0.2, **place)
+    ax.set_xlim(0.0, 1.0)
+    ax.set_xlabel("probability" if comparison["fits"].any() else "probability: the least wrong")
+    labels = [_family_label(comparison.sel(family=name)) for name in comparison["family"].values]
+    ax.set_yticks(places, labels)
+    for tick, fits in zip(ax.yaxis.get_major_ticks(), comparison["fits"].values, strict=True):
+        tick.label1.set_color("black" if fits else "0.4")
+    ax.tick_params(axis="y", length=0.0)
+
+
+def _family_label(family: xr.Dataset) -> str:
+    """Name and, below it, what is wrong."""
+    name = str(family["family"].values)
+    if not family["sampled"]:
+        return f"{name}\nnot sampled: far off"
+    wrong = [] if family["fits"] else ["does not fit"]
+    wrong += [] if family["converged"] else ["not converged"]
+    return "\n".join((name, ", ".join(wrong))) if wrong else name
+
+
+def _write_share(ax: Axes, place: float, share: float, *, inside_colour: str, sampled: bool) -> None:
+    if not sampled:
+        return
+    words = "<0.001" if share < 1e-3 else ">0.999" if share > 0.999 else number(share, digits=2)
+    inside = share > 0.75
+    ax.annotate(
+        words,
+        (share, place),
+        (-8.0 if inside else 8.0, 0.0),
+        textcoords="offset points",
+        ha="right" if inside else "left",
+        va="center",
+        fontsize="small",
+        color=inside_colour if inside else "black",
+        bbox={"facecolor": "0.9", "edgecolor": "none", "pad": 1.0} if inside and inside_colour == "black" else None,
+    )
+
+
+def _draw_differences(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
+    difference, error = (comparison[f"elpd_difference{end}"].values for end in ("", "_error"))
+    ax.axvspan(-_LITTLE, 0.0, color="0.92", linewidth=0.0, zorder=0)
+    ax.axvline(0.0, color="0.4", linewidth=0.8, zorder=1)
+    inside: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points"}
+    fits = comparison["fits"].values
+    for chosen, colour, filling in ((fits, PALETTE["median"], PALETTE["median"]), (~fits, "0.55", "white")):
+        ax.errorbar(
+            difference[chosen],
+            places[chosen],
+            xerr=error[chosen],
+            linestyle="none",
+            marker="o",
+            markersize=5.0,
+            markerfacecolor=filling,
+            color=colour,
+            capsize=2.5,
+            linewidth=1.2,
+            zorder=3,
+        )
+    ax.annotate(
+        "little", (-0.5 * _LITTLE, 0.0), (0.0, 2.0), **inside, ha="center", va="bottom", fontsize="small", color="0.35"
+    )
+    least = float(np.min((difference - error)[np.isfinite(difference - error)], initial=0.0))
+    if least < _FAR:
+        ax.set_xscale("symlog", linthresh=10.0)
+        decades = int(np.log10(-least))
+        ax.set_xticks([0.0, *(-(10.0**k) for k in range(1, decades + 1) if k % 2 or decades < 4)])
+        ax.set_xlim(1.5 * least, 3.0)
+        ax.xaxis.set_major_formatter(lambda value, _: number(value))
+    ax.set_xlabel("how left-out samples are foretold:\nelpd difference ± standard error")
+    ax.tick_params(axis="y", length=0.0)
+
+
+def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:
+    """Above the panels, from the left edge of the first one."""
+    words, style, letters = str(comparison.attrs["verdict"]), {"fontsize": "medium"}, 10.5
+    if not comparison["fits"].any():
+        words, letters = "None fits: the record does not look like one of any of these shapes", 6.5
+        style = {"fontsize": "x-large", "fontweight": "bold", "color": _WARNING}
+    width = float(panels[0].figure.get_figwidth())
+    wrapped = textwrap.fill(words, max(20, int(letters * width)), break_on_hyphens=False)
+    panels[0].set_title(wrapped, loc="left", **style)
