@@ -180,24 +180,6 @@ def test_a_file_that_is_not_there(tmp_path):
 # --- Interrupts -----------------------------------------------------------------------------------------------------
 
 
-def test_an_interrupt_that_sampling_outlives_ends_the_comparison(instead, record, tmp_path):
-    """As it ends one posterior, sampling is over: what comes after it is not begun."""
-
-    def interrupted(progress):
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:
-            progress("circle", None)
-        pytest.fail("went on")
-
-    instead(made_up([0.4, 0.6]), before=interrupted)
-    result = call("compare", record, "--out", tmp_path, "--quiet")
-    assert result.exit_code == 130
-    assert result.stderr == "tactile-bayes: interrupted, results are incomplete\n"
-    assert list(tmp_path.iterdir()) == []
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
 SAMPLING = """
 import functools
 from tactile_bayes.cli import main
@@ -229,6 +211,6 @@ def test_control_c_while_sampling_ends_all_of_it(record, tmp_path):
         process.send_signal(signal.SIGINT)
         out, errors = process.communicate(timeout=300)
     assert process.returncode == 130
-    assert errors == "tactile-bayes: interrupted, results are incomplete\n"
+    assert errors == "tactile-bayes: interrupted while sampling shape-free: nothing comes of it\n"
     assert set(out.splitlines()) <= {"sampling"}
     assert list((tmp_path / "run").iterdir()) == []

@@ -102,6 +102,16 @@ def test_a_run_is_made_again_from_its_seed(circle, compared):
     assert np.isfinite(again.log_evidence).all()
 
 
+def test_an_interrupt_ends_the_comparison(circle):
+    def interrupt(name, state):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="interrupted while sampling circle: nothing comes of it"):
+        compare_families(
+            circle, families=["circle", "ellipse"], load_cell=CELL, seed=1, nuisances=(), progress=interrupt
+        )
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

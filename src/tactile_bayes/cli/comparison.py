@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -29,9 +28,6 @@ from tactile_bayes.cli.record_options import (
 from tactile_bayes.cli.sampling_bar import sampling_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from types import FrameType
-
     import xarray as xr
 
     from tactile_bayes.comparison_run import ComparisonRun
@@ -98,14 +94,11 @@ def compare(
         nuisance=nuisance,
         as_stated=as_stated,
     )
-    with sampling_bar(quiet) as show, _stopped_by_interrupts() as stop_if_interrupted:
+    with sampling_bar(quiet) as show:
 
         def note(name: str, progress: Progress) -> None:
-            try:
-                if show is not None:
-                    show(progress, name)
-            finally:
-                stop_if_interrupted()
+            if show is not None:
+                show(progress, name)
 
         run = compare_into(
             measured,
@@ -120,40 +113,6 @@ def compare(
             progress=note,
         )
     _print_run(run)
-
-
-class _Stopped(BaseException):
-    """An interrupt that sampling does not take for the end of one posterior."""
-
-
-@contextmanager
-def _stopped_by_interrupts() -> Iterator[Callable[[], object]]:
-    """An interrupt ends all of it: of families that were cut short, and others that were not, nothing is to be said."""
-    import signal
-    import threading
-
-    come: list[int] = []
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        come.append(number)
-        raise KeyboardInterrupt
-
-    def stop_if_interrupted() -> None:
-        if come:
-            raise _Stopped
-
-    usual = signal.getsignal(signal.SIGINT)
-    ours = usual is signal.default_int_handler and threading.current_thread() is threading.main_thread()
-    if ours:
-        signal.signal(signal.SIGINT, interrupt)
-    try:
-        yield stop_if_interrupted
-        stop_if_interrupted()
-    except _Stopped:
-        raise KeyboardInterrupt from None
-    finally:
-        if ours:
-            signal.signal(signal.SIGINT, usual)
 
 
 def _print_run(run: ComparisonRun) -> None:

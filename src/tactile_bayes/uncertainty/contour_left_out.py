@@ -66,6 +66,7 @@ def foretold_samples(
         settings=settings,
         coordinates=walk.coordinates,
     )
+    draws.refuse_interrupted(f"{model.family.name} without some samples")
     of_events = _densities(model, draws.samples)[..., chosen]
     for i, of_sample in enumerate(chosen):
         one = left_out_from_wider(of_events, i)

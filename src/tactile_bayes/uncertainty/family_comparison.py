@@ -145,6 +145,8 @@ def compare_families(
     ------
     RecordError, ParameterError, InferenceError
         As of `infer_contour`; ParameterError if there are not at least two different families.
+    KeyboardInterrupt
+        At Ctrl-C: of families some of which were cut short, nothing is to be said.
 
     Notes
     -----
@@ -185,6 +187,7 @@ def compare_families(
             continue
         watch = None if progress is None else functools.partial(progress, name)
         found = sampled(problem, seed=of_family[1], settings=settings, progress=watch, walk=walk)
+        found.draws.refuse_interrupted(name)
         try:
             evidence = contour_evidence(problem.model, found, np.random.default_rng(of_family[2]))
         except InferenceError:

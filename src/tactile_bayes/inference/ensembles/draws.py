@@ -54,6 +54,11 @@ class Draws:
     places: tuple[Place, ...] = ()
     """Where ensembles sit if each has come to rest but not all in one place; else empty."""
 
+    def refuse_interrupted(self, what: str) -> None:
+        """Pass an interrupt on that ended the run: for what cannot use a part of it."""
+        if "interrupted" in self.message:
+            raise KeyboardInterrupt(f"interrupted while sampling {what}: nothing comes of it")
+
     def by_walker(self) -> Floats:
         """The samples as (chain, walker, step, parameter)."""
         chains, _, parameters = self.samples.shape
