@@ -108,7 +108,13 @@ def test_an_interrupt_ends_the_comparison(circle):
 
     with pytest.raises(KeyboardInterrupt, match="interrupted while sampling circle: nothing comes of it"):
         compare_families(
-            circle, families=["circle", "ellipse"], load_cell=CELL, seed=1, nuisances=(), progress=interrupt
+            circle,
+            families=["circle", "ellipse"],
+            load_cell=CELL,
+            seed=1,
+            nuisances=(),
+            settings=SamplerSettings(ensembles=2, min_ess=1e9),
+            progress=interrupt,
         )
 
 
