@@ -189,7 +189,10 @@ REPEATED = {
 }
 
 
-@pytest.mark.parametrize("name", REPEATED)
+QUICK = ("correlated normal", "box")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow) for n in REPEATED])
 def test_standard_errors_are_those_of_repetitions(name):
     target, shape, correlation = REPEATED[name]
     scores = z_scores(target, shape, 120, correlation=correlation, proposals=400)

@@ -136,6 +136,7 @@ def test_a_run_is_made_again_from_its_seed_and_has_units():
     assert units == {"r": "m", "amplitude": "1", "length_scale": "rad", "z_1": "1", "q": "m"}
 
 
+@pytest.mark.slow
 def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
     measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, seed=1)
 
