@@ -123,6 +123,9 @@ def _print_run(run: ComparisonRun) -> None:
     console.print(found.attrs["verdict"], markup=False, highlight=False, soft_wrap=True)
     console.print()
     console.print(_table(found))
+    far = found.family.values[~found.sampled.values]
+    if far.size:
+        console.print(f"Far off, and not sampled: {', '.join(far)}", highlight=False, soft_wrap=True)
     if "largest_k" in found:
         poor = found.family.values[found.largest_k.values > _POOR_K]
         if poor.size:
@@ -137,26 +140,21 @@ def _print_run(run: ComparisonRun) -> None:
 
 
 def _table(found: xr.Dataset) -> object:
+    """No wider than 80 columns; errors of the evidence are in the files."""
     from rich.table import Table
 
     left_out = "elpd" in found
     table = Table(box=None, pad_edge=False)
-    heads = ["family", "probability", "log evidence"]
-    heads += ["elpd difference", "weight"] if left_out else []
-    for head in [*heads, "check p", "fits", "converged"]:
-        table.add_column(head, justify="left" if head in ("family", "fits", "converged") else "right")
+    heads = ["family", "probability", "log evid.", *(["elpd diff.", "weight"] if left_out else []), "check p", "fits"]
+    for head in heads:
+        table.add_column(head, justify="left" if head in ("family", "fits") else "right", no_wrap=True)
     for name in found.family.values:
         row = {str(column): values.item() for column, values in found.sel(family=name).items() if not values.ndim}
-        cells = [_share(row["probability"]), _with_error(row["log_evidence"], row["log_evidence_error"], 2)]
+        cells = [_share(row["probability"]), _fixed(row["log_evidence"])]
         if left_out:
-            cells += [_with_error(row["elpd_difference"], row["elpd_difference_error"], 1), _share(row["weight"])]
-        converged = _yes_or_no(row["converged"]) if row["sampled"] else "not sampled"
-        table.add_row(str(name), *cells, _share(row["p_value"]), _yes_or_no(row["fits"]), converged)
+            cells += [_with_error(row["elpd_difference"], row["elpd_difference_error"]), _share(row["weight"])]
+        table.add_row(str(name), *cells, _share(row["p_value"]), "yes" if row["fits"] else "no")
     return table
-
-
-def _yes_or_no(value: bool) -> str:
-    return "yes" if value else "no"
 
 
 def _share(value: float) -> str:
@@ -168,7 +166,11 @@ def _share(value: float) -> str:
     return f"{value:g}"
 
 
-def _with_error(value: float, error: float, digits: int) -> str:
+def _fixed(value: float) -> str:
+    return "–" if value != value else f"{value:.1f}"
+
+
+def _with_error(value: float, error: float) -> str:
     if value != value:
         return "–"
-    return f"{value:.{digits}f} ± {error:.{digits}f}" if value or error else "0"
+    return f"{value:.1f} ± {error:.1f}" if value or error else "0"
