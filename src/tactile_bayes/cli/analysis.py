@@ -42,7 +42,10 @@ def infer(
     out: Out,
     family: Annotated[
         str,
-        typer.Option(help="Shape: parabola, circle, ellipse, power-law, or one for each flank: parabola/power-law."),
+        typer.Option(
+            help="Shape: parabola, circle, ellipse, power-law, one for each flank: parabola/power-law; or shape-free, "
+            "any smooth one."
+        ),
     ] = "parabola",
     column: Columns = None,
     split_sweeps: SplitSweeps = False,
