@@ -16,8 +16,8 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
-from tactile_bayes.inference.random_radius import RandomRadius
-from tactile_bayes.inference.shape_free_optimum import whitening_at
+from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
+from tactile_bayes.inference.shape_free_posterior.random_radius import RandomRadius
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan

@@ -13,8 +13,8 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit, fitted_noise, optimum_of
 from tactile_bayes.inference.ensembles import Coordinates, Logarithms, SamplerSettings, in_coordinates, scatter_walkers
 from tactile_bayes.inference.nuisances import MAY_VANISH
-from tactile_bayes.inference.shape_free import ShapeFreeFamily
-from tactile_bayes.inference.shape_free_optimum import whitening_at
+from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
+from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.start import gather
 
 __all__ = ["Walk", "walk_of"]

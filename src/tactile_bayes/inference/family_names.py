@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import FAMILIES, FLANKS, Family
-from tactile_bayes.inference.shape_free import SHAPE_FREE
+from tactile_bayes.inference.shape_free_posterior.family import SHAPE_FREE
 
 __all__ = ["family_named"]
 

@@ -23,7 +23,7 @@ from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.shape_free import SHAPE_FREE
+from tactile_bayes.inference.shape_free_posterior.family import SHAPE_FREE
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import rod_of, validate, with_rod
 from tactile_bayes.rod import Rod

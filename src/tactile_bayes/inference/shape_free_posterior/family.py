@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.inference.families import Family, Prior, parabola_through
-from tactile_bayes.inference.random_radius import RandomRadius
+from tactile_bayes.inference.shape_free_posterior.random_radius import RandomRadius
 
 __all__ = ["SHAPE_FREE", "ShapeFreeFamily"]
 

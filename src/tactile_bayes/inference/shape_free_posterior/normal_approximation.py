@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.shape_free import ShapeFreeFamily
+from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.normal_approximation import (
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
     LinearPrior,
     NormalApproximation,
     Observer,
@@ -15,7 +15,7 @@ from tactile_bayes.inference.normal_approximation import (
     linear_names,
     split,
 )
-from tactile_bayes.inference.whitening import Whitening
+from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
 __all__ = ["whitening_at"]
 

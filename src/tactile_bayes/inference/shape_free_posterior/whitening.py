@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.inference.ensembles import whitened_moves
-from tactile_bayes.inference.normal_approximation import NormalApproximation, joined, split
+from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation, joined, split
 
 __all__ = ["Whitening"]
 
