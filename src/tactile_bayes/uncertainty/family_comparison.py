@@ -158,6 +158,18 @@ def compare_families(
     sample's density is that given all other samples. Samples next to first contact and snap-off are foretold from a
     posterior that is inferred again without them, since importance sampling cannot reach contours that would have let
     go earlier; of a load cell that drifts they are left out, of all families alike.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, scan
+    >>> from tactile_bayes.contours import Circle
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(Circle(0.8, q=0.5), drive_step=0.1).record, seed=1)
+    >>> quick = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.1)
+    >>> options = {"load_cell": cell, "nuisances": [], "leave_one_out": False, "settings": quick}
+    >>> found = compare_families(measured, families=["circle", "ellipse", "parabola"], seed=1, **options)
+    >>> found.attrs["most_probable"], found.fits.values.tolist()
+    ('circle', [True, True, False])
     """
     settings = settings or SamplerSettings()
     names = _checked(families, priors or {})
