@@ -430,6 +430,7 @@ def test_one_folder_is_for_one_run_at_a_time(tmp_path):
     assert draw(tmp_path).steps_run == 60
 
 
+@pytest.mark.slow
 def test_where_there_are_no_locks_a_second_run_writes_over_nothing(tmp_path, monkeypatch):
     """The first run finds what a second has written meanwhile, and stops; the second has ended well."""
     monkeypatch.setitem(sys.modules, "fcntl", None)

@@ -15,6 +15,7 @@ def log_probability(points):
         return np.where(size > 0.0, 2.0 * np.log(size) - size, -np.inf) - 0.5 * place**2
 
 
+@pytest.mark.slow
 def test_logarithms_change_what_is_walked_in_and_not_what_is_drawn():
     """Mean and variance of the gamma distribution are 3: within 5 standard errors of 4000 effective draws."""
     coordinates = Logarithms(np.array([True, False]))

@@ -189,7 +189,7 @@ REPEATED = {
 }
 
 
-QUICK = ("correlated normal", "box")
+QUICK = ("correlated normal",)
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow) for n in REPEATED])
@@ -280,6 +280,7 @@ def sampled(target, size, *, scatter, seed, **settings) -> Evidence:
     return bridge_evidence(target.log_density, draws.samples, draws.log_probability, rng, proposals=2000)
 
 
+@pytest.mark.slow
 def test_draws_of_the_sampler():
     target = HalfNormals(3, 2)
     result = sampled(

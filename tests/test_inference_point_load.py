@@ -255,6 +255,7 @@ def rms_over_range(tree):
     return np.sqrt(np.mean(left**2)) / np.ptp(reading)
 
 
+@pytest.mark.slow
 def test_a_real_whisker_is_a_large_deflection_rod(whisker_posterior):
     """Residual at the posterior mean at most 0.2 % of the sensor's range, and data that the posterior might have made.
 

@@ -83,7 +83,9 @@ def whitened(model):
 SI = Rod(length=0.1, flexural_rigidity=2e-4)
 
 
-@pytest.mark.parametrize("rod", [None, SI], ids=["dimensionless", "SI"])
+@pytest.mark.parametrize(
+    "rod", [pytest.param(None, marks=pytest.mark.slow, id="dimensionless"), pytest.param(SI, id="SI")]
+)
 def test_a_volume_grows_as_the_whitening_says(rod):
     """Log-determinant of the derivatives, by differences."""
     unit = (1.0, 1.0) if rod is None else (rod.force_unit, rod.moment_unit)
@@ -125,6 +127,7 @@ def test_a_smooth_contour_is_within_its_band(profile, nuisances):
     assert check_record(result).passed
 
 
+@pytest.mark.slow
 def test_a_run_is_made_again_from_its_seed_and_has_units():
     settings = SamplerSettings(ensembles=2, max_steps=20)
     cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)

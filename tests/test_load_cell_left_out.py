@@ -50,6 +50,7 @@ def test_it_is_the_ratio_of_dense_densities_with_and_without_a_sample(name, miss
     np.testing.assert_allclose(result, expected, rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NORMAL)
 def test_it_is_dense_over_many_samples(name):
     """The dense density is a difference of numbers in thousands."""
