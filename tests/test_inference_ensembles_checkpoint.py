@@ -62,11 +62,12 @@ def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_a_checkpoint_does_not_change_the_draws(tmp_path):
     assert_same(draw(tmp_path / "made" / "on the way", settings=STEADY), draw(settings=STEADY))
 
 
-@pytest.mark.parametrize("calls", [1, 3, 25, 50, 97])
+@pytest.mark.parametrize("calls", [1, 25, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 50, 97))])
 def test_a_run_goes_on_bit_by_bit_wherever_it_was_killed(tmp_path, calls):
     with pytest.raises(Killed):
         draw(tmp_path, target=Counted(killed_at=calls))
