@@ -10,7 +10,7 @@ PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench coverage calibration samplers images lint clean
+.PHONY: demo test test-slow bench coverage calibration shapes recognition samplers images lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -31,6 +31,12 @@ coverage: $(READY)
 
 calibration: $(READY)
 	$(BIN)/python -m benchmarks.calibration
+
+shapes: $(READY)
+	$(BIN)/python -m benchmarks.shapes
+
+recognition: $(READY)
+	$(BIN)/python -m benchmarks.recognition
 
 samplers: $(READY)
 	$(BIN)/python -m pip install --quiet --target $(PEERS) --upgrade --no-deps \
