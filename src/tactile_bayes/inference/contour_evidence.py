@@ -58,8 +58,8 @@ def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Gener
     InferenceError
         If the draws are too few or the posterior is nothing like a normal one, so that the integral is not to be had.
     """
-    coordinates, (chains, count, size) = sampled.coordinates, sampled.draws.samples.shape
-    kept = np.unique(np.linspace(0, count - 1, min(count, _DRAWS // chains)).astype(np.intp))
+    coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
+    kept = sampled.draws.evenly(_DRAWS // chains)
     points = sampled.draws.samples[:, kept].reshape(-1, size)
     places = coordinates.of(points)
     _, growth = coordinates.parameters(places)
@@ -75,7 +75,7 @@ def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Gener
         others = widened(own, width)
         change = np.zeros(len(points))
         for name, prior in others.items():
-            if width != 1.0:
+            if prior is not own[name]:
                 values = points[:, model.names.index(name)]
                 change += prior.logpdf(values) - own[name].logpdf(values)
         reached = _share_within_reach(model, others, rng, _PRIOR_DRAWS if width == 1.0 else _OTHER_DRAWS)

@@ -27,7 +27,7 @@ _PRIOR_DRAWS = 1000
 def groups_of(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
     """The result's groups except the prior."""
     chains, count, _ = draws.samples.shape
-    kept = np.unique(np.linspace(0, count - 1, min(count, _KEPT_DRAWS)).astype(int))
+    kept = draws.evenly(_KEPT_DRAWS)
     points = draws.samples[:, kept].reshape(-1, len(model.names))
     predicted, likelihood, events = [], [], []
     for part in np.array_split(points, max(1, len(points) // 200)):

@@ -83,7 +83,7 @@ def contact_fit(model: ContourModel) -> Floats | None:
         return None
     contacts = reconstruct(
         model.measured,
-        load_cell=model.noise.cell if model.noise.names == ("noise_scale",) else None,
+        load_cell=model.noise.stated_cell,
         friction=model.nuisances.friction,
     )
     force = np.hypot(model.measured.force_x.values, model.measured.force_y.values)

@@ -84,7 +84,7 @@ def contour_problem(
                 f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
             )
     data_sha256 = record_hash(measured)
-    loaded = loaded_samples(measured, noise.cell if noise.names == ("noise_scale",) else None)
+    loaded = loaded_samples(measured, noise.stated_cell)
     if not loaded.any():
         raise InferenceError(
             "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "

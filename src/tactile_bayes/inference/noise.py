@@ -27,6 +27,11 @@ class Noise(NamedTuple):
     priors: dict[str, Prior]
 
     @property
+    def stated_cell(self) -> LoadCell | None:
+        """The cell, if its noise is stated but for a factor; None where nothing is."""
+        return self.cell if self.names == ("noise_scale",) else None
+
+    @property
     def inferred(self) -> tuple[str, ...]:
         """Entries of the cell that are not known beforehand, or stated elsewhere."""
         return ("frame", *self.names)

@@ -11,7 +11,7 @@ from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem
 from tactile_bayes.inference.contour_start import walk_of
-from tactile_bayes.inference.ensembles import SamplerSettings, Seed, sample, spawn
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, sample, spawn
 from tactile_bayes.uncertainty.leave_one_out import left_out, left_out_from_wider
 
 __all__ = ["ForetoldSamples", "foretold_samples"]
@@ -44,7 +44,7 @@ def foretold_samples(
     by all of them but one.
     """
     model = problem.model
-    logs = _densities(model, sampled.draws.samples)
+    logs = _densities(model, sampled.draws)
     found = left_out(logs)
     events = model.likelihood.event_samples(problem.loaded)
     chosen = np.unique(events[events >= 0])
@@ -67,7 +67,7 @@ def foretold_samples(
         coordinates=walk.coordinates,
     )
     draws.refuse_interrupted(f"{model.family.name} without some samples")
-    of_events = _densities(model, draws.samples)[..., chosen]
+    of_events = _densities(model, draws)[..., chosen]
     for i, of_sample in enumerate(chosen):
         one = left_out_from_wider(of_events, i)
         log_density[of_sample], error[of_sample] = one.log_density, one.standard_error
@@ -79,11 +79,11 @@ def _knows_of_others(model: ContourModel) -> bool:
     return bool(cell.drift or any(cell.bias_uncertainty))
 
 
-def _densities(model: ContourModel, samples: Floats) -> Floats:
+def _densities(model: ContourModel, draws: Draws) -> Floats:
     """Log-densities of samples, given the others where they know of them, shape (chains, draws, samples)."""
-    chains, count, parameters = samples.shape
-    kept = np.unique(np.linspace(0, count - 1, min(count, _DRAWS // chains)).astype(np.intp))
-    points = samples[:, kept].reshape(-1, parameters)
+    chains, _, parameters = draws.samples.shape
+    kept = draws.evenly(_DRAWS // chains)
+    points = draws.samples[:, kept].reshape(-1, parameters)
     logs = []
     for part in np.array_split(points, max(1, len(points) // 200)):
         loads, reached = model.loads_with_errors(part)

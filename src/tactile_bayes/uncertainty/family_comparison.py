@@ -29,7 +29,7 @@ from tactile_bayes.record import rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 from tactile_bayes.uncertainty.contour_left_out import ForetoldSamples, foretold_samples
 from tactile_bayes.uncertainty.family_verdict import verdict_on
-from tactile_bayes.uncertainty.leave_one_out import stacking_weights
+from tactile_bayes.uncertainty.leave_one_out import difference, stacking_weights
 from tactile_bayes.uncertainty.record_check import check_record
 
 __all__ = ["SHAPES", "compare_families"]
@@ -273,12 +273,12 @@ def _left_out(foretold: Sequence[ForetoldSamples | None]) -> dict[str, Any]:
     logs = np.array([of_family.log_density for of_family in known])
     common = np.isfinite(logs).all(axis=0)
     elpd = logs[:, common].sum(axis=1)
-    apart = logs[:, common] - logs[np.argmax(elpd), common]
+    apart = [difference(of_family, logs[np.argmax(elpd), common]) for of_family in logs[:, common]]
     columns = {
         "elpd": elpd,
         "elpd_error": [np.sqrt(np.sum(of_family.standard_error[common] ** 2)) for of_family in known],
-        "elpd_difference": apart.sum(axis=1),
-        "elpd_difference_error": np.sqrt(common.sum()) * apart.std(axis=1, ddof=1),
+        "elpd_difference": [one.difference for one in apart],
+        "elpd_difference_error": [one.standard_error for one in apart],
         "weight": stacking_weights(logs[:, common]),
         "largest_k": [np.nanmax(of_family.pareto_k) for of_family in known],
     }

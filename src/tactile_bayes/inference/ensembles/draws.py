@@ -59,6 +59,11 @@ class Draws:
         if "interrupted" in self.message:
             raise KeyboardInterrupt(f"interrupted while sampling {what}: nothing comes of it")
 
+    def evenly(self, most: int) -> NDArray[np.intp]:
+        """Places of draws of each chain, at most so many, evenly spread."""
+        count = self.samples.shape[1]
+        return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+
     def by_walker(self) -> Floats:
         """The samples as (chain, walker, step, parameter)."""
         chains, _, parameters = self.samples.shape

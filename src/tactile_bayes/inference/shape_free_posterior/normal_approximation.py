@@ -68,8 +68,7 @@ class Observer:
 
     def __init__(self, model: ContourModel) -> None:
         self.model = model
-        cell = model.noise.cell if model.noise.names == ("noise_scale",) else None
-        self.loaded = loaded_samples(model.measured, cell)
+        self.loaded = loaded_samples(model.measured, model.noise.stated_cell)
         stated = np.asarray(model.likelihood.load_cell.noise)
         self.noise = np.where(stated > 0.0, stated, model.deviation)
         between = model.likelihood.event_angles(self.loaded)[:, 2:]
