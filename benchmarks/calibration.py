@@ -24,6 +24,7 @@ from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.scanning import Scan
 from tactile_bayes.tasks import run_tasks
 
 Floats = NDArray[np.float64]
@@ -99,15 +100,7 @@ def replicate(task: tuple[str, int]) -> Outcome:
     ranks = {
         parameter: int(np.sum(draws[parameter].values.ravel()[picked] < value)) for parameter, value in truth.items()
     }
-    forward, backward = scan.events["forward"], scan.events["backward"]
-    left, right = sorted([backward.snap_off.contact_x, forward.snap_off.contact_x])
-    gap = np.linspace(left, right, PLACES + 2)[1:-1]
-    touched = np.concatenate(
-        [
-            np.linspace(event.snap_off.contact_x, event.first_contact.contact_x, PLACES + 1)[1:]
-            for event in (forward, backward)
-        ]
-    )
+    gap, touched = gap_and_touched(scan)
     in_gap, out_of_gap = (held(result, contour, x) for x in (gap, touched))
     return Outcome(ranks, in_gap, out_of_gap, bool(result.attrs["converged"]), seconds)
 
@@ -131,6 +124,17 @@ def sensed(truth: Mapping[str, float]) -> tb.LoadCell:
     scale = truth["noise_scale"]
     bias = truth["moment_bias"], truth["force_x_bias"], truth["force_y_bias"]
     return tb.LoadCell(force_noise=scale * CELL.force_noise, moment_noise=scale * CELL.moment_noise, bias=bias)
+
+
+def gap_and_touched(scan: Scan) -> tuple[Floats, Floats]:
+    """Places in the gap, and beside it as far as first contact."""
+    forward, backward = scan.events["forward"], scan.events["backward"]
+    left, right = sorted([backward.snap_off.contact_x, forward.snap_off.contact_x])
+    sides = [
+        np.linspace(event.snap_off.contact_x, event.first_contact.contact_x, PLACES + 1)[1:]
+        for event in (forward, backward)
+    ]
+    return np.linspace(left, right, PLACES + 2)[1:-1], np.concatenate(sides)
 
 
 def held(result: xr.DataTree, contour: tb.contours.Contour, x: Floats) -> float:

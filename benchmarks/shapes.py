@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import tactile_bayes as tb
+from benchmarks.calibration import PROBABILITY, gap_and_touched
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw, Smooth, from_points, paper_profile
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.tasks import run_tasks
@@ -28,7 +29,6 @@ NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.0
 
 ANGLES = np.radians(np.arange(0.0, 200.0, 1.0))
 SETTINGS = SamplerSettings(max_seconds=60.0)
-PROBABILITY, PLACES = 0.9, 9
 
 
 def _corner(q: float, x_c: float) -> Contour:
@@ -111,15 +111,9 @@ def record(task: tuple[str, str, int]) -> Outcome:
     began = time.perf_counter()
     result = tb.infer_contour(measured, family="shape-free", load_cell=cell, seed=number, settings=SETTINGS)
     seconds = time.perf_counter() - began
-    forward, backward = scan.events["forward"], scan.events["backward"]
-    left, right = sorted([backward.snap_off.contact_x, forward.snap_off.contact_x])
-    gap = np.linspace(left, right, PLACES + 2)[1:-1]
-    sides = [
-        np.linspace(event.snap_off.contact_x, event.first_contact.contact_x, PLACES + 1)[1:]
-        for event in (forward, backward)
-    ]
+    gap, touched = gap_and_touched(scan)
     in_gap, width, off = compared(result, contour, gap)
-    out_of_gap, _, _ = compared(result, contour, np.concatenate(sides))
+    out_of_gap, _, _ = compared(result, contour, touched)
     known_width = np.nan
     if truth.family is not None:
         known = tb.infer_contour(measured, family=truth.family, load_cell=cell, seed=number, settings=SETTINGS)

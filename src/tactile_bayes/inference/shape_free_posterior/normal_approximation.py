@@ -15,9 +15,11 @@ from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_names", "split"]
+__all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_names", "scale_names", "split"]
 
 Floats = NDArray[np.float64]
+
+_OF_ROUGHNESS = ("amplitude", "length_scale")
 
 _STEP = 1e-4
 """Of the differences by which loads are made linear, over the scale of each coordinate."""
@@ -39,9 +41,14 @@ class LinearPrior(NamedTuple):
     precision: Floats
 
 
+def scale_names(model: ContourModel) -> tuple[str, ...]:
+    """Parameters in which loads are not made linear."""
+    return (*_OF_ROUGHNESS, *model.noise.names)
+
+
 def linear_names(model: ContourModel) -> tuple[str, ...]:
     """Parameters in which loads are made linear, r by its logarithm; amplitude, length scale and noise are the rest."""
-    rough = [name for name in model.family.parameters if name not in ("amplitude", "length_scale")]
+    rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
     return (*rough, *model.nuisances.names)
 
 
@@ -50,7 +57,7 @@ def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
     values = model.values(points)
     linear = np.stack([values[name] for name in linear_names(model)], axis=1)
     linear[:, 0] = np.log(linear[:, 0])
-    return np.stack([values[n] for n in ("amplitude", "length_scale", *model.noise.names)], axis=1), linear
+    return np.stack([values[name] for name in scale_names(model)], axis=1), linear
 
 
 def joined(scales: Floats, linear: Floats) -> Floats:

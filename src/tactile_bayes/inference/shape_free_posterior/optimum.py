@@ -13,6 +13,7 @@ from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
     Observer,
     joined,
     linear_names,
+    scale_names,
     split,
 )
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
@@ -70,7 +71,7 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator) -
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:
     """Not far from those that are given."""
-    names = ("amplitude", "length_scale", *model.noise.names)
+    names = scale_names(model)
     columns = [model.names.index(name) for name in names]
 
     def cost(logarithms: Floats) -> float:
