@@ -15,7 +15,7 @@ from arviz_stats.base.array import array_stats
 from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
-from benchmarks.samplers import demonstration
+from benchmarks.samplers import demonstration, started
 from benchmarks.shooting import (
     contact_by_integration,
     misfit_by_least_squares,
@@ -161,7 +161,7 @@ def contour_posterior() -> tuple[Row, str]:
     results: list[xr.DataTree] = []
     ours = best_time(lambda: results.append(tb.infer_contour(measured, nuisances=[], seed=1)), 3)
     model = demonstration()
-    start = walk_of(model, spawn(1, 1)[0], tb.SamplerSettings()).start
+    start = started(walk_of(model, spawn(1, 1)[0], tb.SamplerSettings()))
     began = time.perf_counter()
     chains = []
     for of_ensemble in start:

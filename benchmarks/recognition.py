@@ -37,7 +37,7 @@ NOISES = {"quiet": (0.02, 0.008), "strong": (0.15, 0.06)}
 ANGLES = np.radians(np.arange(0.0, 200.0, 2.0))
 VERTEX = {"q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
 NUISANCES = ("bias",)
-SETTINGS = SamplerSettings(ensembles=2, min_ess=300.0, max_r_hat=1.03, max_seconds=8.0)
+SETTINGS = SamplerSettings(ensembles=2, min_ess=300.0, max_r_hat=1.03, max_steps=300)
 BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 
 

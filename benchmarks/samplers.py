@@ -29,7 +29,7 @@ import tactile_bayes as tb
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import default_priors
-from tactile_bayes.inference.contour_start import walk_of
+from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import sample, spawn
 from tactile_bayes.inference.ensembles.diagnosis import walker_major
 from tactile_bayes.inference.family_names import family_named
@@ -60,12 +60,13 @@ def main(evaluations: int = 40_000) -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     with threadpool_limits(1):
         model = demonstration()
-        start = walk_of(model, spawn(1, 1)[0], tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS)).start
+        walk = walk_of(model, spawn(1, 1)[0], tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS))
+        start = started(walk)
         model.log_probability(start[0])  # whatever is compiled is compiled here
         print(f"{', '.join(model.names)}: {RUNS} runs of {evaluations // RUNS:,} evaluations\n")
         print(f"{'':<54}{'evaluations':>12}{'CPU':>9}{'R̂':>8}{'ESS':>8}{'ESS/s':>8}{'ESS/1000':>10}{'means off':>11}")
         reference = None
-        for name, package, sampler in samplers():
+        for name, package, sampler in samplers(walk):
             if not installed(package):
                 print(f"{name:<54}not installed, skipped: see `make samplers`")
                 continue
@@ -76,6 +77,12 @@ def main(evaluations: int = 40_000) -> None:
             chains = walker_major(draws[:, draws.shape[1] // 2 :])
             reference = chains if reference is None else reference
             print_row(f"{name}, {package[0]} {version(package[0])}", target.evaluations, seconds, chains, reference)
+
+
+def started(walk: Walk) -> Floats:
+    """Where walkers start, as parameters, shape (ensembles, walkers, parameters)."""
+    parameters, _ = walk.coordinates.parameters(walk.start.reshape(-1, walk.start.shape[-1]))
+    return parameters.reshape(walk.start.shape)
 
 
 def demonstration() -> ContourModel:
@@ -111,9 +118,9 @@ def print_row(name: str, evaluations: int, seconds: float, chains: Floats, refer
 # (runs, steps, walkers, parameters)
 
 
-def samplers() -> Iterator[tuple[str, tuple[str, str], Sampler]]:
+def samplers(walk: Walk) -> Iterator[tuple[str, tuple[str, str], Sampler]]:
     """Name, distribution and module, and function."""
-    yield "infer_contour's", ("tactile-bayes", "tactile_bayes"), ours
+    yield "infer_contour's", ("tactile-bayes", "tactile_bayes"), ours(walk)
     pints = ("pints", "pints")
     yield "DifferentialEvolutionMCMC", pints, population_of_pints("DifferentialEvolutionMCMC")
     yield "DreamMCMC", pints, population_of_pints("DreamMCMC")
@@ -121,12 +128,17 @@ def samplers() -> Iterator[tuple[str, tuple[str, str], Sampler]]:
     yield "EnsembleSampler", ("zeus-mcmc", "zeus"), zeus
 
 
-def ours(target: Counted, start: Floats, evaluations: int) -> Floats:
+def ours(walk: Walk) -> Sampler:
     """Until the evaluations are spent, though it would have stopped before."""
-    settings = tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS, max_steps=steps_for(evaluations), min_ess=1e9)
-    draws = sample(target, start, names=[f"p{i}" for i in range(start.shape[-1])], seed=1, settings=settings)
-    kept = np.swapaxes(draws.by_walker(), 1, 2)
-    return np.concatenate([np.full_like(kept, np.nan), kept], axis=1)  # it keeps the second half alone
+
+    def draw(target: Counted, start: Floats, evaluations: int) -> Floats:
+        settings = tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS, max_steps=steps_for(evaluations), min_ess=1e9)
+        names = [f"p{i}" for i in range(start.shape[-1])]
+        draws = sample(target, walk.start, names=names, seed=1, settings=settings, coordinates=walk.coordinates)
+        kept = np.swapaxes(draws.by_walker(), 1, 2)
+        return np.concatenate([np.full_like(kept, np.nan), kept], axis=1)  # it keeps the second half alone
+
+    return draw
 
 
 def population_of_pints(name: str) -> Sampler:

@@ -28,7 +28,7 @@ NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.0
 """Of forces [EI/L²] and of the moment [EI/L]."""
 
 ANGLES = np.radians(np.arange(0.0, 200.0, 1.0))
-SETTINGS = SamplerSettings(max_seconds=60.0)
+SETTINGS = SamplerSettings(max_steps=700)
 
 
 def _corner(q: float, x_c: float) -> Contour:

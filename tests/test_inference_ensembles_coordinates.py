@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.inference.ensembles import Logarithms, SamplerSettings, sample
+from tactile_bayes.inference.ensembles.proposal import Proposal
 
 
 def log_probability(points):
@@ -47,3 +48,6 @@ def test_coordinates_of_points_lead_back_to_them():
 
 def test_a_checkpoint_tells_coordinates_apart():
     assert Logarithms(np.array([True, False])).digest != Logarithms(np.array([False, True])).digest
+    proposals = [Proposal(np.zeros(2), width * np.eye(2)) for width in (1.0, 2.0)]
+    digests = {Logarithms(np.array([True, False]), proposal).digest for proposal in [None, *proposals]}
+    assert len(digests) == 3

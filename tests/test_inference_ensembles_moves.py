@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import emcee
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles.moves import FittedMove, NormalMove, standard_moves, whitened_moves
+from tactile_bayes.inference.ensembles.moves import FittedMove, FixedMove, NormalMove, standard_moves, whitened_moves
+from tactile_bayes.inference.ensembles.proposal import Proposal
 from tactile_bayes.inference.ensembles.walkers import first_random_state, walking_ensemble
 
 WALKERS = 40
@@ -87,6 +90,20 @@ def test_each_move_leaves_a_target_invariant(moves, parameters, scale, wall):
     """Within 4 standard errors of 64 ensembles: false alarm 2e-4 a number; 160 numbers, as scales give the same."""
     error, standard = moments(Gaussian(parameters, scale, wall=wall), MOVES[moves], ensembles=64, steps=60)
     assert np.all(standard < 0.05)
+    assert np.all(np.abs(error) < 4.0 * standard)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("parameters", "wall"), [(2, False), (2, True), (8, False), (8, True)])
+def test_proposals_from_elsewhere_leave_a_target_invariant(parameters, wall):
+    """However badly they fit: off by half a deviation, and as wide in one direction as in every other."""
+    target = Gaussian(parameters, 1.0, wall=wall)
+    proposal = Proposal(target.mean + 0.5 * target.deviation, np.diag(1.2 * target.deviation))
+    error, standard = moments(target, lambda: [(FixedMove(proposal), 1.0)], ensembles=64, steps=60)
+    assert np.all(np.abs(error) < 4.0 * standard)
+    moves = standard_moves(replace(proposal, efficiency=0.2))
+    assert sum(share for _, share in moves) == pytest.approx(1.0)
+    error, standard = moments(target, lambda: moves, ensembles=64, steps=60)
     assert np.all(np.abs(error) < 4.0 * standard)
 
 

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit, fitted_noise, optimum_of
-from tactile_bayes.inference.ensembles import Coordinates, Logarithms, SamplerSettings, in_coordinates, scatter_walkers
+from tactile_bayes.inference.ensembles import (
+    Coordinates,
+    Logarithms,
+    SamplerSettings,
+    approximate,
+    in_coordinates,
+    scatter_walkers,
+)
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
@@ -42,8 +49,7 @@ def walk_of(model: ContourModel, seed: np.random.SeedSequence, settings: Sampler
     rng = np.random.default_rng(seed)
     if isinstance(model.family, ShapeFreeFamily):
         return _whitened(model, seed, rng, settings)
-    coordinates = Logarithms((model.low == 0.0) & ~np.isin(model.names, MAY_VANISH))
-    return Walk(coordinates.of(_scattered(model, seed, rng, settings)), coordinates)
+    return _scattered(model, seed, rng, settings)
 
 
 def _whitened(
@@ -83,24 +89,20 @@ def _misfit(model: ContourModel, point: Floats) -> float:
 
 def _scattered(
     model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
-) -> Floats:
-    """Walkers, shape (ensembles, walkers, parameters), scattered twice as wide as a normal approximation."""
-    size = len(model.located)
+) -> Walk:
+    """Walkers scattered twice as wide as a normal approximation, which they are then proposed from."""
     optimum = optimum_of(model, rng)
-
-    with_noise_in_logarithms = Logarithms(np.arange(len(model.names)) >= size)
-
-    def parameters(coordinates: Floats) -> Floats:
-        return with_noise_in_logarithms.parameters(coordinates)[0]
+    of_noise = np.arange(len(model.names)) >= len(model.located)
+    around = Logarithms(of_noise)
 
     def log_probability(coordinates: Floats) -> Floats:
-        return model.log_probability(parameters(coordinates))
+        return model.log_probability(around.parameters(coordinates)[0])
 
-    cloud = gather(log_probability, with_noise_in_logarithms.of(optimum.point), optimum.covariance, rng)
+    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng)
     try:
-        return scatter_walkers(
+        start = scatter_walkers(
             lambda points: np.where(model.log_probability(points) > cloud.floor, 0.0, -np.inf),
-            lambda rng, count: parameters(cloud.draw(rng, count)),
+            lambda rng, count: around.parameters(cloud.draw(rng, count))[0],
             parameters=len(model.names),
             seed=seed,
             settings=settings,
@@ -111,3 +113,14 @@ def _scattered(
             f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, rod, "
             "base and family right?"
         ) from error
+    positive = (model.low == 0.0) & ~np.isin(model.names, MAY_VANISH)
+    walked = Logarithms(positive)
+    centre = around.parameters(cloud.centre[None])[0]
+    per_unit = np.where(positive & ~of_noise, 1.0 / centre[0], 1.0)
+    proposal = approximate(
+        in_coordinates(model.log_probability, walked),
+        walked.of(centre)[0],
+        cloud.narrow_covariance * np.outer(per_unit, per_unit),
+        rng,
+    )
+    return Walk(walked.of(start), Logarithms(positive, proposal))

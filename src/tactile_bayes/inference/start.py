@@ -93,6 +93,11 @@ class Cloud:
     """Times its transpose it is the covariance."""
     floor: float
 
+    @property
+    def narrow_covariance(self) -> Floats:
+        """Roughly the posterior's."""
+        return np.asarray(self.root @ self.root.T / _WIDER**2)
+
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return self.centre + rng.normal(size=(count, self.centre.size)) @ self.root.T
 

@@ -26,6 +26,7 @@ from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithm
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.places import Place
+from tactile_bayes.inference.ensembles.proposal import approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, spawn
@@ -39,6 +40,7 @@ __all__ = [
     "Progress",
     "SamplerSettings",
     "Seed",
+    "approximate",
     "in_coordinates",
     "sample",
     "scatter_walkers",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.inference.ensembles.moves import standard_moves
+from tactile_bayes.inference.ensembles.proposal import Proposal
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["Coordinates", "Logarithms", "Plain", "in_coordinates"]
@@ -53,9 +54,13 @@ class Logarithms(Plain):
     Where a record tells a ratio of powers of two sizes, and hardly the sizes, their logarithms lie along a line.
     """
 
-    def __init__(self, positive: NDArray[np.bool_]) -> None:
+    def __init__(self, positive: NDArray[np.bool_], proposal: Proposal | None = None) -> None:
+        """What is known to come near the posterior, of the coordinates, may be proposed to walkers."""
         self._positive = positive
+        self._proposal = proposal
         self.digest = f"logarithms of parameters {', '.join(map(str, np.flatnonzero(positive)))}"
+        if proposal is not None:
+            self.digest += f", proposal {proposal.digest}"
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         points = coordinates.copy()
@@ -67,6 +72,9 @@ class Logarithms(Plain):
         coordinates = points.copy()
         coordinates[..., self._positive] = np.log(points[..., self._positive])
         return coordinates
+
+    def moves(self) -> list[tuple[Any, float]]:
+        return standard_moves(self._proposal)
 
 
 def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) -> LogProbability:

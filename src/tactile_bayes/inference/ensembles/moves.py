@@ -8,23 +8,38 @@ from typing import Any
 import emcee
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
-__all__ = ["FittedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
+from tactile_bayes.inference.ensembles.proposal import Proposal
+
+__all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
 
 Floats = NDArray[np.float64]
 Moves = Callable[[], list[tuple[Any, float]]]
 """Makes the moves of one ensemble, with their shares."""
 
-_DEGREES_OF_FREEDOM = 10.0
-"""Of the t distribution: tails heavier than a normal posterior's, at little cost where it is one."""
-
-_WIDENING = 1.1
-"""Scale over that of the walkers it is fitted to: too wide a proposal costs less than too narrow a one."""
-
-
 _LEAST_NEW = 0.2
 """Share that is new in the shortest step of `NormalMove`."""
+
+_MOST_FIXED, _EFFICIENT = 0.8, 0.5
+"""Share of proposals from a distribution of that efficiency or a better one."""
+
+
+class FixedMove(emcee.moves.RedBlueMove):
+    """Proposals from one and the same distribution, whatever the walkers do.
+
+    The nearer it is to the target the more of them are accepted, and a walker has forgotten where it was.
+    """
+
+    def __init__(self, proposal: Proposal) -> None:
+        super().__init__()
+        self._proposal = proposal
+
+    def get_proposal(
+        self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
+    ) -> tuple[Floats, Floats]:
+        """Places proposed to walkers, (n, parameters), and log of the density back over that of going there, (n,)."""
+        there, density = self._proposal.draw(random, len(sample))
+        return there, self._proposal.log_density(sample) - density
 
 
 class FittedMove(emcee.moves.RedBlueMove):
@@ -48,16 +63,13 @@ class FittedMove(emcee.moves.RedBlueMove):
     ) -> tuple[Floats, Floats]:
         """Places proposed to walkers, (n, parameters), and log of the density back over that of going there, (n,)."""
         moving, others = sample[:, self._columns], np.concatenate(complement)[:, self._columns]
-        normal = random.standard_normal(moving.shape)
-        steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, len(moving)) / _DEGREES_OF_FREEDOM)[:, None]
         proposed = sample.copy()
         try:
-            mean, root = _fit(others)
+            proposal = Proposal.fitted(others)
         except np.linalg.LinAlgError:
             return proposed, np.full(len(moving), -np.inf)
-        here = solve_triangular(root, (moving - mean).T, lower=True).T
-        proposed[:, self._columns] = mean + steps @ root.T
-        return proposed, _log_density(here) - _log_density(steps)
+        proposed[:, self._columns], density = proposal.draw(random, len(moving))
+        return proposed, proposal.log_density(moving) - density
 
 
 class NormalMove(emcee.moves.RedBlueMove):
@@ -84,30 +96,17 @@ class NormalMove(emcee.moves.RedBlueMove):
         return proposed, 0.5 * np.sum(there**2 - moving**2, axis=1)
 
 
-def _fit(points: Floats) -> tuple[Floats, Floats]:
-    """Mean and root of the scale matrix, whatever the units of the parameters."""
-    mean, deviation = points.mean(axis=0), points.std(axis=0)
-    if not np.all(deviation > 0.0):
-        raise np.linalg.LinAlgError("a parameter is the same in all points")
-    standard = (points - mean) / deviation
-    root = np.linalg.cholesky(standard.T @ standard / (len(points) - 1))
-    return mean, _WIDENING * deviation[:, None] * root
-
-
-def _log_density(steps: Floats) -> Floats:
-    """Of the t distribution with mean 0 and unit scale, up to a constant."""
-    squares = np.sum(steps**2, axis=1)
-    density: Floats = -0.5 * (_DEGREES_OF_FREEDOM + steps.shape[1]) * np.log1p(squares / _DEGREES_OF_FREEDOM)
-    return density
-
-
-def standard_moves() -> list[tuple[Any, float]]:
+def standard_moves(proposal: Proposal | None = None) -> list[tuple[Any, float]]:
     """Moves of one ensemble and their shares, new ones for each ensemble, since a move keeps its scale between calls.
 
-    Fitted proposals where the posterior is nearly normal; differences of two other walkers, scaled and now and then
-    unscaled, where it is not. All cut the ensemble in two halves, which `Together` counts on.
+    Proposals fitted to the walkers where the posterior is nearly normal; differences of two other walkers, scaled and
+    now and then unscaled, where it is not. Where there is a proposal that comes near the posterior anyway, it is used
+    most, the more efficient it is. All cut the ensemble in two halves, which `Together` counts on.
     """
-    return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
+    fixed = 0.0 if proposal is None else _MOST_FIXED * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))
+    rest = [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
+    moves = [(move, (1.0 - fixed) * share) for move, share in rest]
+    return moves if proposal is None or not fixed else [(FixedMove(proposal), fixed), *moves]
 
 
 def whitened_moves(bent: int) -> list[tuple[Any, float]]:

@@ -1,0 +1,142 @@
+"""A distribution from which places are proposed to walkers, and how near it is to that which they are to draw from."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from tactile_bayes.inference.ensembles.target import LogProbability
+
+__all__ = ["Proposal", "approximate"]
+
+Floats = NDArray[np.float64]
+
+_DEGREES_OF_FREEDOM = 10.0
+"""Of the t distribution: tails heavier than a normal posterior's, at little cost where it is one."""
+
+_WIDENING = 1.1
+"""Scale over that of the points it is fitted to: too wide a proposal costs less than too narrow a one."""
+
+_ROUNDS = 4
+_DRAWS = 60
+"""For each parameter, in each round."""
+
+_GOOD = 0.5
+"""Efficiency that is not worth another round."""
+
+_HELD = 5
+"""Effective draws for each parameter that a covariance is fitted to, at least; weights are made more equal until they
+are as many."""
+
+
+class Random(Protocol):
+    """NumPy's new generators and its old ones."""
+
+    def standard_normal(self, size: tuple[int, int], /) -> Floats: ...
+
+    def chisquare(self, df: float, size: int, /) -> Floats: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Student's t distribution in several dimensions.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (parameters,)
+    root : ndarray, shape (parameters, parameters)
+        Lower triangle; times its transpose the scale matrix.
+    efficiency : float
+        Effective share of independent draws, weighted by the target: 1 if it is the target's own distribution.
+    """
+
+    mean: Floats
+    root: Floats
+    efficiency: float = 0.0
+
+    @classmethod
+    def fitted(cls, points: Floats, weights: Floats | None = None) -> Proposal:
+        """To points, shape (n, parameters), with weights of sum one, whatever the units of the parameters.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If they lie in a plane.
+        """
+        weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
+        mean = weights @ points
+        apart = points - mean
+        deviation = np.sqrt(weights @ apart**2)
+        if not np.all(deviation > 1e-12 * np.abs(mean)):
+            raise np.linalg.LinAlgError("a parameter is the same in all points")
+        standard = apart / deviation
+        correlation = (weights[:, None] * standard).T @ standard / (1.0 - np.sum(weights**2))
+        return cls(mean, _WIDENING * deviation[:, None] * np.linalg.cholesky(correlation))
+
+    @property
+    def digest(self) -> str:
+        """What tells it from others."""
+        return hashlib.sha256(self.mean.tobytes() + self.root.tobytes() + repr(self.efficiency).encode()).hexdigest()
+
+    def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
+        """Points, shape (count, parameters), and the logarithm of their density, up to the constant of `log_density`"""
+        normal = random.standard_normal((count, self.mean.size))
+        steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, count) / _DEGREES_OF_FREEDOM)[:, None]
+        return self.mean + steps @ self.root.T, _log_density(steps)
+
+    def log_density(self, points: Floats) -> Floats:
+        """Of points, shape (n, parameters), up to a constant."""
+        return _log_density(solve_triangular(self.root, (points - self.mean).T, lower=True).T)
+
+
+def approximate(
+    log_probability: LogProbability, centre: Floats, covariance: Floats, rng: np.random.Generator
+) -> Proposal:
+    """The proposal nearest to a target that some rounds of importance sampling find, by a guess at mean and covariance.
+
+    Draws of one round, weighted by the target, say what the next one draws from; of all rounds that counts which was
+    the most efficient (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
+    10.1198/106186004X12803).
+    """
+    proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)))
+    best = proposal
+    for _ in range(_ROUNDS):
+        points, density = proposal.draw(rng, _DRAWS * centre.size)
+        surplus = log_probability(points) - density
+        if not np.isfinite(surplus).sum() > _HELD * centre.size:
+            break
+        efficiency = _effective(_weights(surplus)) / len(points)
+        if efficiency > best.efficiency:
+            best = Proposal(proposal.mean, proposal.root, efficiency)
+        if best.efficiency >= _GOOD:
+            break
+        power = 1.0
+        while _effective(weights := _weights(power * surplus)) < _HELD * centre.size:
+            power *= 0.8
+        try:
+            proposal = Proposal.fitted(points, weights)
+        except np.linalg.LinAlgError:
+            break
+    return best
+
+
+def _weights(surplus: Floats) -> Floats:
+    with np.errstate(invalid="ignore"):  # −inf less the largest is −inf still
+        weights = np.exp(surplus - surplus.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _effective(weights: Floats) -> float:
+    return float(1.0 / np.sum(weights**2))
+
+
+def _log_density(steps: Floats) -> Floats:
+    """Of the t distribution with mean 0 and unit scale, up to a constant."""
+    squares = np.sum(steps**2, axis=1)
+    density: Floats = -0.5 * (_DEGREES_OF_FREEDOM + steps.shape[1]) * np.log1p(squares / _DEGREES_OF_FREEDOM)
+    return density
