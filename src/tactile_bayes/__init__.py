@@ -25,6 +25,8 @@ _HOMES = {
     "RandomWalk": "load_cell",
     "Rod": "rod",
     "SamplerSettings": "inference.ensembles",
+    "World": "calibration.world",
+    "calibrate": "calibration.calibrate",
     "check_record": "uncertainty.record_check",
     "compare_families": "uncertainty.family_comparison",
     "contact_moments": "uncertainty.contact_moments",
@@ -61,6 +63,8 @@ if TYPE_CHECKING:
     from tactile_bayes import elastica as elastica
     from tactile_bayes import errors as errors
     from tactile_bayes import plotting as plotting
+    from tactile_bayes.calibration.calibrate import calibrate as calibrate
+    from tactile_bayes.calibration.world import World as World
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings

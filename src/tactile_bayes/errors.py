@@ -46,6 +46,10 @@ class SpecificationError(TactileBayesError, ValueError):
     """A specification of a data set is impossible, or a folder holds another data set."""
 
 
+class CalibrationError(TactileBayesError, ValueError):
+    """A folder holds the replicates of another calibration."""
+
+
 class TaskError(TactileBayesError, RuntimeError):
     """Processes died over a task again and again."""
 

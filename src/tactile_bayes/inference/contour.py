@@ -176,8 +176,11 @@ def sampled(
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     walk: Walk | None = None,
+    with_prior: bool = True,
 ) -> Sampled:
-    """The posterior of a problem; see `infer_contour`. Walkers walk as they would anyway, or as is said."""
+    """The posterior of a problem; see `infer_contour`. Walkers walk as they would anyway, or as is said; the group of
+    prior draws may be left out.
+    """
     model, seeds = problem.model, spawn(seed, 4)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         walk = walk or walk_of(model, seeds[0], settings)
@@ -193,7 +196,8 @@ def sampled(
             identity=None if checkpoint is None else problem.identity,
         )
         groups = groups_of(model, draws, np.random.default_rng(seeds[2]))
-        groups["prior"] = prior_draws(model, np.random.default_rng(seeds[3]))
+        if with_prior:
+            groups["prior"] = prior_draws(model, np.random.default_rng(seeds[3]))
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
     return Sampled(tree, draws, walk.coordinates)

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import Draws
 from tactile_bayes.inference.result import sample_stats
@@ -35,7 +36,7 @@ def groups_of(model: ContourModel, draws: Draws, rng: np.random.Generator) -> di
         error = model.likelihood.encoder.draw(rng, (len(part), loads.shape[2]))
         predicted.append(np.take_along_axis(loads, error[:, None, :, None], axis=1)[:, 0])
         likelihood.append(model.likelihood.score(loads, reached, model.noise_scale(part), pointwise=True))
-        events.append(_events(model, part))
+        events.append(events_of(model.likelihood, model.contours(part), model.rig(part)))
     shape = (chains, kept.size)
     coords = {"chain": np.arange(chains), "draw": kept}
     cell = model.likelihood.load_cell
@@ -104,20 +105,3 @@ def _unit(model: ContourModel, name: str) -> str:
 def _load_units(model: ContourModel) -> Floats:
     rod = model.likelihood.rod
     return np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
-
-
-def _events(model: ContourModel, points: Floats) -> dict[str, Floats]:
-    """First contact and snap-off in every stroke, in the record's units, each of shape (n, strokes)."""
-    count = len(points)
-    paths = model.likelihood.paths(model.contours(points), model.rig(points), exact_events=True)
-    lanes = np.arange(paths.seen.lanes)
-    backward = paths.seen.mirrored
-    out = {}
-    for label, angle, parameter in (
-        ("first", paths.first_angle, paths.first_parameter),
-        ("snap_off", paths.snap_angle, paths.snap_parameter),
-    ):
-        locus = paths.seen.contour.take(lanes).locate(np.where(backward, -parameter, parameter))
-        out[f"{label}_drive_angle"] = np.where(backward, np.pi - angle, angle)
-        out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
-    return {name: values.reshape(-1, count).T for name, values in out.items()}

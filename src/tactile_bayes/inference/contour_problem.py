@@ -25,7 +25,7 @@ from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 
-__all__ = ["ContourProblem", "contour_problem", "default_priors"]
+__all__ = ["ContourProblem", "contour_problem", "default_priors", "prior_in_words"]
 
 
 class ContourProblem(NamedTuple):
@@ -101,7 +101,7 @@ def contour_problem(
         "friction": friction,
         "nuisances": json.dumps(rig.names),
         "events": int(events),
-        "priors": json.dumps({name: _in_words(prior) for name, prior in chosen_priors.items()}),
+        "priors": json.dumps({name: prior_in_words(prior) for name, prior in chosen_priors.items()}),
         "units": measured.attrs["units"],
         "load_cell_frame": frame_of(measured),
         **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
@@ -137,7 +137,8 @@ def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
     return family.default_priors(base, rod_of(measured).length)
 
 
-def _in_words(prior: Prior) -> str:
+def prior_in_words(prior: Prior) -> str:
+    """A distribution as an attribute."""
     law = getattr(prior, "dist", None)
     if law is None:
         return repr(prior)

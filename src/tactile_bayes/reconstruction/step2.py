@@ -9,7 +9,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES
+from tactile_bayes.contact_fit import Reading
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES, TANGENTIAL
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction.constrained import constrained_estimate
@@ -79,7 +80,10 @@ def reconstruct(
         of misfits there exceed 3.84, instead of 5 %, and their mean is 0.8 to 1.1. The attributes misfit_sum,
         misfit_samples and misfit_probability (that noise gives such a sum, or a larger one) leave out what is nearer
         than 3; the probability is NaN where samples share errors. Near 0 it says that rod, friction or frame are wrong,
-        or the noise is larger than stated; near 1, that it is smaller.
+        or the noise is larger than stated; near 1, that it is smaller. In tangential contact the force along the rod at
+        the pivot follows from the moment, fAx cos φ0 + fAy sin φ0 = m0²/2 (− f sin δ with friction angle δ): the mean
+        of the difference over such samples, weighted, in standard errors, is axial_score: standard normal where the
+        model holds, far below zero where there is friction that is not stated.
 
         status is one of
 
@@ -144,7 +148,7 @@ def reconstruct(
     estimate = _METHODS[method](samples, np.full(samples.side.size, np.arctan(friction)))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     return kept.assign(_variables(estimate, samples, measured)).assign_attrs(
-        method=method, friction=friction, units=measured.attrs["units"], **_check(estimate, samples, cell)
+        method=method, friction=friction, units=measured.attrs["units"], **_check(estimate, samples, cell, friction)
     )
 
 
@@ -214,8 +218,8 @@ def _covariance_in_world(place: Floats, covariance: Floats, side: Floats, radius
     return np.asarray(signs[:, :, None] * covariance * signs[:, None, :])
 
 
-def _check(estimate: Estimate, samples: Samples, cell: LoadCell) -> dict[str, float | int]:
-    """The misfit of all samples clear of the edge, and how probable noise makes it."""
+def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float) -> dict[str, float | int]:
+    """The misfit of all samples clear of the edge, how probable noise makes it, and whether it has a sign."""
     if estimate.misfit is None or estimate.edge_distance is None:
         return {}
     with np.errstate(invalid="ignore"):
@@ -223,4 +227,28 @@ def _check(estimate: Estimate, samples: Samples, cell: LoadCell) -> dict[str, fl
     total, count = float(estimate.misfit[clear].sum()), int(np.count_nonzero(clear))
     shared = cell.drift is not None or any(cell.bias_uncertainty)
     probability = np.nan if shared or not count else float(chdtrc(count, total))
-    return {"misfit_sum": total, "misfit_samples": count, "misfit_probability": probability}
+    lying = np.flatnonzero(clear & (estimate.phase == TANGENTIAL))
+    score = np.nan if shared or not lying.size else _axial_score(samples.take(lying).reading, friction)
+    return {
+        "misfit_sum": total,
+        "misfit_samples": count,
+        "misfit_probability": probability,
+        "axial_score": score,
+    }
+
+
+def _axial_score(reading: Reading, friction: float) -> float:
+    """Mean over tangential contacts of the force along the rod at the pivot, less what the moment says it is, over
+    its standard error.
+    """
+    moment, force_x, force_y = reading.loads.T
+    cos, sin = np.cos(reading.drive_angle), np.sin(reading.drive_angle)
+    force = np.hypot(force_x, force_y)
+    drag = friction / np.hypot(1.0, friction)
+    moment_variance = reading.covariance[:, 0, 0]
+    surplus = force_x * cos + force_y * sin + drag * force - 0.5 * (moment**2 - moment_variance)
+    slopes = np.stack([-moment, cos + drag * force_x / force, sin + drag * force_y / force], axis=1)
+    by_angle = force_y * cos - force_x * sin + np.sum(slopes * reading.leaning, axis=1)
+    variance = np.einsum("ni,nij,nj->n", slopes, reading.covariance, slopes)
+    variance += (by_angle * reading.angle_deviation) ** 2
+    return float(np.sum(surplus / variance) / np.sqrt(np.sum(1.0 / variance)))

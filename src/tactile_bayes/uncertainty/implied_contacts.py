@@ -23,7 +23,7 @@ from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validat
 from tactile_bayes.touching import PLACE
 from tactile_bayes.world import in_world
 
-__all__ = ["implied_contacts"]
+__all__ = ["contacts_of", "implied_contacts"]
 
 Floats = NDArray[np.float64]
 
@@ -172,7 +172,7 @@ def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> 
     parts = []
     for block in np.array_split(every, -(-every.size // _BLOCK)):
         rig = nuisances.rig({name: of_draws[block] for name, of_draws in values.items()})
-        parts.append(_contacts(likelihood, contours.take(block), rig, angle))
+        parts.append(contacts_of(likelihood, contours.take(block), rig, angle))
     shape = (picked.sizes["chain"], picked.sizes["draw"], -1)
     names = [*PLACE, "tangential"]
     if any(name in inferred for name in _TURNED_BY):
@@ -180,10 +180,11 @@ def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> 
     return {name: np.concatenate([part[name] for part in parts]).reshape(shape) for name in names}
 
 
-def _contacts(likelihood: RecordLikelihood, contours: Contour, rig: Rig, angle: Floats) -> dict[str, Floats]:
+def contacts_of(likelihood: RecordLikelihood, contours: Contour, rig: Rig, angle: Floats) -> dict[str, Floats]:
     """Contacts of contours, shape (contours, samples), in the world's signs and the record's units.
 
-    Drive angles are those of the samples, shape (samples,), as read but for what the data sheet says.
+    Drive angles are those of the samples, shape (samples,), as read but for what the data sheet says; NaN where nothing
+    is asked.
     """
     count, strokes = contours.shape[0], likelihood.strokes
     paths = likelihood.paths(contours, rig, exact_events=True)

@@ -1,0 +1,239 @@
+"""Simulation-based calibration: are posteriors right, over truths drawn from the prior?"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from tactile_bayes.calibration.experiment import Experiment
+from tactile_bayes.calibration.ledger import open_ledger
+from tactile_bayes.calibration.replicate import replicate
+from tactile_bayes.calibration.summary import summary
+from tactile_bayes.calibration.world import World
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.rod import Rod
+from tactile_bayes.tasks import run_tasks
+
+__all__ = ["Calibrating", "calibrate", "experiment_of"]
+
+_NOTING = 0.05
+"""Share of the time that goes into notes of what is finished."""
+
+_ANGLES = np.arange(-30.0, 211.0, 2.0)
+"""Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""
+
+_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
+
+
+class Calibrating(NamedTuple):
+    """How far a calibration has come."""
+
+    done: int
+    wanted: int
+    made: int
+    """Of those that are done, in this run."""
+    seconds: float
+    """Since this run began."""
+
+
+def calibrate(
+    *,
+    seed: int,
+    family: str = "parabola",
+    replicates: int = 200,
+    load_cell: LoadCell | None = None,
+    rod: Rod | None = None,
+    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
+    direction: Literal["both", "forward", "backward"] = "both",
+    drive_angles: ArrayLike | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    nuisances: Sequence[str] = STANDARD,
+    friction: float = 0.0,
+    events: bool = True,
+    settings: SamplerSettings | None = None,
+    probability: float = 0.9,
+    world: World | None = None,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[Calibrating], object] | None = None,
+) -> xr.Dataset:
+    """Show whether intervals hold: simulate records of truths that are drawn from the prior, infer, and compare.
+
+    If a posterior is right, the rank of the truth among its draws is uniform, for every quantity (simulation-based
+    calibration: Talts et al. 2018, arXiv:1804.06788), and what is stated with 90 % probability holds in nine of ten
+    replicates. The other way round, ranks that are not uniform prove that sampler, likelihood or prior are wrong; and
+    with a `world` that differs from what inference assumes they show what becomes of the intervals there.
+
+    Parameters
+    ----------
+    seed : int
+        The same seed, the same numbers, whatever the number of workers, but for the seconds.
+    family : str
+        As in `infer_contour`.
+    replicates : int
+        How many; each takes about a second.
+    load_cell : LoadCell, optional
+        That measures and that inference is told, with noise, in the record's units; by default force_noise 0.05 EI/L²
+        and moment_noise 0.02 EI/L.
+    rod : Rod, optional
+        By default the dimensionless rod.
+    base : (float, float) or sequence of them
+        Pivots, visited in turn [length].
+    direction : {"both", "forward", "backward"}
+    drive_angles : array_like, shape (n,), optional
+        As a perfect encoder reads them [rad], in every sweep; by default every 2° from −30° to 210°. They do not depend
+        on the contour, or they would tell of it.
+    priors, nuisances, friction, events
+        As in `infer_contour`; truths are drawn from the same priors.
+    settings : SamplerSettings, optional
+        By default 2 ensembles, until R̂ is below 1.05 and 200 effective draws are there, five for every walker, in 2000
+        steps at most. Runs that end unconverged stay in.
+    probability : float
+        Of the bands, regions and intervals that are judged.
+    world : World, optional
+        In what the world differs from what inference assumes.
+    out : path-like, optional
+        Folder in which what is done is kept, in replicates.json: a run that was killed goes on, and one with more
+        replicates begins with those that are there.
+    workers : int, optional
+        Processes on this machine; by default one for each core.
+    scheduler : str, optional
+        Address of a Dask scheduler, in place of `workers`.
+    progress : callable, optional
+        Is given a `Calibrating` after each replicate.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "replicate", "quantity" (parameters, log-likelihood, angles of snap-off) and "claim":
+
+        ranks (replicate, quantity)
+            Of the truth among 99 draws; −1 where there is none.
+        rank_p_value (quantity)
+            That uniform ranks are as far from uniform, by simultaneous bands of their distribution (Säilynoja et al.
+            2022, doi 10.1007/s11222-022-10090-6).
+        coverage, coverage_error, coverage_replicates (claim)
+            Share in which what is stated holds, its standard error, and of how many: pointwise and simultaneous bands
+            of the contour in the gap and beside it, contact regions, the predicted angle of snap-off.
+        pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
+        median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,
+        effective_draws, evaluations, seconds, message (replicate)
+            Of each.
+
+        Attributes: verdict, in words; calibrated (0 or 1) and false_alarm, the probability, at most, that right
+        posteriors are not called so; and the experiment.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is impossible.
+    CalibrationError
+        If `out` holds replicates of another experiment, or is being worked on.
+    ReachError
+        If the rod hardly ever reaches a contour of the prior.
+    TaskError
+        If processes died over a replicate again and again, or cannot begin.
+
+    Examples
+    --------
+    >>> from scipy import stats
+    >>> found = calibrate(replicates=2, nuisances=[], priors={"a": stats.uniform(0.4, 0.4)}, seed=1, workers=1)
+    >>> list(found.quantity.values)
+    ['a', 'q', 'x_c', 'noise_scale', 'log_likelihood', 'snap_off_backward', 'snap_off_forward']
+    >>> found.attrs["verdict"].partition(":")[0]
+    'Too few replicates to judge'
+    """
+    if isinstance(replicates, bool) or not isinstance(replicates, int | np.integer) or replicates < 1:
+        raise ParameterError(f"replicates is {replicates!r}: give a whole number from 1 up")
+    experiment = experiment_of(
+        seed=seed,
+        family=family,
+        load_cell=load_cell,
+        rod=rod,
+        base=base,
+        direction=direction,
+        drive_angles=drive_angles,
+        priors=priors,
+        nuisances=nuisances,
+        friction=friction,
+        events=events,
+        settings=settings,
+        probability=probability,
+        world=world,
+    )
+    began = time.monotonic()
+    with open_ledger(experiment.words, None if out is None else Path(out).resolve()) as ledger:
+        kept = {number: outcome for number, outcome in ledger.outcomes.items() if number < replicates}
+        tasks = [(experiment, number) for number in range(replicates) if number not in kept]
+        next_note, done = began, len(kept)
+        with closing(run_tasks(replicate, tasks, workers=workers, scheduler=scheduler)) as results:
+            for made, ((_, number), outcome) in enumerate(results, start=1):
+                ledger.outcomes[number] = kept[number] = outcome
+                if (now := time.monotonic()) >= next_note:
+                    ledger.write()
+                    next_note = time.monotonic() + (time.monotonic() - now) / _NOTING
+                if progress is not None:
+                    progress(Calibrating(done + made, replicates, made, time.monotonic() - began))
+    return summary(experiment, kept)
+
+
+def experiment_of(
+    *,
+    seed: int,
+    family: str,
+    load_cell: LoadCell | None,
+    rod: Rod | None,
+    base: tuple[float, float] | Sequence[tuple[float, float]],
+    direction: str,
+    drive_angles: ArrayLike | None,
+    priors: Mapping[str, Prior] | None,
+    nuisances: Sequence[str],
+    friction: float,
+    events: bool,
+    settings: SamplerSettings | None,
+    probability: float,
+    world: World | None,
+) -> Experiment:
+    """What `calibrate` is asked for, as it says."""
+    rod_taken = rod or Rod()
+    cell = load_cell or LoadCell(force_noise=0.05 * rod_taken.force_unit, moment_noise=0.02 * rod_taken.moment_unit)
+    directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
+    if direction not in directions:
+        raise ParameterError(f"direction is {direction!r}: choose 'both', 'forward' or 'backward'")
+    angles = np.radians(_ANGLES) if drive_angles is None else np.unique(np.asarray(drive_angles, dtype=float))
+    if angles.ndim != 1 or angles.size < 3 or not np.all(np.isfinite(angles)):
+        raise ParameterError("drive_angles are not a list of at least 3 finite numbers [rad]")
+    pivots = np.atleast_2d(np.asarray(base, dtype=float))
+    if pivots.ndim != 2 or pivots.shape[1] != 2 or not np.all(np.isfinite(pivots)):
+        raise ParameterError(f"base is {base!r}: give (x, y), or a list of such pairs")
+    if isinstance(nuisances, str):
+        raise ParameterError(f"nuisances is {nuisances!r}: give a list of names, like [{nuisances!r}]")
+    return Experiment(
+        family=family,
+        load_cell=cell,
+        drive_angles=tuple(angles.tolist()),
+        rod=rod,
+        bases=tuple((float(x), float(y)) for x, y in pivots),
+        directions=directions[direction],
+        priors=dict(priors or {}),
+        nuisances=tuple(nuisances),
+        friction=friction,
+        events=events,
+        settings=settings or _SETTINGS,
+        probability=probability,
+        seed=seed,
+        world=world or World(),
+    )

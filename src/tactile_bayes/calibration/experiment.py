@@ -1,0 +1,157 @@
+"""The experiment that is repeated: rig, drive and prior, what is inferred and how, and in what the world differs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from functools import cached_property
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.calibration.world import World
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem, prior_in_words
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.likelihood import FINE_ORDER, bases_of
+from tactile_bayes.inference.noise import noise_of
+from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, make_record, rod_of
+from tactile_bayes.rod import Rod
+
+__all__ = ["Experiment"]
+
+Floats = NDArray[np.float64]
+
+_LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One record, drawn, measured and inferred from; `calibrate` says what each entry means."""
+
+    family: str
+    load_cell: LoadCell
+    drive_angles: tuple[float, ...]
+    rod: Rod | None = None
+    bases: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    directions: tuple[str, ...] = ("forward", "backward")
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+    nuisances: tuple[str, ...] = STANDARD
+    friction: float = 0.0
+    events: bool = True
+    settings: SamplerSettings = field(default_factory=SamplerSettings)
+    probability: float = 0.9
+    seed: int = 0
+    world: World = field(default_factory=World)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.probability < 1.0:
+            raise ParameterError(f"probability is {self.probability!r}: give a number between 0 and 1, like 0.9")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int | np.integer) or self.seed < 0:
+            raise ParameterError(f"seed is {self.seed!r}: give a whole number from 0 up")
+        if not any(self.load_cell.standard_deviations.values()):
+            raise ParameterError(
+                "the load cell has no noise, so that there is nothing to be calibrated: give "
+                "LoadCell(force_noise=0.05, moment_noise=0.02), in the record's units"
+            )
+        strangers = sorted({*self.priors, *self.world.priors} - set(self.model.names))
+        if strangers:
+            raise ParameterError(
+                f"there is a prior of {', '.join(strangers)}, which is not inferred: there are "
+                f"{', '.join(self.model.names)}"
+            )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what follows from the rest, to travel lightly."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @cached_property
+    def template(self) -> xr.Dataset:
+        """The record without loads: its drive angles are those read where the encoder makes no error of its own."""
+        angles = np.sort(np.asarray(self.drive_angles, dtype=float))
+        parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
+        sweep = 0
+        for x, y in self.bases:
+            for direction in self.directions:
+                parts["sweep"].append(np.full(angles.size, sweep))
+                parts["direction"].append(np.full(angles.size, direction))
+                parts["base_x"].append(np.full(angles.size, x))
+                parts["base_y"].append(np.full(angles.size, y))
+                parts["drive_angle"].append(angles if direction == "forward" else angles[::-1])
+                sweep += 1
+        columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
+        columns["drive_angle"] = columns["drive_angle"] + self.load_cell.drive_angle_offset
+        loads = {name: np.zeros(columns["sweep"].size) for name in CHANNELS}
+        return make_record(columns | loads, rod=self.rod, load_cell_frame=self.load_cell.frame or "fixed")
+
+    @cached_property
+    def model(self) -> ContourModel:
+        """What truths are drawn from, and to full accuracy what they would make the rod's base feel."""
+        noise = noise_of(self.template, self.load_cell)
+        rig = nuisances_of(self.template, self.nuisances, self.priors, noise.cell, self.friction)
+        family = family_named(self.family)
+        base = float(np.mean([x for x, _ in self.bases])), float(np.mean([y for _, y in self.bases]))
+        contour = family.default_priors(base, rod_of(self.template).length)
+        priors = {**contour, **rig.priors, **noise.priors, **self.priors, **self.world.priors}
+        model = ContourModel(self.template, family, rig, noise, priors)
+        model.likelihood.order = FINE_ORDER
+        if self.world.friction or self.world.flat_spot:  # a family that is always clear without may be not with them
+            model.likelihood.is_always_clear = False
+        return model
+
+    @property
+    def pivots(self) -> int:
+        return len(bases_of(self.template))
+
+    def problem_of(self, measured: xr.Dataset) -> ContourProblem:
+        """What is inferred from a record."""
+        return contour_problem(
+            measured,
+            family=self.family,
+            load_cell=self.load_cell,
+            priors=self.priors,
+            rod=None,
+            friction=self.friction,
+            nuisances=self.nuisances,
+            events=self.events,
+        )
+
+    @property
+    def words(self) -> dict[str, str]:
+        """What its numbers follow from; the same words, the same numbers."""
+        world = self.world
+        told = {
+            "family": self.family,
+            "load_cell": json.dumps(self.load_cell.entries()),
+            "load_cell_frame": self.load_cell.frame or "fixed",
+            "drive_angles": _said(self.drive_angles),
+            "rod": "dimensionless" if self.rod is None else json.dumps(asdict(self.rod)),
+            "bases": json.dumps(self.bases),
+            "directions": json.dumps(self.directions),
+            "priors": json.dumps({name: prior_in_words(prior) for name, prior in self.priors.items()}),
+            "nuisances": json.dumps(self.nuisances),
+            "friction": repr(self.friction),
+            "events": repr(self.events),
+            "settings": json.dumps(asdict(self.settings)),
+            "probability": repr(self.probability),
+            "seed": repr(self.seed),
+        }
+        for name in ("friction", "base_shift", "further_base_shift", "rigidity_scale", "drive_angle_offset"):
+            told[f"world_{name}"] = repr(getattr(world, name))
+        told |= {f"world_{name}": repr(getattr(world, name)) for name in ("bias", "drift", "flat_spot")}
+        told["world_load_cell"] = "as stated" if world.load_cell is None else json.dumps(world.load_cell.entries())
+        told["world_priors"] = json.dumps({name: prior_in_words(prior) for name, prior in world.priors.items()})
+        return told | {f"version of {name}": version(name) for name in _LIBRARIES}
+
+
+def _said(angles: tuple[float, ...]) -> str:
+    return json.dumps([float(angle) for angle in angles])

@@ -1,0 +1,223 @@
+"""One replicate: a record simulated, a posterior inferred, and what is to be said of it beside the truth."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.calibration.experiment import Experiment
+from tactile_bayes.calibration.simulation import Simulation, simulate
+from tactile_bayes.errors import InferenceError, TactileBayesError
+from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.contact_region import contact_region
+from tactile_bayes.uncertainty.implied_contacts import contacts_of
+from tactile_bayes.uncertainty.record_check import check_record
+
+__all__ = ["DRAWS", "LOG_LIKELIHOOD", "REGIONS", "Outcome", "replicate"]
+
+Floats = NDArray[np.float64]
+
+DRAWS = 99
+"""Thinned draws among which the truth has a rank, from 0 to this."""
+
+LOG_LIKELIHOOD = "log_likelihood"
+"""What is ranked besides parameters."""
+
+REGIONS = ("in_gap", "beside")
+"""Where bands are judged: between the last contacts of both directions, and from there to first contact."""
+
+_PLACES = 9
+"""At which a band is judged in the gap, and on each side of it."""
+
+_CONTACTS = (0.1, 0.5, 0.9)
+"""Places in a stroke, between first contact and snap-off, whose contact region is judged."""
+
+_CONTACT_DRAWS = 200
+"""That a contact region is made from."""
+
+
+class Outcome(NamedTuple):
+    """Of one replicate; what could not be had is NaN, or missing among the ranks."""
+
+    ranks: Mapping[str, int]
+    """Of the truth among the draws: of parameters, of the log-likelihood, and of what follows from them."""
+    numbers: Mapping[str, float]
+    """Shares, widths, scores and times by name."""
+    message: str
+    """How sampling ended, or why there is no posterior."""
+
+
+def replicate(task: tuple[Experiment, int]) -> Outcome:
+    """Simulate record `number` of an experiment, infer from it, and compare."""
+    experiment, number = task
+    simulated, inferred, picked = np.random.SeedSequence(experiment.seed, spawn_key=(number,)).spawn(3)
+    simulation = simulate(experiment, np.random.default_rng(simulated))
+    began = time.perf_counter()
+    try:
+        problem = experiment.problem_of(simulation.measured)
+        result = sampled(problem, seed=inferred, settings=experiment.settings, with_prior=False)
+    except InferenceError as error:
+        return Outcome({}, {"seconds": time.perf_counter() - began}, f"{type(error).__name__}: {error}")
+    numbers = {
+        "seconds": time.perf_counter() - began,
+        "converged": float(result.draws.converged),
+        "effective_draws": float(np.min([result.draws.ess_bulk, result.draws.ess_tail])),
+        "evaluations": float(result.draws.evaluations),
+    }
+    rng = np.random.default_rng(picked)
+    tree = result.tree
+    ranks = _ranks(problem.model, result.draws.samples, simulation.truth, rng)
+    ranks |= _ranks_of_events(tree, simulation, rng)
+    numbers |= _bands(tree, simulation, experiment.probability)
+    numbers |= _snap_offs(tree, simulation, experiment.probability)
+    numbers |= _contacts(problem.model, result.draws.samples, simulation, experiment, rng)
+    numbers |= _checks(tree, simulation, experiment)
+    return Outcome(ranks, numbers, result.draws.message)
+
+
+def _ranks(
+    model: ContourModel, samples: Floats, truth: Mapping[str, float], rng: np.random.Generator
+) -> dict[str, int]:
+    """Among draws picked at random, as neighbours in a walker's history are alike."""
+    draws = samples.reshape(-1, samples.shape[-1])
+    picked = draws[rng.choice(len(draws), min(DRAWS, len(draws)), replace=False)]
+    point = np.array([truth[name] for name in model.names])
+    ranks = {name: _rank(picked[:, i], point[i], rng) for i, name in enumerate(model.names)}
+    every = np.vstack([point, picked])
+    loads, reached = model.loads_with_errors(every)
+    values = model.likelihood.score(loads, reached, model.noise_scale(every))
+    return ranks | {LOG_LIKELIHOOD: _rank(values[1:], values[0], rng)}
+
+
+def _ranks_of_events(tree: xr.DataTree, simulation: Simulation, rng: np.random.Generator) -> dict[str, int]:
+    """Of the snap-off's drive angle in each stroke."""
+    events = tree["events"].to_dataset()
+    angles = events.snap_off_drive_angle.stack(all=("chain", "draw")).values  # (stroke, draws)
+    picked = rng.choice(angles.shape[1], min(DRAWS, angles.shape[1]), replace=False)
+    names = _stroke_names(events)
+    truths = simulation.events["snap_off_drive_angle"]
+    return {
+        f"snap_off_{name}": _rank(of_stroke[picked], truth, rng)
+        for name, of_stroke, truth in zip(names, angles, truths, strict=True)
+    }
+
+
+def _stroke_names(events: xr.Dataset) -> list[str]:
+    strokes = [str(stroke) for stroke in events.stroke.values]
+    counted = dict.fromkeys(strokes, 0)
+    names = []
+    for stroke in strokes:
+        counted[stroke] += 1
+        names.append(stroke if strokes.count(stroke) == 1 else f"{stroke}_{counted[stroke]}")
+    return names
+
+
+def _rank(draws: Floats, truth: float, rng: np.random.Generator) -> int:
+    """Draws below the truth, and of those that equal it, as at the end of a record, a random number.
+
+    Where there are fewer than `DRAWS` the rank is stretched to as many.
+    """
+    below, equal = int(np.sum(draws < truth)), int(np.sum(draws == truth))
+    rank = below + int(rng.integers(equal + 1))
+    return rank if draws.size == DRAWS else int((rank + rng.random()) * (DRAWS + 1) / (draws.size + 1))
+
+
+def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
+    numbers: dict[str, float] = {}
+    for region, x in _places(simulation).items():
+        height = np.asarray(simulation.contour.height(x))
+        if not x.size:
+            continue
+        for simultaneous in (False, True):
+            band = contour_band(tree, x, probability, simultaneous)
+            inside = (band.lower.values <= height) & (height <= band.upper.values)
+            known = np.isfinite(band.lower.values)
+            if simultaneous:
+                numbers[f"simultaneous_{region}"] = float(inside.all()) if known.all() else np.nan
+                continue
+            off = band["median"].values - height
+            numbers |= {
+                f"pointwise_{region}": float(inside[known].mean()) if known.any() else np.nan,
+                f"width_{region}": float(np.mean(band.upper.values - band.lower.values)),
+                f"bias_{region}": float(np.mean(off)),
+                f"off_{region}": float(np.max(np.abs(off))),
+            }
+    return numbers
+
+
+def _places(simulation: Simulation) -> dict[str, Floats]:
+    """Values of x by region; none where the sweeps leave no gap, or are of one direction."""
+    ends, begins = simulation.events["snap_off_contact_x"], simulation.events["first_contact_x"]
+    is_forward = begins > ends
+    beside = [np.linspace(end, begin, _PLACES + 1)[1:] for end, begin in zip(ends, begins, strict=True)]
+    places = {"beside": np.concatenate(beside)}
+    if is_forward.any() and not is_forward.all():
+        left, right = ends[~is_forward].max(), ends[is_forward].min()
+        if left < right:
+            places["in_gap"] = np.linspace(left, right, _PLACES + 2)[1:-1]
+    return places
+
+
+def _snap_offs(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
+    """Share of strokes whose snap-off lies in the central interval of the predicted one."""
+    angles = tree["events"].to_dataset().snap_off_drive_angle
+    low, high = np.quantile(angles.values, [0.5 - 0.5 * probability, 0.5 + 0.5 * probability], axis=(0, 1))
+    true = simulation.events["snap_off_drive_angle"]
+    return {"snap_off": float(np.mean((low <= true) & (true <= high)))}
+
+
+def _contacts(
+    model: ContourModel, samples: Floats, simulation: Simulation, experiment: Experiment, rng: np.random.Generator
+) -> dict[str, float]:
+    """Share of the contacts looked at that lie in their region."""
+    likelihood = experiment.model.likelihood
+    read = experiment.template.drive_angle.values - experiment.load_cell.drive_angle_offset
+    true = contacts_of(likelihood, simulation.contour, simulation.rig, read)
+    chosen: list[int] = []
+    for stroke in likelihood.strokes:
+        touching = stroke.samples[np.isfinite(true["contact_x"][0, stroke.samples])]
+        if touching.size:
+            chosen += [int(touching[round(share * (touching.size - 1))]) for share in _CONTACTS]
+    if not chosen or not experiment.events:  # without events the record that is inferred from has fewer samples
+        return {}
+    draws = samples.reshape(-1, samples.shape[-1])
+    points = draws[rng.choice(len(draws), min(_CONTACT_DRAWS, len(draws)), replace=False)]
+    asked = np.full(read.size, np.nan)
+    asked[chosen] = (simulation.measured.drive_angle.values - experiment.load_cell.drive_angle_offset)[chosen]
+    found = contacts_of(model.likelihood, model.contours(points), model.rig(points), asked)
+    dims = ("chain", "draw", "sample")
+    columns = {name: (dims, found[name][None][..., chosen]) for name in ("contact_x", "contact_y")}
+    implied = xr.Dataset(columns, coords={"sample": chosen})
+    held = []
+    for sample in chosen:
+        try:
+            region = contact_region(implied, sample, experiment.probability)
+        except InferenceError:  # hardly any contour of the posterior is touched there
+            held.append(False)
+            continue
+        held.append(bool(region.contains(true["contact_x"][0, sample], true["contact_y"][0, sample])))
+    return {"contact_region": float(np.mean(held))}
+
+
+def _checks(tree: xr.DataTree, simulation: Simulation, experiment: Experiment) -> dict[str, float]:
+    """What the checks say that a user sees: of the posterior's predictions, and of the loads of single samples."""
+    check = check_record(tree)
+    numbers = {"check_p_value": float(check.overall_p_value), "check_passed": float(check.attrs["passed"])}
+    try:
+        contacts = reconstruct(
+            simulation.measured, method="constrained", load_cell=experiment.load_cell, friction=experiment.friction
+        )
+    except TactileBayesError:  # a channel without noise
+        return numbers
+    return numbers | {
+        "misfit_probability": float(contacts.attrs["misfit_probability"]),
+        "axial_score": float(contacts.attrs["axial_score"]),
+    }

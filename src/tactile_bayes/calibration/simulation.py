@@ -1,0 +1,81 @@
+"""The simulation of a record: a truth drawn from the prior, and what is measured of it in the world as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.calibration.experiment import Experiment
+from tactile_bayes.contours import Contour
+from tactile_bayes.errors import ReachError
+from tactile_bayes.inference.contour_events import events_of
+from tactile_bayes.inference.likelihood import Rig
+from tactile_bayes.load_cell.corruption import corrupted_angles
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["Simulation", "simulate"]
+
+Floats = NDArray[np.float64]
+
+_TRIALS = 200
+"""Truths drawn until the rod reaches one in the world as it is."""
+
+
+class Simulation(NamedTuple):
+    """A record of which everything is known."""
+
+    measured: xr.Dataset
+    truth: Mapping[str, float]
+    """Parameters by name, in the record's units."""
+    contour: Contour
+    """The object, of shape (1,)."""
+    rig: Rig
+    """As it is."""
+    events: Mapping[str, Floats]
+    """First contact and snap-off by stroke, each of shape (strokes,)."""
+
+
+def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
+    """Draw a truth, sweep along it and measure.
+
+    Loads come to full accuracy from the arrays of `Paths`, not from the compiled code that inference asks.
+
+    Raises
+    ------
+    ReachError
+        If the rod hardly ever reaches a contour of the prior.
+    """
+    model, world = experiment.model, experiment.world
+    likelihood = model.likelihood
+    for _ in range(_TRIALS):
+        point, _ = model.draw_prior(rng, 1)
+        contour = world.contour(model.contours(point))
+        rig = world.rig(model.rig(point), experiment.pivots)
+        loads, reached = likelihood.predict(contour, rig)
+        if reached[0]:
+            break
+    else:
+        raise ReachError(
+            f"of {_TRIALS} contours from the prior the rod reaches none in the world as it is: make it differ less"
+        )
+    values = model.values(point)
+    sensed = model.nuisances.sensed(loads, values, likelihood.load_cell)[0]
+    rod = likelihood.rod
+    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    told = experiment.load_cell
+    cell = told if world.load_cell is None else world.load_cell
+    readings = cell.dimensionless(rod).simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
+    course = model.nuisances.way[:, None]
+    readings = readings + np.array(world.bias) + np.array(world.drift) * course
+    template = experiment.template
+    # The template has the angles that a perfect encoder with the offset that is told would read.
+    angles = corrupted_angles(cell, template.drive_angle.values - cell.drive_angle_offset, rng)
+    columns = {name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)}
+    measured = template.assign(columns).assign(drive_angle=("sample", angles, template.drive_angle.attrs))
+    events = {name: found[0] for name, found in events_of(likelihood, contour, rig).items()}
+    truth = {name: float(value[0]) for name, value in values.items()}
+    return Simulation(measured, truth, contour, rig, events)

@@ -1,0 +1,125 @@
+"""The world as it is, where inference takes it for something else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from tactile_bayes.contours import Contour, ShapeFree
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.likelihood import Rig
+from tactile_bayes.load_cell import LoadCell
+
+__all__ = ["World"]
+
+Triple = tuple[float, float, float]
+
+_NOTHING: Triple = (0.0, 0.0, 0.0)
+
+_SPOT = 0.1
+"""Standard deviation of a flat spot in slope angle [rad]."""
+
+_ENDS, _KNOTS = 1.5, 121
+"""Of a contour with a flat spot, which is a spline over slope angle [rad]."""
+
+
+@dataclass(frozen=True)
+class World:
+    """In what the world differs from what inference assumes; by default in nothing.
+
+    Parameters
+    ----------
+    friction : float
+        Coulomb's coefficient that the rod slides with, beyond that which inference knows of.
+    base_shift : (float, float)
+        By how much the pivots are off where the record has them [length].
+    further_base_shift : (float, float)
+        By how much all pivots but the first are off besides [length].
+    rigidity_scale : float
+        Flexural rigidity over that stated, beside what is inferred of it.
+    drive_angle_offset : float
+        What the encoder reads too much, beside what is inferred of it [rad].
+    bias, drift : (float, float, float)
+        Of the readings of moment, force_x and force_y; a drift is what a zero moves by evenly from the first sample to
+        the last, a bias what it is in the middle; beside what is inferred of them.
+    load_cell : LoadCell, optional
+        That which measures, in place of the one that inference is told.
+    flat_spot : (float, float), optional
+        Slope angle [rad] and factor by which the radius of curvature is larger there, and within 0.1 rad of it (a bell
+        curve of that standard deviation), than that of any contour of the family.
+    priors : mapping
+        Of some parameters, from which truths are drawn in place of those that inference takes.
+
+    Examples
+    --------
+    >>> World(friction=0.3)
+    World(friction=0.3)
+    """
+
+    friction: float = 0.0
+    base_shift: tuple[float, float] = (0.0, 0.0)
+    further_base_shift: tuple[float, float] = (0.0, 0.0)
+    rigidity_scale: float = 1.0
+    drive_angle_offset: float = 0.0
+    bias: Triple = _NOTHING
+    drift: Triple = _NOTHING
+    load_cell: LoadCell | None = None
+    flat_spot: tuple[float, float] | None = None
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        sizes = {"base_shift": 2, "further_base_shift": 2, "bias": 3, "drift": 3, "flat_spot": 2}
+        for name, value in self._given().items():
+            if name in ("load_cell", "priors"):
+                continue
+            wanted = () if name not in sizes else (sizes[name],)
+            try:
+                numbers = np.asarray(value, dtype=float)
+            except (TypeError, ValueError):
+                numbers = np.empty(0)
+            if numbers.shape != wanted or not np.all(np.isfinite(numbers)):
+                kind = f"{sizes[name]} finite numbers" if name in sizes else "a finite number"
+                raise ParameterError(f"{name} of the world is {value!r}: give {kind}")
+        if not self.friction >= 0.0:
+            raise ParameterError(f"friction of the world is {self.friction!r}: give a coefficient from 0 up")
+        if not self.rigidity_scale > 0.0 or (self.flat_spot is not None and not self.flat_spot[1] > 0.0):
+            raise ParameterError("rigidity_scale and the factor of a flat spot are positive numbers")
+
+    def __repr__(self) -> str:
+        return f"World({', '.join(f'{name}={value!r}' for name, value in self._given().items())})"
+
+    def _given(self) -> dict[str, Any]:
+        """What is not as by default."""
+        given = {each.name: getattr(self, each.name) for each in fields(self)}
+        ideal: dict[str, Any] = {each.name: {} if each.name == "priors" else each.default for each in fields(self)}
+        return {name: value for name, value in given.items() if value != ideal[name]}
+
+    def contour(self, drawn: Contour) -> Contour:
+        """The object, of shape (1,), from a contour of the family."""
+        if self.flat_spot is None:
+            return drawn
+        slopes = np.linspace(-_ENDS, _ENDS, _KNOTS)
+        at, factor = self.flat_spot
+        radius = np.asarray(drawn.radius_of_curvature(slopes), dtype=float)
+        x, y = (np.ravel(np.asarray(value, dtype=float))[0] for value in drawn.point(0.0))
+        flatter = np.log(radius) + np.log(factor) * np.exp(-0.5 * ((slopes - at) / _SPOT) ** 2)
+        return ShapeFree(slopes, flatter[None], x=x, y=y, at=0.0)
+
+    def rig(self, drawn: Rig, pivots: int) -> Rig:
+        """The rig, of one contour, from what was drawn of it."""
+        shifts = np.zeros((1, pivots, 2))
+        if drawn.base_shifts is not None:
+            shifts[:, : drawn.base_shifts.shape[1]] += drawn.base_shifts
+        shifts += np.array(self.base_shift)
+        shifts[:, 1:] += np.array(self.further_base_shift)
+        return Rig(
+            drive_angle_offset=drawn.drive_angle_offset + self.drive_angle_offset,
+            rigidity_scale=drawn.rigidity_scale * self.rigidity_scale,
+            suspension_compliance=drawn.suspension_compliance,
+            friction=drawn.friction + self.friction,
+            base_shifts=shifts,
+        )

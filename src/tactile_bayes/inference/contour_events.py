@@ -1,0 +1,30 @@
+"""Where contact begins and ends on many contours, in every stroke of a record."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+
+__all__ = ["events_of"]
+
+Floats = NDArray[np.float64]
+
+
+def events_of(likelihood: RecordLikelihood, contours: Contour, rig: Rig | None = None) -> dict[str, Floats]:
+    """First contact and snap-off in every stroke, in the record's units, each of shape (n, strokes)."""
+    count = contours.shape[0]
+    paths = likelihood.paths(contours, rig, exact_events=True)
+    lanes = np.arange(paths.seen.lanes)
+    backward = paths.seen.mirrored
+    out = {}
+    for label, angle, parameter in (
+        ("first", paths.first_angle, paths.first_parameter),
+        ("snap_off", paths.snap_angle, paths.snap_parameter),
+    ):
+        locus = paths.seen.contour.take(lanes).locate(np.where(backward, -parameter, parameter))
+        out[f"{label}_drive_angle"] = np.where(backward, np.pi - angle, angle)
+        out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
+    return {name: values.reshape(-1, count).T for name, values in out.items()}
