@@ -10,7 +10,7 @@ PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench coverage calibration shapes recognition samplers images lint clean
+.PHONY: demo test test-slow bench coverage calibration shapes recognition misspecification samplers images lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -37,6 +37,9 @@ shapes: $(READY)
 
 recognition: $(READY)
 	$(BIN)/python -m benchmarks.recognition
+
+misspecification: $(READY)
+	$(BIN)/python -m benchmarks.misspecification
 
 samplers: $(READY)
 	$(BIN)/python -m pip install --quiet --target $(PEERS) --upgrade --no-deps \

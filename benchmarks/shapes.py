@@ -17,9 +17,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import tactile_bayes as tb
-from benchmarks.calibration import PROBABILITY, gap_and_touched
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw, Smooth, from_points, paper_profile
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.scanning import Scan
 from tactile_bayes.tasks import run_tasks
 
 Floats = NDArray[np.float64]
@@ -28,6 +28,7 @@ NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.0
 """Of forces [EI/L²] and of the moment [EI/L]."""
 
 ANGLES = np.radians(np.arange(0.0, 200.0, 1.0))
+PROBABILITY, PLACES = 0.9, 9
 SETTINGS = SamplerSettings(max_steps=700)
 
 
@@ -120,6 +121,17 @@ def record(task: tuple[str, str, int]) -> Outcome:
         _, known_width, _ = compared(known, contour, gap)
     passed = bool(tb.check_record(result).attrs["passed"])
     return Outcome(in_gap, out_of_gap, width, off, known_width, seconds, bool(result.attrs["converged"]), passed)
+
+
+def gap_and_touched(scan: Scan) -> tuple[Floats, Floats]:
+    """Places in the gap, and beside it as far as first contact."""
+    forward, backward = scan.events["forward"], scan.events["backward"]
+    left, right = sorted([backward.snap_off.contact_x, forward.snap_off.contact_x])
+    sides = [
+        np.linspace(event.snap_off.contact_x, event.first_contact.contact_x, PLACES + 1)[1:]
+        for event in (forward, backward)
+    ]
+    return np.linspace(left, right, PLACES + 2)[1:-1], np.concatenate(sides)
 
 
 def compared(result: xr.DataTree, contour: Contour, x: Floats) -> tuple[float, float, float]:

@@ -133,8 +133,8 @@ def calibrate(
         effective_draws, evaluations, seconds, message (replicate)
             Of each.
 
-        Attributes: verdict, in words; calibrated (0 or 1) and false_alarm, the probability, at most, that right
-        posteriors are not called so; and the experiment.
+        Attributes: verdict, in words; calibrated (0 or 1); false_alarm, the probability, at most, that right posteriors
+        are not called so, and level, the p-value below which a single quantity or claim is at fault; the experiment.
 
     Raises
     ------

@@ -63,12 +63,14 @@ class Experiment:
                 "the load cell has no noise, so that there is nothing to be calibrated: give "
                 "LoadCell(force_noise=0.05, moment_noise=0.02), in the record's units"
             )
-        strangers = sorted({*self.priors, *self.world.priors} - set(self.model.names))
-        if strangers:
-            raise ParameterError(
-                f"there is a prior of {', '.join(strangers)}, which is not inferred: there are "
-                f"{', '.join(self.model.names)}"
-            )
+        own = {*family_named(self.family).parameters, *self.model.nuisances.names, *self.model.noise.names}
+        for whose, priors, names in (("", self.priors, own), ("of the world ", self.world.priors, self.model.names)):
+            strangers = sorted(set(priors) - set(names))
+            if strangers:
+                raise ParameterError(
+                    f"there is a prior {whose}of {', '.join(strangers)}, which is no parameter: there are "
+                    f"{', '.join(sorted(names))}"
+                )
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what follows from the rest, to travel lightly."""
@@ -98,15 +100,21 @@ class Experiment:
         """What truths are drawn from, and to full accuracy what they would make the rod's base feel."""
         noise = noise_of(self.template, self.load_cell)
         rig = nuisances_of(self.template, self.nuisances, self.priors, noise.cell, self.friction)
-        family = family_named(self.family)
+        family = family_named(self.world.family or self.family)
         base = float(np.mean([x for x, _ in self.bases])), float(np.mean([y for _, y in self.bases]))
         contour = family.default_priors(base, rod_of(self.template).length)
         priors = {**contour, **rig.priors, **noise.priors, **self.priors, **self.world.priors}
+        priors = {name: priors[name] for name in (*family.parameters, *rig.names, *noise.names)}
         model = ContourModel(self.template, family, rig, noise, priors)
         model.likelihood.order = FINE_ORDER
         if self.world.friction or self.world.flat_spot:  # a family that is always clear without may be not with them
             model.likelihood.is_always_clear = False
         return model
+
+    @property
+    def is_of_family(self) -> bool:
+        """Whether contours are of the family that inference takes them for."""
+        return self.world.family in (None, self.family) and self.world.flat_spot is None
 
     @property
     def pivots(self) -> int:
@@ -145,6 +153,7 @@ class Experiment:
             "probability": repr(self.probability),
             "seed": repr(self.seed),
         }
+        told["world_family"] = world.family or self.family
         for name in ("friction", "base_shift", "further_base_shift", "rigidity_scale", "drive_angle_offset"):
             told[f"world_{name}"] = repr(getattr(world, name))
         told |= {f"world_{name}": repr(getattr(world, name)) for name in ("bias", "drift", "flat_spot")}

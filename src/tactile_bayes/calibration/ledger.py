@@ -69,7 +69,7 @@ def open_ledger(words: Mapping[str, str], folder: Path | None) -> Iterator[Ledge
 
 
 def _read(file: Path, words: Mapping[str, str]) -> dict[int, Outcome]:
-    remedy = "give another folder, or remove that file to begin anew"
+    remedy = f"give another folder, or remove {file.name} from it to begin anew"
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
         if table["format"] != _FORMAT:

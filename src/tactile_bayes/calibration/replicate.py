@@ -74,7 +74,7 @@ def replicate(task: tuple[Experiment, int]) -> Outcome:
     }
     rng = np.random.default_rng(picked)
     tree = result.tree
-    ranks = _ranks(problem.model, result.draws.samples, simulation.truth, rng)
+    ranks = _ranks(problem.model, result.draws.samples, simulation.truth, experiment.is_of_family, rng)
     ranks |= _ranks_of_events(tree, simulation, rng)
     numbers |= _bands(tree, simulation, experiment.probability)
     numbers |= _snap_offs(tree, simulation, experiment.probability)
@@ -84,13 +84,23 @@ def replicate(task: tuple[Experiment, int]) -> Outcome:
 
 
 def _ranks(
-    model: ContourModel, samples: Floats, truth: Mapping[str, float], rng: np.random.Generator
+    model: ContourModel,
+    samples: Floats,
+    truth: Mapping[str, float],
+    is_of_family: bool,
+    rng: np.random.Generator,
 ) -> dict[str, int]:
-    """Among draws picked at random, as neighbours in a walker's history are alike."""
+    """Among draws picked at random, as neighbours in a walker's history are alike.
+
+    Of a contour that is none of the family there are no true parameters.
+    """
     draws = samples.reshape(-1, samples.shape[-1])
     picked = draws[rng.choice(len(draws), min(DRAWS, len(draws)), replace=False)]
+    ranked = model.names if is_of_family else model.names[len(model.family.parameters) :]
+    ranks = {name: _rank(picked[:, model.names.index(name)], truth[name], rng) for name in ranked}
+    if not is_of_family:
+        return ranks
     point = np.array([truth[name] for name in model.names])
-    ranks = {name: _rank(picked[:, i], point[i], rng) for i, name in enumerate(model.names)}
     every = np.vstack([point, picked])
     loads, reached = model.loads_with_errors(every)
     values = model.likelihood.score(loads, reached, model.noise_scale(every))

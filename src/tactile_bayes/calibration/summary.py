@@ -76,18 +76,22 @@ def summary(experiment: Experiment, outcomes: Mapping[int, Outcome]) -> xr.Datas
     failed = Counter(row.message.split(":")[0] for row in rows if not row.ranks)
     with_posterior = sum(1 for row in rows if row.ranks)
     converged = values.get("converged", np.empty(0))
-    faults = _faults(data, experiment.probability)
+    # Shared by all that is looked at.
+    tested = int(np.isfinite(data.rank_p_value).sum()) + int((data.coverage_replicates >= _FEWEST).sum())
+    level = FALSE_ALARM / max(tested, 1)
+    faults = _faults(data, experiment.probability, level)
     enough = with_posterior >= _FEWEST
     is_calibrated = enough and not faults and sum(failed.values()) <= _MOST_FAILED * len(rows)
     data.attrs = {
+        **experiment.words,
         "verdict": _verdict(data, experiment, faults, failed, enough),
         "calibrated": int(is_calibrated),
         "false_alarm": FALSE_ALARM,
+        "level": level,
         "replicates": len(rows),
         "without_posterior": sum(failed.values()),
         "not_converged": int(np.sum(converged == 0.0)),
         "probability": experiment.probability,
-        **experiment.words,
     }
     return data
 
@@ -97,10 +101,8 @@ def _uniformity(ranks: NDArray[np.intp]) -> float:
     return uniformity_p_value(known, DRAWS) if known.size >= _FEWEST else np.nan
 
 
-def _faults(data: xr.Dataset, probability: float) -> list[_Fault]:
-    """What is less probable than the verdict's rate of false alarms, shared by all that is looked at."""
-    tested = int(np.isfinite(data.rank_p_value).sum()) + int((data.coverage_replicates >= _FEWEST).sum())
-    level = FALSE_ALARM / max(tested, 1)
+def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
+    """What is at most as probable as a level, where posteriors are right."""
     faults = []
     for name, p_value in zip(data.quantity.values, data.rank_p_value.values, strict=True):
         if p_value <= level:

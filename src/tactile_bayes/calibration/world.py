@@ -51,6 +51,8 @@ class World:
     flat_spot : (float, float), optional
         Slope angle [rad] and factor by which the radius of curvature is larger there, and within 0.1 rad of it (a bell
         curve of that standard deviation), than that of any contour of the family.
+    family : str, optional
+        From which contours are drawn, in place of that which inference takes them for; its priors are its own.
     priors : mapping
         Of some parameters, from which truths are drawn in place of those that inference takes.
 
@@ -69,12 +71,13 @@ class World:
     drift: Triple = _NOTHING
     load_cell: LoadCell | None = None
     flat_spot: tuple[float, float] | None = None
+    family: str | None = None
     priors: Mapping[str, Prior] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         sizes = {"base_shift": 2, "further_base_shift": 2, "bias": 3, "drift": 3, "flat_spot": 2}
         for name, value in self._given().items():
-            if name in ("load_cell", "priors"):
+            if name in ("load_cell", "family", "priors"):
                 continue
             wanted = () if name not in sizes else (sizes[name],)
             try:

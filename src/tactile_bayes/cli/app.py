@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from tactile_bayes.cli.analysis import demo, infer
+from tactile_bayes.cli.calibration import calibrate
 from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
 
@@ -44,6 +45,7 @@ app = typer.Typer(
 )
 app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")(infer)
 app.command(epilog="Example: tactile-bayes compare record.csv --out run/")(compare)
+app.command(epilog="Example: tactile-bayes calibrate --family parabola --replicates 200 --out calibration/")(calibrate)
 app.command(epilog="Example: tactile-bayes demo --out results/demo")(demo)
 app.add_typer(dataset, name="dataset")
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tactile_bayes.cli.interrupts import going_on
+from tactile_bayes.cli.task_bar import counted, task_bar
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from types import FrameType
 
     from tactile_bayes.datasets import Production, Verification
     from tactile_bayes.datasets.manifest import Manifest
@@ -64,24 +66,19 @@ def generate(
         raise ParameterError("--workers and --scheduler exclude each other: give one of them")
     spec = datasets.read_specification(specification)
     last: Production | None = None
-    try:
-        with _progress(spec.records, quiet) as show, _interrupts_kept() as raise_lost:
 
-            def note(production: Production) -> None:
-                nonlocal last
-                last = production
-                show(production)
-                raise_lost()
+    def have() -> str:
+        return f"{last.records:,} of {spec.records:,} records are in {out}" if last else "no further file was finished"
 
-            datasets.generate(spec, out, workers=workers, scheduler=scheduler, progress=note)
-    except KeyboardInterrupt as interrupt:
-        have = f"{last.records:,} of {spec.records:,} records are in {out}" if last else "no further file was finished"
-        is_terminated = isinstance(interrupt, _Terminated)
-        words = f"{'terminated' if is_terminated else 'interrupted'}, {have}: the same command goes on"
-        if is_terminated:
-            typer.echo(f"tactile-bayes: {words}", err=True)
-            raise typer.Exit(143) from None
-        raise KeyboardInterrupt(words) from None
+    with going_on(have) as raise_lost, task_bar(spec.records, "record", quiet) as show:
+
+        def note(production: Production) -> None:
+            nonlocal last
+            last = production
+            show(production.records)
+            raise_lost()
+
+        datasets.generate(spec, out, workers=workers, scheduler=scheduler, progress=note)
     _print_result(out, read_manifest(out), last)
 
 
@@ -123,33 +120,6 @@ def record(
 
 
 @contextmanager
-def _progress(records: int, quiet: bool) -> Iterator[Callable[[Production], object]]:
-    """A bar that fills with records; none where nobody sees it move."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
-    from rich.text import Text
-
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield lambda production: None
-        return
-
-    class Rate(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            return Text(f"{task.speed:,.0f} records/s" if task.speed else "")
-
-    words = (TextColumn("{task.description}"), Rate(), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
-    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
-        task = bar.add_task(f"{_records(records)} to be made", total=None, left="")
-
-        def show(production: Production) -> None:
-            description = f"{production.records:,} of {records:,} records"
-            bar.update(task, total=records, completed=production.records, description=description, left="left")
-
-        yield show
-
-
-@contextmanager
 def _verification_progress(quiet: bool) -> Iterator[Callable[[Verification], object]]:
     """A bar that fills with files; none where nobody sees it move."""
     from rich.console import Console
@@ -168,40 +138,6 @@ def _verification_progress(quiet: bool) -> Iterator[Callable[[Verification], obj
             bar.update(task, total=wanted, completed=done, description=f"{done:,} of {_files(wanted)}", left="left")
 
         yield show
-
-
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM, as batch systems send it before they kill."""
-
-
-@contextmanager
-def _interrupts_kept() -> Iterator[Callable[[], object]]:
-    """Raises an interrupt that was lost: Python ignores one that comes in the callback of a weak reference."""
-    import signal
-    import threading
-
-    usual: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-    ours = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
-    if not ours or threading.current_thread() is not threading.main_thread():
-        yield lambda: None
-        return
-    come: list[type[KeyboardInterrupt]] = []
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        come.append(_Terminated if number == signal.SIGTERM else KeyboardInterrupt)
-        raise come[0]
-
-    def raise_lost() -> None:
-        if come:
-            raise come[0]
-
-    for number in ours:
-        signal.signal(number, interrupt)
-    try:
-        yield raise_lost
-    finally:
-        for number in ours:
-            signal.signal(number, usual[number])
 
 
 def _print_result(out: Path, manifest: Manifest, last: Production | None) -> None:
@@ -229,8 +165,8 @@ def _rate(production: Production) -> str:
 
 
 def _records(count: int) -> str:
-    return f"{count:,} record" + "s" * (count != 1)
+    return counted(count, "record")
 
 
 def _files(count: int) -> str:
-    return f"{count:,} file" + "s" * (count != 1)
+    return counted(count, "file")

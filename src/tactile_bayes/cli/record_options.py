@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from tactile_bayes.load_cell import LoadCell
+    from tactile_bayes.rod import Rod
 
 __all__ = [
     "AsStated",
@@ -32,7 +33,9 @@ __all__ = [
     "Record",
     "Seed",
     "SplitSweeps",
+    "nuisances_asked",
     "read_measurement",
+    "rod_asked",
 ]
 
 Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc.")]
@@ -114,19 +117,10 @@ def read_measurement(
     RecordError
         If the file holds no record.
     """
-    from tactile_bayes.errors import ParameterError
-    from tactile_bayes.inference.nuisances import STANDARD
     from tactile_bayes.record import read_record
-    from tactile_bayes.rod import Rod
 
-    if as_stated and nuisance:
-        raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")
-    nuisances = [] if as_stated else list(nuisance or STANDARD)
-    if (length is None) != (flexural_rigidity is None):
-        raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
-    if diameter and length is None:
-        raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
-    rod = None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
+    nuisances = nuisances_asked(nuisance, as_stated)
+    rod = rod_asked(length, flexural_rigidity, diameter)
     record = read_record(
         path,
         columns=_origins(column or []),
@@ -143,6 +137,40 @@ def read_measurement(
             err=True,
         )
     return Measurement(record, cell, nuisances)
+
+
+def nuisances_asked(nuisance: Sequence[str] | None, as_stated: bool) -> list[str]:
+    """What is to be inferred beside a contour.
+
+    Raises
+    ------
+    ParameterError
+        If the options contradict each other.
+    """
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.inference.nuisances import STANDARD
+
+    if as_stated and nuisance:
+        raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")
+    return [] if as_stated else list(nuisance or STANDARD)
+
+
+def rod_asked(length: float | None, flexural_rigidity: float | None, diameter: float) -> Rod | None:
+    """The rod, if one is given.
+
+    Raises
+    ------
+    ParameterError
+        If it is not given whole.
+    """
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.rod import Rod
+
+    if (length is None) != (flexural_rigidity is None):
+        raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
+    if diameter and length is None:
+        raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
+    return None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
 
 
 def _origins(options: Sequence[str]) -> dict[str, str]:

@@ -6,8 +6,10 @@ made; its settings are left alone, and nothing is shown.
 """
 
 from tactile_bayes.plotting.axes import PALETTE
+from tactile_bayes.plotting.calibration_panels import calibration_ranks
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
 from tactile_bayes.plotting.contour_map import band_detail, contour
+from tactile_bayes.plotting.coverage_bars import coverage
 from tactile_bayes.plotting.family_bars import families
 from tactile_bayes.plotting.gap_map import gap
 from tactile_bayes.plotting.posteriors import pairs, trace
@@ -20,9 +22,11 @@ from tactile_bayes.plotting.touch_map import touched
 __all__ = [
     "PALETTE",
     "band_detail",
+    "calibration_ranks",
     "contact_ellipses",
     "contact_regions",
     "contour",
+    "coverage",
     "families",
     "gap",
     "observables",

@@ -1,0 +1,190 @@
+"""The command `calibrate`: whether intervals hold, over records that are simulated."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tactile_bayes.cli.interrupts import going_on
+from tactile_bayes.cli.record_options import (
+    AsStated,
+    Friction,
+    Nuisances,
+    Out,
+    Quiet,
+    Seed,
+    nuisances_asked,
+    rod_asked,
+)
+from tactile_bayes.cli.task_bar import task_bar
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+
+    from tactile_bayes.calibration.calibrate import Calibrating
+    from tactile_bayes.calibration.world import World
+    from tactile_bayes.calibration_run import CalibrationRun
+    from tactile_bayes.load_cell import LoadCell
+    from tactile_bayes.rod import Rod
+
+__all__ = ["calibrate"]
+
+
+def calibrate(
+    out: Out,
+    family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
+    replicates: Annotated[int, typer.Option(help="How many records.", min=1)] = 200,
+    force_noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; by default 0.05 EI/L².")
+    ] = None,
+    moment_noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; by default 0.02 EI/L.")
+    ] = None,
+    length: Annotated[
+        float | None, typer.Option(help="Rod length [m]; by default everything is dimensionless, in units of the rod.")
+    ] = None,
+    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None,
+    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0,
+    base: Annotated[
+        list[str] | None, typer.Option(help="A pivot, X,Y; give it again for another. By default one at 0,0.")
+    ] = None,
+    drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 2.0,
+    friction: Friction = 0.0,
+    nuisance: Nuisances = None,
+    as_stated: AsStated = False,
+    world: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What the world has otherwise than inference assumes: friction=0.3, rigidity_scale=1.05, "
+            "drive_angle_offset=0.02, base_shift=0.01,0, bias=0.02,0.05,0.05, drift=0.04,0.1,0.1, flat_spot=ANGLE,FACTOR; give it "
+            "again for another."
+        ),
+    ] = None,
+    probability: Annotated[float, typer.Option(help="Of the bands and regions that are judged.")] = 0.9,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes on this machine; by default one for each core.", min=1)
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask scheduler in place of --workers, like tcp://10.0.0.1:8786."),
+    ] = None,
+    seed: Seed = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Show whether intervals hold: simulate records, infer from each, and compare with the truth.
+
+    A run that was stopped goes on by the same command; with more replicates it begins with those that are there.
+    """
+    import numpy as np
+
+    from tactile_bayes.calibration_run import calibrate_into
+    from tactile_bayes.errors import ParameterError
+
+    if workers is not None and scheduler is not None:
+        raise ParameterError("--workers and --scheduler exclude each other: give one of them")
+    rod = rod_asked(length, flexural_rigidity, diameter)
+    last: Calibrating | None = None
+
+    def have() -> str:
+        return f"{last.done:,} of {replicates:,} replicates are in {out}" if last else "no further replicate was done"
+
+    with going_on(have) as raise_lost, task_bar(replicates, "replicate", quiet) as show:
+
+        def note(calibrating: Calibrating) -> None:
+            nonlocal last
+            last = calibrating
+            show(calibrating.done)
+            raise_lost()
+
+        run = calibrate_into(
+            out,
+            family=family,
+            replicates=replicates,
+            load_cell=_load_cell(rod, force_noise, moment_noise),
+            rod=rod,
+            base=[_numbers(pivot, "--base", 2) for pivot in base or ["0,0"]],
+            drive_angles=np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
+            friction=friction,
+            nuisances=nuisances_asked(nuisance, as_stated),
+            world=_world(world or []),
+            probability=probability,
+            workers=workers,
+            scheduler=scheduler,
+            seed=seed,
+            progress=note,
+        )
+    _print_run(run)
+
+
+def _load_cell(rod: Rod | None, force_noise: float | None, moment_noise: float | None) -> LoadCell | None:
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.load_cell import LoadCell
+
+    if force_noise is None and moment_noise is None:
+        return None
+    if not force_noise or not moment_noise:
+        raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
+    return LoadCell(force_noise=force_noise, moment_noise=moment_noise)
+
+
+def _world(options: Sequence[str]) -> World:
+    from tactile_bayes.calibration.world import World
+    from tactile_bayes.errors import ParameterError
+
+    sizes = {"friction": 1, "rigidity_scale": 1, "drive_angle_offset": 1, "bias": 3, "drift": 3}
+    sizes |= {"base_shift": 2, "further_base_shift": 2, "flat_spot": 2}
+    given: dict[str, Any] = {}
+    for option in options:
+        name, equals, value = (part.strip() for part in option.partition("="))
+        if not equals or name not in sizes:
+            raise ParameterError(f"--world {option}: write NAME=VALUE, with one of {', '.join(sizes)}")
+        numbers = _numbers(value, f"--world {name}", sizes[name])
+        given[name] = numbers[0] if sizes[name] == 1 else numbers
+    return World(**given)
+
+
+def _numbers(text: str, option: str, count: int) -> tuple[float, ...]:
+    from tactile_bayes.errors import ParameterError
+
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count:
+        wanted = "a number" if count == 1 else f"{count} numbers with commas between them"
+        raise ParameterError(f"{option} is {text!r}: give {wanted}")
+    return numbers
+
+
+def _print_run(run: CalibrationRun) -> None:
+    from rich.console import Console
+
+    console = Console()
+    found = run.calibration
+    console.print(found.attrs["verdict"], markup=False, highlight=False, soft_wrap=True)
+    console.print()
+    console.print(_table(found))
+    console.print()
+    for what, path in run.files.items():
+        console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)
+
+
+def _table(found: xr.Dataset) -> object:
+    from rich.table import Table
+
+    from tactile_bayes.calibration.summary import CLAIMS
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column(f"stated with {found.attrs['probability']:.0%}", no_wrap=True)
+    table.add_column("holds in", justify="right", no_wrap=True)
+    table.add_column("of replicates", justify="right", no_wrap=True)
+    for name in found.claim.values:
+        row = found.sel(claim=name)
+        share, error, count = float(row.coverage), float(row.coverage_error), int(row.coverage_replicates)
+        if count:
+            told = f"{share:.1%}" + (f" ± {error:.1%}" if error == error else "")
+            table.add_row(CLAIMS[str(name)], told, f"{count:,}")
+    return table

@@ -1,0 +1,66 @@
+"""Interrupts of long runs, which go on where they stopped when they are started again."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import FrameType
+
+__all__ = ["going_on"]
+
+
+@contextmanager
+def going_on(have: Callable[[], str]) -> Iterator[Callable[[], object]]:
+    """A run that goes on by the same command: an interrupt ends it with words that say what is there.
+
+    What is yielded is to be called now and then: it raises an interrupt that was lost.
+    """
+    try:
+        with _interrupts_kept() as raise_lost:
+            yield raise_lost
+    except KeyboardInterrupt as interrupt:
+        is_terminated = isinstance(interrupt, _Terminated)
+        words = f"{'terminated' if is_terminated else 'interrupted'}, {have()}: the same command goes on"
+        if is_terminated:
+            typer.echo(f"tactile-bayes: {words}", err=True)
+            raise typer.Exit(143) from None
+        raise KeyboardInterrupt(words) from None
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, as batch systems send it before they kill."""
+
+
+@contextmanager
+def _interrupts_kept() -> Iterator[Callable[[], object]]:
+    """Raises an interrupt that was lost: Python ignores one that comes in the callback of a weak reference."""
+    import signal
+    import threading
+
+    usual: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    ours = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
+    if not ours or threading.current_thread() is not threading.main_thread():
+        yield lambda: None
+        return
+    come: list[type[KeyboardInterrupt]] = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        come.append(_Terminated if number == signal.SIGTERM else KeyboardInterrupt)
+        raise come[0]
+
+    def raise_lost() -> None:
+        if come:
+            raise come[0]
+
+    for number in ours:
+        signal.signal(number, interrupt)
+    try:
+        yield raise_lost
+    finally:
+        for number in ours:
+            signal.signal(number, usual[number])

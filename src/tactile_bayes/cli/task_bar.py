@@ -1,0 +1,45 @@
+"""The bar that shows how many of many tasks are done, and how long the rest will take."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+__all__ = ["counted", "task_bar"]
+
+
+@contextmanager
+def task_bar(total: int, noun: str, quiet: bool) -> Iterator[Callable[[int], object]]:
+    """A bar that is told how many are done; none where nobody sees it move."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
+    from rich.text import Text
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield lambda done: None
+        return
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            if not task.speed:
+                return Text("")
+            return Text(f"{task.speed:,.0f} {noun}s/s" if task.speed > 2.0 else f"{1.0 / task.speed:.2g} s a {noun}")
+
+    words = (TextColumn("{task.description}"), Rate(), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
+    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
+        task = bar.add_task(f"{counted(total, noun)} to be made", total=None, left="")
+
+        def show(done: int) -> None:
+            description = f"{done:,} of {counted(total, noun)}"
+            bar.update(task, total=total, completed=done, description=description, left="left")
+
+        yield show
+
+
+def counted(count: int, noun: str) -> str:
+    """Like "1 record" and "2,000 records"."""
+    return f"{count:,} {noun}" + "s" * (count != 1)

@@ -1,0 +1,215 @@
+"""Ranks of the truth in a calibration, in a panel for each quantity: whether they are uniform."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.axes import PALETTE, AxesArray, Floats, number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["calibration_ranks", "refuse_another"]
+
+_MOST_COLUMNS = 4
+_BAND = 0.95
+_ROOM = 1.55
+"""Limits of the panels over the largest value drawn: words stand above and below it."""
+
+_LETTERS = 82
+"""In a line of the heading."""
+
+_COLOURS = {"": PALETTE["median"], "leaves the band": "#E69F00", "not uniform": "#D55E00"}
+"""Of a line, by the word that stands in its panel."""
+
+
+class _Ranks(NamedTuple):
+    """What is drawn of one quantity, over the ranks 0, 1, …, and in which way it is marked."""
+
+    name: str
+    replicates: int
+    p_value: float
+    excess: Floats
+    low: Floats
+    high: Floats
+    word: str
+
+
+def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray:
+    """Ranks of the truth among draws of the posterior: those of right posteriors are uniform.
+
+    A panel for each quantity has the share of ranks up to each rank, less the share that is expected of uniform ranks.
+    If these are uniform the whole line stays in the shaded band with 95 %: one line in twenty "leaves the band", and
+    its panel says so. "not uniform" is stronger: the p value is at most ``attrs["level"]``, as the verdict
+    has it. Over the panels of a new figure stands what they show together.
+
+    A line above 0 tells that posteriors lie too high, one below 0 that they lie too low; one that is above 0 on the
+    left and below 0 on the right that they are too narrow, the other way round too wide.
+
+    Parameters
+    ----------
+    calibration : xr.Dataset
+        From `tactile_bayes.calibrate`.
+    axes : array_like of Axes, shape (quantities,), optional
+        One for each quantity, in their order.
+
+    Returns
+    -------
+    ndarray of Axes, shape (quantities,)
+
+    Raises
+    ------
+    ParameterError
+        If this is no calibration, none of its replicates has a posterior, or the axes have another shape.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> found = xr.Dataset(
+    ...     {
+    ...         "ranks": (("replicate", "quantity"), rng.integers(0, 100, (50, 2))),
+    ...         "rank_p_value": ("quantity", [0.4, 0.8]),
+    ...     },
+    ...     coords={"quantity": ["a", "q"]},
+    ...     attrs={"level": 0.001},
+    ... )
+    >>> [ax.get_title() for ax in calibration_ranks(found)]
+    ['a', 'q']
+    """
+    refuse_another(calibration, {"ranks", "rank_p_value", "quantity"}, "level")
+    if not np.any(calibration["ranks"].values >= 0):
+        raise ParameterError(
+            f"none of {calibration.sizes['replicate']} replicates has a posterior: see message, that says why"
+        )
+    drawn = _ranks(calibration)
+    panels = _new_panels(calibration, drawn) if axes is None else _panels_given(axes, len(drawn))
+    limit = _ROOM * max(float(np.max(np.abs([each.excess, each.low, each.high]))) for each in drawn)
+    usual = max(each.replicates for each in drawn)
+    for ax, each in zip(panels, drawn, strict=True):
+        _draw_ranks(ax, each, usual)
+        ax.set_xlim(0.0, 1.0)
+        ax.set_xticks([0.0, 0.5, 1.0], ["0", "0.5", "1"])
+        ax.set_ylim(-limit, limit)
+        ax.locator_params(axis="y", nbins=5)
+        ax.tick_params(labelsize="small")
+    return panels
+
+
+def refuse_another(calibration: xr.Dataset, names: set[str], attribute: str) -> None:
+    is_calibration = (
+        isinstance(calibration, xr.Dataset) and names <= set(calibration.variables) and attribute in calibration.attrs
+    )
+    if not is_calibration:
+        raise ParameterError("this is no calibration: give what calibrate returned")
+
+
+def _panels_given(axes: Any, wanted: int) -> AxesArray:
+    panels = np.atleast_1d(np.asarray(axes, dtype=object))
+    if panels.shape != (wanted,):
+        raise ParameterError(f"axes have shape {panels.shape}, and ({wanted},) is wanted: one for each quantity")
+    for ax in panels:
+        ax.set_xlabel(_across(), fontsize="small")
+        ax.set_ylabel("share up to there\n− expected share", fontsize="small")
+    return panels
+
+
+def _new_panels(calibration: xr.Dataset, drawn: list[_Ranks]) -> AxesArray:
+    """In rows that are about as long as one another, below what they show together."""
+    from matplotlib import pyplot as plt
+
+    wanted = len(drawn)
+    rows = -(-wanted // _MOST_COLUMNS)
+    columns = -(-wanted // rows)
+    size = (7.0, max(3.0, 1.3 + 1.35 * rows))
+    style: dict[str, Any] = {"layout": "constrained", "sharex": True, "sharey": True, "squeeze": False}
+    figure, grid = plt.subplots(rows, columns, figsize=size, **style)
+    panels = grid.ravel()[:wanted]
+    for ax in grid.ravel()[wanted:]:
+        ax.remove()
+    for ax in panels[-columns:]:
+        ax.tick_params(labelbottom=True)
+    figure.supxlabel(f"{_across()}: share of the draws that lie below it", fontsize="medium")
+    figure.supylabel(
+        (" " if rows > 2 else "\n").join(["share of ranks up to there", "− expected share"]), fontsize="medium"
+    )
+    figure.suptitle(_heading(calibration, drawn), x=0.01, ha="left", fontsize="medium")
+    return panels
+
+
+def _across() -> str:
+    from tactile_bayes.calibration.replicate import DRAWS
+
+    return f"rank of the truth / {DRAWS}"
+
+
+def _ranks(calibration: xr.Dataset) -> list[_Ranks]:
+    from tactile_bayes.calibration.replicate import DRAWS
+
+    p_values = calibration["rank_p_value"].values.astype(float)
+    level = float(calibration.attrs["level"])
+    by_quantity = calibration["ranks"].transpose("quantity", "replicate").values
+    return [
+        _ranks_of(str(name), ranks[ranks >= 0], DRAWS, float(p_value), level)
+        for name, ranks, p_value in zip(calibration["quantity"].values, by_quantity, p_values, strict=True)
+    ]
+
+
+def _ranks_of(name: str, ranks: Any, top: int, p_value: float, level: float) -> _Ranks:
+    nothing = np.zeros(top + 1)
+    if not ranks.size:
+        return _Ranks(name, 0, p_value, nothing, nothing, nothing, "")
+    shares = np.cumsum(np.bincount(ranks, minlength=top + 1))[:top] / ranks.size
+    low, high = simultaneous_band(ranks.size, top, _BAND)
+    leaves = bool(np.any((shares < low) | (shares > high)))
+    # All ranks are up to the last, and are expected to be.
+    excess, low, high = (np.append(each - expected_shares(top), 0.0) for each in (shares, low, high))
+    word = "not uniform" if p_value <= level else "leaves the band" if leaves else ""
+    return _Ranks(name, int(ranks.size), p_value, excess, low, high, word)
+
+
+def _draw_ranks(ax: Axes, drawn: _Ranks, usual: int) -> None:
+    colour = _COLOURS[drawn.word]
+    is_marked = bool(drawn.word)
+    ax.set_title(drawn.name, fontsize="small", fontweight="bold" if is_marked else "normal", pad=3.0)
+    words: dict[str, Any] = {"fontsize": "small", "transform": ax.transAxes, "ha": "center"}
+    if not drawn.replicates:
+        ax.text(0.5, 0.5, "no ranks", va="center", **words)
+        return
+    at = np.linspace(0.0, 1.0, drawn.excess.size)
+    style: dict[str, Any] = {"step": "post", "color": PALETTE["band"], "alpha": 0.6, "linewidth": 0.0}
+    ax.fill_between(at, drawn.low, drawn.high, **style)
+    ax.axhline(0.0, color="0.45", linewidth=0.7, zorder=1.5)
+    ax.step(at, drawn.excess, where="post", color=colour, linewidth=1.8 if is_marked else 1.1, zorder=2.5)
+    if drawn.word == "not uniform":
+        ax.spines[:].set(color=colour, linewidth=1.6)
+    if is_marked:
+        ax.text(0.5, 0.97, drawn.word, va="top", fontweight="bold", **words)
+    of = f" (of {drawn.replicates})" if drawn.replicates != usual else ""
+    ax.text(0.5, 0.03, _p_value_in_words(drawn.p_value) + of, va="bottom", **words)
+
+
+def _p_value_in_words(p_value: float) -> str:
+    if np.isnan(p_value):
+        return "too few to test"
+    return "p < 0.001" if p_value < 1e-3 else f"p = {number(p_value, digits=2)}"
+
+
+def _heading(calibration: xr.Dataset, drawn: list[_Ranks]) -> str:
+    with_ranks, count = int((calibration["ranks"] >= 0).any("quantity").sum()), calibration.sizes["replicate"]
+    replicates = f"{count} replicates" if with_ranks == count else f"{with_ranks} of {count} replicates"
+    wrong = [each.name for each in drawn if each.word == "not uniform"]
+    tested = sum(1 for each in drawn if np.isfinite(each.p_value))
+    if wrong:
+        words = f"Not uniform, over {replicates}: ranks of {', '.join(wrong)}"
+    elif tested:
+        words = f"Uniform, as far as {replicates} tell: ranks of {tested} quantities"
+    else:
+        words = f"Too few to judge whether ranks are uniform: {replicates}"
+    lines = [words, f"Where ranks are uniform, 1 line in {round(1.0 / (1.0 - _BAND))} leaves the shaded band."]
+    return "\n".join(textwrap.fill(line, _LETTERS, break_on_hyphens=False) for line in lines)
