@@ -26,6 +26,11 @@ BRIEF = 1e-6
 _HALVINGS = 8
 """How often a stretch is halved at most; where something is not smooth at its end that is never enough."""
 
+_MOST_MORE = 64
+"""Segments of a path, beyond those that are there, from which on none is halved: what is rough everywhere, like a
+contour whose curvature is interpolated, is not smooth in smaller pieces either.
+"""
+
 
 class Segments(NamedTuple):
     """Smooth stretches of all the paths; lanes may have one or several, in the order of the path."""
@@ -84,11 +89,14 @@ def resolved(
         return chebyshev.coefficients(sample(some, np.broadcast_to(chebyshev.nodes(order), (some.lane.size, order))))
 
     series = fit(segments)
+    lanes = int(segments.lane.max(initial=-1)) + 1
+    most = np.bincount(segments.lane, minlength=lanes) + _MOST_MORE
     for _ in range(_HALVINGS):
         size = np.abs((series if series.ndim == 2 else series[..., 0])[1:])
         begin, end = whole(segments)
         long = segments.begin - segments.end > BRIEF * (begin - end)
-        rough = long & (size[-2:].max(axis=0) > tolerance * size.max(axis=0))
+        few = (np.bincount(segments.lane, minlength=lanes) < most)[segments.lane]
+        rough = long & few & (size[-2:].max(axis=0) > tolerance * size.max(axis=0))
         if not np.any(rough):
             break
         segments, halves = segments.halved(rough)

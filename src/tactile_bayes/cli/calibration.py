@@ -59,8 +59,8 @@ def calibrate(
         list[str] | None,
         typer.Option(
             help="What the world has otherwise than inference assumes: friction=0.3, rigidity_scale=1.05, "
-            "drive_angle_offset=0.02, base_shift=0.01,0, bias=0.02,0.05,0.05, drift=0.04,0.1,0.1, flat_spot=ANGLE,FACTOR; give it "
-            "again for another."
+            "drive_angle_offset=0.02, base_shift=0.01,0, bias=0.02,0.05,0.05, drift=0.04,0.1,0.1, "
+            "flat_spot=ANGLE,FACTOR; give it again for another."
         ),
     ] = None,
     probability: Annotated[float, typer.Option(help="Of the bands and regions that are judged.")] = 0.9,
