@@ -455,3 +455,28 @@ def test_the_radius_of_the_rod_moves_points_and_their_spread():
         np.testing.assert_allclose(surface.normal_sd, axis.normal_sd, rtol=1e-6, atol=1e-12)
         np.testing.assert_allclose(surface.slope_angle_sd, axis.slope_angle_sd, rtol=1e-9)
         assert not np.allclose(surface.tangent_sd.dropna("sample"), axis.tangent_sd.dropna("sample"), rtol=1e-3)
+
+
+@pytest.mark.parametrize(("frame", "drive_angle_noise"), [("fixed", 0.0), ("fixed", 0.01), ("turning", 0.01)])
+def test_the_force_along_the_rod_agrees_with_the_moment(frame, drive_angle_noise):
+    """Standard normal: mean of 60 within 4.5 standard errors, and spread within 4, of which χ² has 2e-4 each."""
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, frame=frame, drive_angle_noise=drive_angle_noise)
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(4.0)).record
+    scores = [
+        reconstruct(load_cell.measure(record, seed=k), method="constrained", load_cell=load_cell).attrs["axial_score"]
+        for k in range(60)
+    ]
+    assert abs(np.mean(scores)) < 4.5 / np.sqrt(60.0)
+    assert abs(np.std(scores) - 1.0) < 4.0 / np.sqrt(120.0)
+
+
+def test_friction_makes_it_disagree_unless_it_is_known():
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(4.0), friction=0.1).record
+    measured = load_cell.measure(record, seed=1)
+    unknown, known = (
+        reconstruct(measured, method="constrained", load_cell=load_cell, friction=mu).attrs["axial_score"]
+        for mu in (0.0, 0.1)
+    )
+    assert unknown < -20.0
+    assert abs(known) < 4.0

@@ -104,6 +104,9 @@ def test_loads_that_contradict_one_another_unless_noise_does_it():
     found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0}))
     assert found[0].startswith("The loads of single samples contradict one another, whatever the contour (noise expl")
     assert "below 1e-99" in found[0]
+    assert "friction makes it" not in found[0]
+    dragged = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
+    assert "too small by 20 standard errors, as friction makes it" in dragged[0]
 
 
 def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():

@@ -33,6 +33,9 @@ _OFF_ZERO = 5.0
 _CONTRADICTION = 1e-4
 """Probability of the misfit of single samples below which it is told."""
 
+_DRAGGING = 6.0
+"""Standard errors by which the force along the rod must be too small to speak of friction."""
+
 _FEWEST_PRIOR_DRAWS = 500
 
 _BEYOND = 0.5
@@ -186,8 +189,18 @@ def _contradictions(record: xr.Dataset, contacts: xr.Dataset | None, noisier: fl
     return [
         "The loads of single samples contradict one another, whatever the contour (noise explains it with probability "
         f"{words}): check length and flexural rigidity of the rod, the friction, the zero of the drive angle, and "
-        "unit, sign and axes of each load."
+        f"unit, sign and axes of each load.{_dragging(float(contacts.attrs.get('axial_score', math.nan)))}"
     ]
+
+
+def _dragging(axial_score: float) -> str:
+    """What friction would do to the force along the rod."""
+    if not axial_score < -_DRAGGING:
+        return ""
+    return (
+        f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
+        "friction makes it: infer it (--nuisance friction)."
+    )
 
 
 def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
