@@ -14,6 +14,7 @@ from tactile_bayes.inference.families import Family, Prior
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
 from tactile_bayes.inference.nuisances import Nuisances
+from tactile_bayes.inference.prior_density import log_density_of
 from tactile_bayes.load_cell import rough_noise
 from tactile_bayes.record import CHANNELS
 
@@ -55,7 +56,7 @@ class ContourModel:
         columns: dict[int, list[int]] = {}
         for i, name in enumerate(self.names):
             columns.setdefault(id(priors[name]), []).append(i)
-        self._columns = [(priors[self.names[which[0]]], which) for which in columns.values()]
+        self._columns = [(log_density_of(priors[self.names[which[0]]]), which) for which in columns.values()]
         rubs = bool(nuisances.friction) or "friction" in nuisances.names
         self.likelihood = RecordLikelihood(
             measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
@@ -99,8 +100,8 @@ class ContourModel:
 
     def log_prior(self, points: Floats) -> Floats:
         values = np.zeros(len(points))
-        for prior, columns in self._columns:
-            values += prior.logpdf(points[:, columns]).sum(axis=1)
+        for log_density, columns in self._columns:
+            values += log_density(points[:, columns]).sum(axis=1)
         values[~((points > self.low) & (points < self.high)).all(axis=1)] = -np.inf
         return values
 

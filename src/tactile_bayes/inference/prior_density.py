@@ -1,0 +1,64 @@
+"""Densities of priors, without what `scipy.stats` asks of its arguments at every call."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from tactile_bayes.inference.families import Prior
+
+__all__ = ["log_density_of"]
+
+Floats = NDArray[np.float64]
+
+_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
+
+
+def log_density_of(prior: Prior) -> Callable[[Floats], Floats]:
+    """Logarithm of the density of a frozen distribution, as its `logpdf`; of the common ones ten times faster.
+
+    A call of `logpdf` takes longer than to sum up a whole record, of a few points at a time.
+    """
+    law = getattr(prior, "dist", None)
+    closed = _CLOSED.get(type(law))
+    if law is None or closed is None:
+        return prior.logpdf
+    names = [*(law.shapes.split(", ") if law.shapes else []), "loc", "scale"]
+    given = dict(zip(names, prior.args, strict=False)) | prior.kwds  # type: ignore[attr-defined]
+    values = {"loc": 0.0, "scale": 1.0} | given
+    if set(values) != set(names) or any(np.ndim(value) for value in values.values()):
+        return prior.logpdf
+    return partial(closed, **{name: float(value) for name, value in values.items()})
+
+
+def _norm(x: Floats, *, loc: float, scale: float) -> Floats:
+    return np.asarray(-0.5 * ((x - loc) / scale) ** 2 - (_ROOT_2PI + math.log(scale)))
+
+
+def _halfnorm(x: Floats, *, loc: float, scale: float) -> Floats:
+    return np.where(x >= loc, _norm(x, loc=loc, scale=scale) + math.log(2.0), -np.inf)
+
+
+def _lognorm(x: Floats, *, s: float, loc: float, scale: float) -> Floats:
+    inside = x > loc
+    logarithm = np.log(np.where(inside, x - loc, 1.0)) - math.log(scale)
+    values = -0.5 * (logarithm / s) ** 2 - logarithm - (_ROOT_2PI + math.log(s) + math.log(scale))
+    return np.where(inside, values, -np.inf)
+
+
+def _uniform(x: Floats, *, loc: float, scale: float) -> Floats:
+    return np.where((x >= loc) & (x <= loc + scale), -math.log(scale), -np.inf)
+
+
+_CLOSED: dict[type, Callable[..., Any]] = {
+    type(stats.norm): _norm,
+    type(stats.halfnorm): _halfnorm,
+    type(stats.lognorm): _lognorm,
+    type(stats.uniform): _uniform,
+}
