@@ -428,3 +428,15 @@ def test_flat_ellipses_mix_although_only_a_ratio_is_told(a, b, q):
     )
     assert result.attrs["converged"], result.attrs["message"]
     assert result["sample_stats"].attrs["evaluations"] < 60_000
+
+
+def test_a_prior_that_ends_before_what_the_record_wants_is_named():
+    """Far beyond it that is a mistake, and near its end the posterior lies there."""
+    record, deviation = measured(), 1.5e-4  # by Fisher information
+    narrow = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.15)}
+    with pytest.raises(InferenceError, match=r"the record wants q = 0\.\d+ \(prior: 0\.\d+ to 0\.\d+\): give a wider"):
+        infer_contour(record, priors=narrow, nuisances=[], seed=1, settings=BRIEF)
+    edged = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.2 - deviation)}
+    found = infer_contour(record, priors=edged, nuisances=[], seed=1, settings=MODEST)
+    assert float(found["posterior"].q.max()) < TRUTH["q"] - deviation
+    assert float(found["posterior"].q.mean()) == pytest.approx(TRUTH["q"] - deviation, abs=3.0 * deviation)

@@ -95,3 +95,16 @@ def test_a_wall_is_respected():
     cloud = gather(walled, np.array([0.5, 2.0]), np.eye(2), np.random.default_rng(1))
     points = cloud.draw(np.random.default_rng(2), 1000)
     assert np.mean(walled(points) > cloud.floor) > 0.15
+
+
+def test_a_search_that_ends_beyond_what_is_possible_goes_on_inside():
+    """Of two parameters that are told apart by the data the one at its end stays there, the other moves freely."""
+    data = DESIGN @ (TRUE / SPREAD)
+    free = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
+    low, high = free.point - np.array([10.0, 0.5]) * SPREAD, free.point + np.array([10.0, -0.1]) * SPREAD
+    found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD, low, high)
+    np.testing.assert_allclose(found.beyond, free.point)
+    assert found.point[1] == pytest.approx(high[1], abs=1e-3 * SPREAD[1])
+    assert np.all((found.point > low) & (found.point < high))
+    assert found.excess == pytest.approx(found.cost - free.cost)
+    assert found.excess > 0.0

@@ -11,7 +11,7 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_groups import groups_of, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
@@ -183,7 +183,12 @@ def sampled(
     """
     model, seeds = problem.model, spawn(seed, 4)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
-        walk = walk or walk_of(model, seeds[0], settings)
+        if walk is None:
+            walk = walk_of(model, seeds[0], settings)
+            if walk.beyond:
+                raise InferenceError(
+                    f"the record wants {walk.beyond}: give a wider prior, or are units, rod, base and family right?"
+                )
         draws = sample(
             model.log_probability,
             walk.start,

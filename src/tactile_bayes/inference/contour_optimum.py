@@ -20,6 +20,9 @@ _CANDIDATES = 8
 """Draws from the prior from which the optimum is sought, the likeliest first, until one explains the record. A sample
 at an event that is loaded or not holds the search up where it began too far away."""
 
+_FAR_BETTER = 100.0
+"""Log-likelihood, roughly, by which a record is explained better beyond the end of a prior for that to be a mistake."""
+
 
 class ContourOptimum(NamedTuple):
     """Parameters that explain a record, by robust least squares."""
@@ -28,6 +31,8 @@ class ContourOptimum(NamedTuple):
     """All of the model's."""
     covariance: Floats
     """Roughly theirs in the posterior, of the logarithms of those of the noise."""
+    beyond: str = ""
+    """What the record wants and the priors do not allow, where that explains it far better; in words."""
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
@@ -55,7 +60,9 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
     by_contacts = contact_fit(model)
     if by_contacts is not None:
         chosen.insert(0, np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))
-    optimum = best_optimum(residuals, np.array(chosen), percentiles.mean(axis=0), spread)
+    ends = np.array([model.priors[name].support() for name in model.located])  # type: ignore[attr-defined]
+    low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
+    optimum = best_optimum(residuals, np.array(chosen), percentiles.mean(axis=0), spread, low, high)
 
     noise = fitted_noise(model, optimum.residuals.reshape(measured.shape))
     possible = candidates[:, size:]
@@ -65,7 +72,13 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
     covariance = np.zeros((len(model.names), len(model.names)))
     covariance[:size, :size] = optimum.covariance * np.outer(narrow, narrow)
     covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
-    return ContourOptimum(np.append(optimum.point, noise), covariance)
+    beyond = ""
+    if optimum.beyond is not None and optimum.excess > _FAR_BETTER:
+        off = np.flatnonzero((optimum.beyond <= low) | (optimum.beyond >= high))
+        beyond = ", ".join(
+            f"{model.located[i]} = {optimum.beyond[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
+        )
+    return ContourOptimum(np.append(optimum.point, noise), covariance, beyond)
 
 
 def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:

@@ -42,6 +42,8 @@ class Walk(NamedTuple):
     start: Floats
     """(ensemble, walker, coordinate)."""
     coordinates: Coordinates
+    beyond: str = ""
+    """What the record wants and the priors do not allow, in words."""
 
 
 def walk_of(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Walk:
@@ -123,4 +125,4 @@ def _scattered(
         cloud.narrow_covariance * np.outer(per_unit, per_unit),
         rng,
     )
-    return Walk(walked.of(start), Logarithms(positive, proposal))
+    return Walk(walked.of(start), Logarithms(positive, proposal), optimum.beyond)

@@ -26,6 +26,9 @@ _WIDER = 2.0
 _DEFICIT = 12.0
 """Log-probability per parameter that a walker may start below the best: three times what _WIDER makes on average."""
 
+_INSIDE = 1e-3
+"""Of the scale of a parameter, from its end, where a search begins that must not leave."""
+
 _ROUNDS = 30
 
 _FITS = 0.55
@@ -40,10 +43,24 @@ class Optimum(NamedTuple):
     """From the Jacobian, as if noise were as stated."""
     residuals: Floats
     cost: float
+    beyond: Floats | None = None
+    """Where the search ended before it was told to stay where things are possible."""
+    excess: float = 0.0
+    """Cost above that there."""
 
 
-def best_optimum(residuals: Residuals, candidates: Floats, middle: Floats, spread: Floats) -> Optimum:
+def best_optimum(
+    residuals: Residuals,
+    candidates: Floats,
+    middle: Floats,
+    spread: Floats,
+    low: Floats | float = -np.inf,
+    high: Floats | float = np.inf,
+) -> Optimum:
     """Robust least squares from one candidate after the other until one fits; the best of them.
+
+    The way to it may lead through what is impossible a priori; if it ends there, the search goes on from the nearest
+    place where that is not so, and stays there.
 
     Parameters
     ----------
@@ -52,6 +69,8 @@ def best_optimum(residuals: Residuals, candidates: Floats, middle: Floats, sprea
     candidates : ndarray, shape (m, d)
     middle, spread : ndarray, shape (d,)
         Where each parameter lies a priori, and on which scale it varies there: it is drawn there like by one residual.
+    low, high : ndarray, shape (d,), or float
+        Between what each parameter can be.
     """
     best: Optimum | None = None
     for candidate in candidates:
@@ -62,10 +81,21 @@ def best_optimum(residuals: Residuals, candidates: Floats, middle: Floats, sprea
             break
     if best is None:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
-    return best
+    if np.all((best.point > low) & (best.point < high)):
+        return best
+    inside = np.clip(best.point, low + _INSIDE * spread, high - _INSIDE * spread)
+    found = _descend(residuals, inside, middle, spread, low, high)
+    return found._replace(beyond=best.point, excess=found.cost - best.cost)
 
 
-def _descend(residuals: Residuals, start: Floats, middle: Floats, spread: Floats) -> Optimum:
+def _descend(
+    residuals: Residuals,
+    start: Floats,
+    middle: Floats,
+    spread: Floats,
+    low: Floats | float = -np.inf,
+    high: Floats | float = np.inf,
+) -> Optimum:
     """In units of the spread, so that the record's units do not matter."""
 
     def one(point: Floats) -> Floats:
@@ -77,7 +107,8 @@ def _descend(residuals: Residuals, start: Floats, middle: Floats, spread: Floats
         values = residuals((point + moves) * spread)
         return np.concatenate([(values[: point.size] - values[point.size :]).T / 2e-4, np.eye(point.size)])
 
-    solution = least_squares(one, start / spread, jacobian, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)
+    bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
+    solution = least_squares(one, start / spread, jacobian, bounds, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)
     _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
     axes = axes / sizes[:, None] * spread
     covariance = axes.T @ axes
