@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ledger import open_ledger
@@ -27,6 +27,8 @@ from tactile_bayes.rod import Rod
 from tactile_bayes.tasks import run_tasks
 
 __all__ = ["Calibrating", "calibrate", "experiment_of"]
+
+Floats = NDArray[np.float64]
 
 _NOTING = 0.05
 """Share of the time that goes into notes of what is finished."""
@@ -208,32 +210,51 @@ def experiment_of(
     world: World | None,
 ) -> Experiment:
     """What `calibrate` is asked for, as it says."""
+    kinds = {"load_cell": LoadCell, "rod": Rod, "settings": SamplerSettings, "world": World, "priors": Mapping}
+    given = {"load_cell": load_cell, "rod": rod, "settings": settings, "world": world, "priors": priors}
+    for name, kind in kinds.items():
+        if given[name] is not None and not isinstance(given[name], kind):
+            wanted = "distributions by name" if kind is Mapping else f"a {kind.__name__}"
+            raise ParameterError(f"{name} is {given[name]!r}: give {wanted}, or None")
     rod_taken = rod or Rod()
     cell = load_cell or LoadCell(force_noise=0.05 * rod_taken.force_unit, moment_noise=0.02 * rod_taken.moment_unit)
     directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
-    if direction not in directions:
+    if not isinstance(direction, str) or direction not in directions:
         raise ParameterError(f"direction is {direction!r}: choose 'both', 'forward' or 'backward'")
-    angles = np.radians(_ANGLES) if drive_angles is None else np.unique(np.asarray(drive_angles, dtype=float))
-    if angles.ndim != 1 or angles.size < 3 or not np.all(np.isfinite(angles)):
-        raise ParameterError("drive_angles are not a list of at least 3 finite numbers [rad]")
-    pivots = np.atleast_2d(np.asarray(base, dtype=float))
+    angles = np.radians(_ANGLES) if drive_angles is None else _floats(drive_angles)
+    if angles.ndim != 1 or np.unique(angles).size < 3 or not np.all(np.isfinite(angles)):
+        raise ParameterError("drive_angles are not a list of at least 3 different finite numbers [rad]")
+    pivots = np.atleast_2d(_floats(base))
     if pivots.ndim != 2 or pivots.shape[1] != 2 or not np.all(np.isfinite(pivots)):
         raise ParameterError(f"base is {base!r}: give (x, y), or a list of such pairs")
     if isinstance(nuisances, str):
         raise ParameterError(f"nuisances is {nuisances!r}: give a list of names, like [{nuisances!r}]")
+    for name, value in {"probability": probability, "friction": friction}.items():
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+            raise ParameterError(f"{name} is {value!r}: give a number")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up")
     return Experiment(
         family=family,
         load_cell=cell,
-        drive_angles=tuple(angles.tolist()),
+        drive_angles=tuple(np.unique(angles).tolist()),
         rod=rod,
         bases=tuple((float(x), float(y)) for x, y in pivots),
         directions=directions[direction],
         priors=dict(priors or {}),
         nuisances=tuple(nuisances),
-        friction=friction,
-        events=events,
+        friction=float(friction),
+        events=bool(events),
         settings=settings or _SETTINGS,
-        probability=probability,
-        seed=seed,
+        probability=float(probability),
+        seed=int(seed),
         world=world or World(),
     )
+
+
+def _floats(values: ArrayLike) -> Floats:
+    """Of what are no numbers an array of shape (0, 0, 0)."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        return np.empty((0, 0, 0))

@@ -18,7 +18,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem, prior_in_words
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.families import Prior, refuse_no_prior
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import FINE_ORDER, bases_of
 from tactile_bayes.inference.noise import noise_of
@@ -56,8 +56,6 @@ class Experiment:
     def __post_init__(self) -> None:
         if not 0.0 < self.probability < 1.0:
             raise ParameterError(f"probability is {self.probability!r}: give a number between 0 and 1, like 0.9")
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int | np.integer) or self.seed < 0:
-            raise ParameterError(f"seed is {self.seed!r}: give a whole number from 0 up")
         if not any(self.load_cell.standard_deviations.values()):
             raise ParameterError(
                 "the load cell has no noise, so that there is nothing to be calibrated: give "
@@ -65,6 +63,8 @@ class Experiment:
             )
         own = {*family_named(self.family).parameters, *self.model.nuisances.names, *self.model.noise.names}
         for whose, priors, names in (("", self.priors, own), ("of the world ", self.world.priors, self.model.names)):
+            for name, prior in priors.items():
+                refuse_no_prior(name, prior)
             strangers = sorted(set(priors) - set(names))
             if strangers:
                 raise ParameterError(
@@ -149,7 +149,7 @@ class Experiment:
             "nuisances": json.dumps(self.nuisances),
             "friction": repr(self.friction),
             "events": repr(self.events),
-            "settings": json.dumps(asdict(self.settings)),
+            "settings": json.dumps(asdict(self.settings), default=_plain),
             "probability": repr(self.probability),
             "seed": repr(self.seed),
         }
@@ -164,3 +164,8 @@ class Experiment:
 
 def _said(angles: tuple[float, ...]) -> str:
     return json.dumps([float(angle) for angle in angles])
+
+
+def _plain(value: Any) -> Any:
+    """A number of NumPy as one of Python."""
+    return value.item()

@@ -83,6 +83,8 @@ def _read(file: Path, words: Mapping[str, str]) -> dict[int, Outcome]:
             )
             for row in table["replicates"]
         }
+    except CalibrationError:
+        raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CalibrationError(f"{file} holds no replicates that can be read ({error}): {remedy}") from error
     differ = [name for name in {**there, **words} if there.get(name) != words.get(name)]

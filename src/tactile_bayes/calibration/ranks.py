@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import bdtr, bdtrik
+from scipy.special import bdtr
 
 __all__ = ["expected_shares", "simultaneous_band", "uniformity_p_value"]
 
@@ -48,19 +48,24 @@ def expected_shares(top: int) -> Floats:
 
 def simultaneous_band(count: int, top: int, probability: float) -> tuple[Floats, Floats]:
     """Between what the shares of `expected_shares` lie with a probability, all of them at once; shapes (top,)."""
-    level = float(np.quantile(_null(count, top), 1.0 - probability, method="lower"))
-    shares = expected_shares(top)
-    low = np.ceil(bdtrik(0.5 * level, count, shares))
-    high = np.ceil(bdtrik(1.0 - 0.5 * level, count, shares))
-    return low / count, high / count
+    null = _null(count, top)
+    # The largest level that sets of uniform ranks fall short of no more often than they may.
+    level = float(null[min(int((1.0 - probability) * null.size), null.size - 1)])
+    counts = np.arange(count + 1)
+    inside = _tails(counts[:, None], count, expected_shares(top)) >= level
+    return np.argmax(inside, axis=0) / count, (count - np.argmax(inside[::-1], axis=0)) / count
+
+
+def _tails(below: NDArray[np.intp], count: int, shares: Floats) -> Floats:
+    """Twice the smaller tail of the binomial distribution of numbers of ranks up to somewhere."""
+    at_most = bdtr(below, count, shares)
+    at_least = 1.0 - np.where(below > 0, bdtr(np.maximum(below - 1, 0), count, shares), 0.0)
+    return np.asarray(2.0 * np.minimum(at_most, at_least))
 
 
 def _least_probability(below: NDArray[np.intp], count: int) -> Floats:
     """Of rows of numbers of ranks up to 0, 1, …, top − 1, shape (rows, top): twice the least tail, shape (rows,)."""
-    shares = expected_shares(below.shape[1])
-    at_most = bdtr(below, count, shares)
-    at_least = 1.0 - np.where(below > 0, bdtr(np.maximum(below - 1, 0), count, shares), 0.0)
-    return np.asarray(2.0 * np.minimum(at_most, at_least).min(axis=1))
+    return np.asarray(_tails(below, count, expected_shares(below.shape[1])).min(axis=1))
 
 
 @lru_cache(maxsize=8)

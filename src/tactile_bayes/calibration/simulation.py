@@ -51,10 +51,14 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
     """
     model, world = experiment.model, experiment.world
     likelihood = model.likelihood
+    told = experiment.load_cell
+    cell = told if world.load_cell is None else world.load_cell
+    misread = cell.drive_angle_offset - told.drive_angle_offset
     for _ in range(_TRIALS):
         point, _ = model.draw_prior(rng, 1)
         contour = world.contour(model.contours(point))
         rig = world.rig(model.rig(point), experiment.pivots)
+        rig = rig._replace(drive_angle_offset=rig.drive_angle_offset + misread)
         loads, reached = likelihood.predict(contour, rig)
         if reached[0]:
             break
@@ -66,13 +70,11 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
     sensed = model.nuisances.sensed(loads, values, likelihood.load_cell)[0]
     rod = likelihood.rod
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
-    told = experiment.load_cell
-    cell = told if world.load_cell is None else world.load_cell
     readings = cell.dimensionless(rod).simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
     course = model.nuisances.way[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course
     template = experiment.template
-    # The template has the angles that a perfect encoder with the offset that is told would read.
+    # The template has the angles that are read but for noise and steps; what is misread is in those of the rod.
     angles = corrupted_angles(cell, template.drive_angle.values - cell.drive_angle_offset, rng)
     columns = {name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)}
     measured = template.assign(columns).assign(drive_angle=("sample", angles, template.drive_angle.attrs))

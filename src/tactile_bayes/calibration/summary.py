@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy import stats
+from scipy.special import rel_entr
 
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ranks import uniformity_p_value
@@ -111,21 +112,38 @@ def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
         of_claim = data.sel(claim=name)
         if of_claim.coverage_replicates < _FEWEST:
             continue
-        share, error = float(of_claim.coverage), float(of_claim.coverage_error)
-        beyond = max(abs(share - probability) - _MARGIN, 0.0)
-        p_value = 0.0
-        if error:
-            p_value = 2.0 * float(stats.t.sf(beyond / error, int(of_claim.coverage_replicates) - 1))
-        if beyond and p_value <= level:
-            faults.append(_Fault(float(p_value), f"{CLAIMS[str(name)]}: {share:.0%} hold, not {probability:.0%}"))
+        held = data[str(name)].values
+        p_value = _coverage_p_value(held[np.isfinite(held)], probability)
+        if p_value <= level:
+            share = float(of_claim.coverage)
+            faults.append(_Fault(p_value, f"{CLAIMS[str(name)]}: {share:.0%} hold, not {probability:.0%}"))
     return sorted(faults)
+
+
+def _coverage_p_value(held: Floats, probability: float) -> float:
+    """At most the probability that shares, one for each replicate, have a mean so far from what they are to have.
+
+    Exact where everything holds or not; else by the bound for any numbers between 0 and 1 (Hoeffding 1963, doi
+    10.1080/01621459.1963.10500830, theorem 1), as places of one replicate are held together.
+    """
+    share = float(held.mean())
+    limit = float(np.clip(share, probability - _MARGIN, min(probability + _MARGIN, 1.0)))
+    if share == limit or not 0.0 < limit < 1.0:
+        return 1.0
+    if np.isin(held, (0.0, 1.0)).all():
+        count = int(held.sum())
+        law = stats.binom(held.size, limit)
+        one_sided = float(law.sf(count - 1) if share > limit else law.cdf(count))
+    else:
+        one_sided = float(np.exp(-held.size * (rel_entr(share, limit) + rel_entr(1.0 - share, 1.0 - limit))))
+    return min(1.0, 2.0 * one_sided)
 
 
 def _off(ranks: NDArray[np.intp], name: str) -> str:
     """In which way ranks are not uniform."""
     known = ranks[ranks >= 0] / DRAWS
     shift = (known.mean() - 0.5) * np.sqrt(12.0 * known.size)
-    spread = (np.mean((known - 0.5) ** 2) - 1.0 / 12.0) * np.sqrt(180.0 * known.size)
+    spread = (known.var() - 1.0 / 12.0) * np.sqrt(180.0 * known.size)
     if name == LOG_LIKELIHOOD:
         return "the truth explains the records " + ("better" if shift > 0.0 else "worse") + " than the draws do"
     if abs(shift) > abs(spread):

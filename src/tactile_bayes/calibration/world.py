@@ -10,7 +10,8 @@ import numpy as np
 
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.load_cell import LoadCell
 
@@ -75,22 +76,24 @@ class World:
     priors: Mapping[str, Prior] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        sizes = {"base_shift": 2, "further_base_shift": 2, "bias": 3, "drift": 3, "flat_spot": 2}
-        for name, value in self._given().items():
-            if name in ("load_cell", "family", "priors"):
+        sizes = {"friction": 0, "rigidity_scale": 0, "drive_angle_offset": 0, "bias": 3, "drift": 3}
+        sizes |= {"base_shift": 2, "further_base_shift": 2, "flat_spot": 2}
+        for name, size in sizes.items():
+            if name == "flat_spot" and self.flat_spot is None:
                 continue
-            wanted = () if name not in sizes else (sizes[name],)
-            try:
-                numbers = np.asarray(value, dtype=float)
-            except (TypeError, ValueError):
-                numbers = np.empty(0)
-            if numbers.shape != wanted or not np.all(np.isfinite(numbers)):
-                kind = f"{sizes[name]} finite numbers" if name in sizes else "a finite number"
-                raise ParameterError(f"{name} of the world is {value!r}: give {kind}")
+            object.__setattr__(self, name, _numbers(name, getattr(self, name), size))
         if not self.friction >= 0.0:
             raise ParameterError(f"friction of the world is {self.friction!r}: give a coefficient from 0 up")
         if not self.rigidity_scale > 0.0 or (self.flat_spot is not None and not self.flat_spot[1] > 0.0):
             raise ParameterError("rigidity_scale and the factor of a flat spot are positive numbers")
+        if self.load_cell is not None and not isinstance(self.load_cell, LoadCell):
+            raise ParameterError(f"load_cell of the world is {self.load_cell!r}: give a LoadCell, or None")
+        if self.family is not None:
+            family_named(self.family)
+        if not isinstance(self.priors, Mapping):
+            raise ParameterError(f"priors of the world are {self.priors!r}: give distributions by name")
+        for name, prior in self.priors.items():
+            refuse_no_prior(name, prior)
 
     def __repr__(self) -> str:
         return f"World({', '.join(f'{name}={value!r}' for name, value in self._given().items())})"
@@ -126,3 +129,16 @@ class World:
             friction=drawn.friction + self.friction,
             base_shifts=shifts,
         )
+
+
+def _numbers(name: str, value: Any, size: int) -> Any:
+    """A number, or as many as there are to be."""
+    try:
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        numbers = np.full(1, np.nan)
+    if numbers.shape != ((size,) if size else ()) or not np.all(np.isfinite(numbers)):
+        raise ParameterError(
+            f"{name} of the world is {value!r}: give {f'{size} finite numbers' if size else 'a finite number'}"
+        )
+    return tuple(numbers.tolist()) if size else float(numbers)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.families import support_of
 from tactile_bayes.inference.start import best_optimum
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
@@ -60,7 +61,7 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
     by_contacts = contact_fit(model)
     if by_contacts is not None:
         chosen.insert(0, np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))
-    ends = np.array([model.priors[name].support() for name in model.located])  # type: ignore[attr-defined]
+    ends = np.array([support_of(model.priors[name]) for name in model.located])
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
     optimum = best_optimum(residuals, np.array(chosen), percentiles.mean(axis=0), spread, low, high)
 

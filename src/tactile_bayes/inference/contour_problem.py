@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import rv_continuous, rv_histogram
+from scipy.stats import rv_histogram
 
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.families import Family, Prior
+from tactile_bayes.inference.families import Family, Prior, refuse_no_prior
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
@@ -79,10 +79,7 @@ def contour_problem(
                 f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}, and of what is "
                 "not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
             )
-        if not isinstance(prior, Prior) or isinstance(prior, rv_continuous):
-            raise ParameterError(
-                f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
-            )
+        refuse_no_prior(name, prior)
     data_sha256 = record_hash(measured)
     loaded = loaded_samples(measured, noise.stated_cell)
     if not loaded.any():

@@ -13,8 +13,9 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw
+from tactile_bayes.errors import ParameterError
 
-__all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior"]
+__all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior", "refuse_no_prior", "support_of"]
 
 _MOST_STEPS = 100
 
@@ -29,6 +30,20 @@ class Prior(Protocol):
     def logpdf(self, x: Any) -> Any: ...
     def rvs(self, size: int, random_state: np.random.Generator) -> Any: ...
     def std(self) -> Any: ...
+
+
+def refuse_no_prior(name: str, prior: Any) -> None:
+    """Refuse what is no distribution, or one whose parameters are not fixed."""
+    if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
+        raise ParameterError(
+            f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+        )
+
+
+def support_of(prior: Prior) -> tuple[float, float]:
+    """Between what values it lies."""
+    ends = prior.support() if hasattr(prior, "support") else (-np.inf, np.inf)
+    return float(ends[0]), float(ends[1])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,391 @@
+"""Calibration from end to end: what it refuses, what it keeps, and that it finds what is wrong."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from helpers.tasks import wait_until
+from tactile_bayes.calibration.calibrate import calibrate, experiment_of
+from tactile_bayes.calibration.ledger import LEDGER
+from tactile_bayes.calibration.replicate import Outcome
+from tactile_bayes.calibration.world import World
+from tactile_bayes.errors import CalibrationError, ParameterError
+from tactile_bayes.inference.ensembles import SamplerSettings, moves
+from tactile_bayes.load_cell import LoadCell
+
+module = importlib.import_module("tactile_bayes.calibration.calibrate")
+
+PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
+ANGLES = np.radians(np.arange(-30.0, 211.0, 4.0))
+
+FEW_STEPS = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
+"""Enough for numbers that are the same again, not for right ones."""
+
+
+def quickly(**options):
+    asked = {"replicates": 2, "nuisances": [], "priors": PRIORS, "drive_angles": ANGLES, "seed": 1, "workers": 1}
+    return calibrate(**(asked | options))
+
+
+def made_up(task):
+    """In place of a replicate: numbers that follow from seed and number alone."""
+    experiment, number = task
+    rng = np.random.default_rng([experiment.seed, number])
+    numbers = {"seconds": 0.0, "snap_off": 0.5 * int(rng.integers(3)), "width_in_gap": np.nan}
+    return Outcome({"a": int(rng.integers(100)), "q": int(rng.integers(100))}, numbers, "converged")
+
+
+@pytest.fixture
+def noted(monkeypatch):
+    """Numbers of the replicates that are made, which take no time."""
+    numbers = []
+
+    def note(task):
+        numbers.append(task[1])
+        return made_up(task)
+
+    monkeypatch.setattr(module, "replicate", note)
+    return numbers
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """Two replicates of few steps, in this process, and where they are kept."""
+    folder = tmp_path_factory.mktemp("small") / "on the way"
+    return quickly(settings=FEW_STEPS, out=folder), folder
+
+
+# ---- what comes of it
+
+
+def test_what_is_found(small):
+    found, _ = small
+    assert found.sizes == {"replicate": 2, "quantity": 7, "claim": 6}
+    assert sorted(found.quantity.values) == sorted([*PRIORS, "noise_scale", "log_likelihood", *SNAP_OFFS])
+    assert np.all((found["ranks"] >= 0) & (found["ranks"] <= 99))
+    assert np.all((found.coverage >= 0.0) & (found.coverage <= 1.0))
+    assert np.all(found.width_in_gap > 0.0)
+    assert np.all(found.evaluations > 0)
+    assert found.attrs["verdict"].startswith("Too few replicates to judge: 2 posteriors, and 20 are the least.")
+
+
+SNAP_OFFS = ("snap_off_forward", "snap_off_backward")
+
+
+def test_what_is_kept_is_all_there_is(small, monkeypatch):
+    """A second call makes nothing, and finds the same, to the last digit."""
+    found, folder = small
+    monkeypatch.setattr(module, "replicate", pytest.fail)
+    assert quickly(settings=FEW_STEPS, out=folder).identical(found)
+    assert [path.name for path in folder.iterdir()] == [LEDGER]
+
+
+@pytest.mark.slow
+def test_workers_change_nothing_but_the_seconds(small):
+    found, _ = small
+    other = quickly(settings=FEW_STEPS, workers=2)
+    assert other.drop_vars("seconds").identical(found.drop_vars("seconds"))
+
+
+def test_replicates_do_not_depend_on_how_many_there_are(noted):
+    three, five = quickly(replicates=3), quickly(replicates=5)
+    np.testing.assert_array_equal(three["ranks"], five["ranks"][:3])
+    assert not np.array_equal(three["ranks"], quickly(replicates=3, seed=2)["ranks"])
+
+
+# ---- going on
+
+
+def test_more_replicates_begin_with_those_that_are_there(noted, tmp_path):
+    whole = quickly(replicates=5)
+    noted.clear()
+    quickly(replicates=2, out=tmp_path)
+    assert quickly(replicates=5, out=tmp_path).identical(whole)
+    assert noted == [0, 1, 2, 3, 4]
+    fewer = quickly(replicates=3, out=tmp_path)
+    assert fewer.sizes["replicate"] == 3
+    assert len(noted) == 5
+    assert len(json.loads((tmp_path / LEDGER).read_text())["replicates"]) == 5  # none is lost
+
+
+def test_a_gap_is_filled(noted, tmp_path):
+    whole = quickly(replicates=4, out=tmp_path)
+    table = json.loads((tmp_path / LEDGER).read_text())
+    del table["replicates"][1]
+    (tmp_path / LEDGER).write_text(json.dumps(table))
+    noted.clear()
+    assert quickly(replicates=4, out=tmp_path).identical(whole)
+    assert noted == [1]
+
+
+def test_progress_is_told(noted, tmp_path):
+    told = []
+    quickly(replicates=2, out=tmp_path, progress=told.append)
+    quickly(replicates=4, out=tmp_path, progress=told.append)
+    assert [(state.done, state.wanted, state.made) for state in told] == [(1, 2, 1), (2, 2, 2), (3, 4, 1), (4, 4, 2)]
+    assert all(state.seconds >= 0.0 for state in told)
+
+
+def test_an_interrupt_keeps_what_is_done(noted, tmp_path):
+    def interrupt(state):
+        if state.done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        quickly(replicates=9, out=tmp_path, progress=interrupt)
+    rows = json.loads((tmp_path / LEDGER).read_text())["replicates"]
+    assert [row["number"] for row in rows] == [0, 1, 2]
+    assert [path.name for path in tmp_path.iterdir()] == [LEDGER]
+    quickly(replicates=9, out=tmp_path)
+    assert noted == list(range(9))
+
+
+def test_what_is_done_is_noted_on_the_way(noted, tmp_path, monkeypatch):
+    """A run that is killed without a word has lost little."""
+    monkeypatch.setattr(module, "_NOTING", 1e9)
+    there = []
+    quickly(
+        replicates=3,
+        out=tmp_path,
+        progress=lambda state: there.append(len(json.loads((tmp_path / LEDGER).read_text())["replicates"])),
+    )
+    assert there == [1, 2, 3]
+
+
+ENDLESS = """
+import sys, time
+from test_calibration_calibrate import made_up, module, quickly
+
+def slowly(task):
+    time.sleep(0.002)
+    return made_up(task)
+
+module.replicate, module._NOTING = slowly, 1e9
+quickly(replicates=10**5, out=sys.argv[1])
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wait", [0.0, 0.1, 0.2])
+def test_a_killed_run_goes_on(tmp_path, wait):
+    """Whenever it is killed, what is noted is whole."""
+    run = subprocess.Popen([sys.executable, "-c", ENDLESS, str(tmp_path)], cwd=Path(__file__).parent)
+    wait_until(lambda: (tmp_path / LEDGER).exists() or run.poll() is not None, seconds=60.0)
+    time.sleep(wait)
+    run.kill()
+    run.wait()
+    done = len(json.loads((tmp_path / LEDGER).read_text())["replicates"])
+    told = []
+    found = quickly(replicates=done, out=tmp_path, progress=told.append)
+    assert found.sizes["replicate"] == done > 0
+    assert told == []
+    assert [path.name for path in tmp_path.iterdir()] == [LEDGER]
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        ({"seed": 2}, "seed is 1 there and 2 here"),
+        ({"friction": 0.1}, "friction is 0.0 there and 0.1 here"),
+        ({"world": World(friction=0.1)}, "world_friction is 0.0 there and 0.1 here"),
+        ({"world": World(priors={"a": stats.norm(1.0)})}, r"world_priors is \{\} there and .*norm"),
+        ({"load_cell": LoadCell(force_noise=0.1, moment_noise=0.02)}, "load_cell is .*0.05.* there and .*0.1.* here"),
+        ({"settings": FEW_STEPS}, "settings is .* there and .* here"),
+        ({"drive_angles": ANGLES[:-1]}, "drive_angles is .* there and .* here"),
+        ({"direction": "forward"}, "directions is .* there and .* here"),
+        ({"priors": {}}, "priors is .* there and .* here"),
+        ({"nuisances": ["bias"]}, "nuisances is .* there and .* here"),
+        ({"base": (0.1, 0.0)}, "bases is .* there and .* here"),
+        ({"probability": 0.8}, "probability is 0.9 there and 0.8 here"),
+        ({"events": False}, "events is True there and False here"),
+    ],
+)
+def test_another_calibration_is_left_alone(noted, tmp_path, other, told):
+    quickly(out=tmp_path)
+    before = (tmp_path / LEDGER).read_bytes()
+    with pytest.raises(CalibrationError, match=f"replicates of another experiment: .*{told}.*; give another folder"):
+        quickly(out=tmp_path, **other)
+    assert (tmp_path / LEDGER).read_bytes() == before
+    assert noted == [0, 1]
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        {"seed": np.int64(1)},
+        {"probability": np.float64(0.9)},
+        {"friction": np.float64(0.0)},
+        {"world": World(base_shift=[0.0, 0.0])},
+        {
+            "settings": SamplerSettings(
+                ensembles=np.int64(2), block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000
+            )
+        },
+    ],
+    ids=lambda same: next(iter(same)),
+)
+def test_the_same_in_other_words_is_the_same(noted, tmp_path, same):
+    quickly(out=tmp_path)
+    quickly(out=tmp_path, **same)
+
+
+def test_what_an_experiment_is_follows_from_its_words():
+    """Those of defaults, written out."""
+    asked = {
+        "seed": 1,
+        "family": "parabola",
+        "load_cell": None,
+        "rod": None,
+        "base": (0.0, 0.0),
+        "direction": "both",
+        "drive_angles": None,
+        "priors": None,
+        "nuisances": [],
+        "friction": 0.0,
+        "events": True,
+        "settings": None,
+        "probability": 0.9,
+        "world": None,
+    }
+    words = experiment_of(**asked).words
+    written_out = {
+        "load_cell": LoadCell(force_noise=0.05, moment_noise=0.02),
+        "drive_angles": np.radians(np.arange(-30.0, 211.0, 2.0))[::-1],
+        "base": [(0.0, 0.0)],
+        "priors": {},
+        "nuisances": (),
+        "settings": SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000),
+        "world": World(),
+    }
+    assert experiment_of(**(asked | written_out)).words == words
+    assert all(isinstance(said, str) for said in words.values())
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        *(({"replicates": count}, "replicates is .*: give a whole number from 1 up") for count in (0, True, 1.5, "3")),
+        *(({"seed": seed}, "seed is .*: give a whole number from 0 up") for seed in (-1, True, 1.5, None)),
+        *(({"probability": p}, "probability is .*: give a number between 0 and 1, like 0.9") for p in (0, 1, np.nan)),
+        ({"workers": 0}, "workers is 0: give a positive number"),
+        ({"direction": "up"}, "direction is 'up': choose 'both', 'forward' or 'backward'"),
+        ({"drive_angles": [0.0, 1.0]}, "drive_angles are not a list of at least 3 different finite numbers"),
+        ({"drive_angles": [0.0, 1.0, np.nan]}, "drive_angles are not a list of at least 3 different finite numbers"),
+        ({"base": [1.0, 2.0, 3.0]}, r"base is \[1.0, 2.0, 3.0\]: give \(x, y\), or a list of such pairs"),
+        ({"base": (np.nan, 0.0)}, r"base is \(nan, 0.0\): give \(x, y\)"),
+        ({"nuisances": "bias"}, r"nuisances is 'bias': give a list of names, like \['bias'\]"),
+        ({"nuisances": ["bia"]}, "there is no nuisance parameter 'bia': choose from bias, drift"),
+        ({"nuisances": ["base"]}, "base cannot be inferred: if pivot and object are shifted together"),
+        ({"family": "cube", "priors": {}}, "there is no family 'cube': choose parabola, circle"),
+        ({"friction": -0.1}, "friction is -0.1: give a coefficient from 0 to"),
+        ({"load_cell": LoadCell()}, "the load cell has no noise, so that there is nothing to be calibrated: give"),
+        (
+            {"priors": {"b": stats.norm()}},
+            "there is a prior of b, which is no parameter: there are a, noise_scale, q, x_c",
+        ),
+        (
+            {"world": World(priors={"friction": stats.norm()})},
+            "there is a prior of the world of friction, which is no parameter",
+        ),
+    ],
+)
+def test_bad_arguments_are_told(noted, tmp_path, wrong, message):
+    """Before there is a folder."""
+    out = tmp_path / "out"
+    with pytest.raises(ParameterError, match=message):
+        quickly(**({"out": None if "workers" in wrong else out} | wrong))
+    assert not out.exists()
+    assert noted == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"drive_angles": "all"}, "drive_angles"),
+        ({"drive_angles": [[0.0, 1.0], [2.0, 3.0]]}, "drive_angles"),
+        ({"base": "here"}, "base"),
+        ({"base": [(0.0, 0.0), (1.0,)]}, "base"),
+        ({"direction": ["both"]}, "direction"),
+        ({"probability": "high"}, "probability"),
+        ({"load_cell": "good"}, "load_cell"),
+        ({"settings": "quick"}, "settings"),
+        ({"world": "real"}, "world"),
+        ({"rod": "thin"}, "rod"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_of_another_kind_is_told(noted, wrong, name):
+    with pytest.raises(ParameterError, match=name):
+        quickly(**wrong)
+
+
+# ---- right and wrong, from end to end
+
+
+@pytest.mark.slow
+def test_the_right_posterior_passes():
+    """False alarm 1 %, but for numbers that are the same again."""
+    found = quickly(replicates=60, workers=None)
+    assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
+
+
+@pytest.mark.slow
+def test_noise_larger_than_told_is_found():
+    """Of 10 %: power is above 99.9 %.
+
+    The 366 readings of a record tell the scale of noise to 1/√732 = 3.7 %, and posteriors lie 2.6 times that too high.
+    """
+    world = World(load_cell=LoadCell(force_noise=0.055, moment_noise=0.022))
+    found = quickly(replicates=25, world=world, workers=None)
+    assert found.attrs["calibrated"] == 0
+    assert "noise_scale: posteriors" in found.attrs["verdict"]
+    assert float(found["ranks"].sel(quantity="noise_scale").mean()) < 15.0  # far too high
+
+
+@pytest.mark.slow
+def test_a_shifted_prior_is_found():
+    """Rods are stiffer by 2 % than the prior says, which is sure to 1 %, where noise leaves much to the prior.
+
+    Posteriors lie 1.7 of their standard deviations too low; power is above 99.9 %.
+    """
+    prior = {"rigidity_scale": stats.lognorm(s=0.01)}
+    found = quickly(
+        replicates=40,
+        load_cell=LoadCell(force_noise=0.5, moment_noise=0.2),
+        priors=PRIORS | prior,
+        world=World(priors={"rigidity_scale": stats.lognorm(s=0.01, scale=1.02)}),
+        workers=None,
+    )
+    assert found.attrs["calibrated"] == 0
+    assert "rigidity_scale: posteriors lie too low" in found.attrs["verdict"]
+
+
+@pytest.mark.slow
+def test_a_wrong_sampler_is_found(monkeypatch):
+    """Its moves divide by what they should multiply with: the ratio of the proposal's densities has the wrong sign.
+
+    Posteriors are some 0.6 times as wide as they should be, and their draws too likely. Power is above 99 %,
+    of 200 times 40 replicates that are drawn from 60.
+    """
+    for kind in (moves.FixedMove, moves.FittedMove):
+
+        def turned(self, *arguments, right=kind.get_proposal):
+            there, ratio = right(self, *arguments)
+            return there, np.where(np.isfinite(ratio), -ratio, ratio)
+
+        monkeypatch.setattr(kind, "get_proposal", turned)
+    found = quickly(replicates=40)
+    assert found.attrs["calibrated"] == 0
+    assert "log_likelihood: the truth explains the records worse than the draws do" in found.attrs["verdict"]

@@ -1,0 +1,143 @@
+"""Ranks among draws: how unusual they are, against simulation and another implementation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from arviz_stats.ecdf_utils import simulate_confidence_bands
+from scipy.special import ndtr
+
+from tactile_bayes.calibration.ranks import _SIMULATIONS, _null, expected_shares, simultaneous_band, uniformity_p_value
+
+LEAST = 1.0 / (_SIMULATIONS + 1)
+"""The smallest p-value there is."""
+
+
+def uniform(sets, count, top, seed):
+    return np.random.default_rng(seed).integers(top + 1, size=(sets, count))
+
+
+def p_values(sets, top):
+    return np.array([uniformity_p_value(ranks, top) for ranks in sets])
+
+
+def shares_of(sets, top):
+    """Share of ranks up to 0, 1, …, top − 1 in each set, shape (sets, top)."""
+    return np.array([np.mean(ranks[:, None] <= np.arange(top), axis=0) for ranks in sets])
+
+
+def five_errors(probability, count):
+    """Of a share that is counted; a normal number is so far out once in two million."""
+    return 5.0 * math.sqrt(probability * (1.0 - probability) / count)
+
+
+# ---- of uniform ranks
+
+
+@pytest.mark.parametrize(("count", "top"), [(100, 99), (37, 9)])
+def test_p_values_of_uniform_ranks_are_uniform(count, top):
+    """False alarm 1e-6 for each share. Ties make p-values larger, but hardly."""
+    found = p_values(uniform(400, count, top, seed=count), top)
+    for level in (0.05, 0.2, 0.5):
+        assert abs(np.mean(found <= level) - level) <= five_errors(level, found.size)
+
+
+@pytest.mark.parametrize(("count", "top", "probability"), [(100, 99, 0.95), (37, 9, 0.9)])
+def test_band_holds_uniform_ranks_with_its_probability(count, top, probability):
+    """False alarm 1e-6; the simulations behind the band have an error, too."""
+    low, high = simultaneous_band(count, top, probability)
+    shares = shares_of(uniform(1000, count, top, seed=3), top)
+    held = np.all((low <= shares) & (shares <= high), axis=1)
+    error = math.hypot(five_errors(probability, held.size), five_errors(probability, _SIMULATIONS))
+    assert abs(held.mean() - probability) <= error
+
+
+@pytest.mark.parametrize(("count", "top", "probability"), [(100, 99, 0.95), (37, 9, 0.95)])
+def test_band_and_p_value_agree_on_every_set(count, top, probability):
+    """A set leaves the band if, and only if, its p-value is at most what the band leaves out."""
+    sets = uniform(1000, count, top, seed=5)
+    low, high = simultaneous_band(count, top, probability)
+    shares = shares_of(sets, top)
+    leaves = np.any((shares < low) | (shares > high), axis=1)
+    np.testing.assert_array_equal(leaves, p_values(sets, top) <= 1.0 - probability)
+    assert leaves.any()
+
+
+def test_level_agrees_with_arviz():
+    """Of another implementation of the same bands: how improbable a share may be at a place of its own.
+
+    Arviz cuts shares times their number to integers, which is exact for a power of two. Its quantile of 2000
+    simulations lies where ours have the same share, within 5 standard errors of both.
+    """
+    count, top, simulations = 64, 19, 2000
+    ours = _null(count, top)
+    probability, places = 0.95, expected_shares(top)
+    theirs = 1.0 - simulate_confidence_bands(count, 1, places, probability, simulations, np.random.default_rng(1))
+    error = math.hypot(five_errors(probability, simulations), five_errors(probability, ours.size))
+    assert np.mean(ours < theirs - 1e-12) <= 1.0 - probability + error
+    assert np.mean(ours <= theirs + 1e-12) >= 1.0 - probability - error
+
+
+# ---- of others
+
+
+@pytest.mark.parametrize(
+    ("shift", "scale"),
+    [
+        pytest.param(1.0, 1.0, id="low"),
+        pytest.param(-1.0, 1.0, id="high"),
+        pytest.param(0.0, 2.0, id="narrow"),
+        pytest.param(0.0, 0.4, id="wide"),
+    ],
+)
+def test_wrong_posteriors_are_found(shift, scale):
+    """Of normal posteriors, where the truth is in their standard deviations; power at p < 1e-3 is 99.9 %."""
+    z = shift + scale * np.random.default_rng(11).normal(size=(20, 100))
+    assert p_values(np.floor(100.0 * ndtr(z)).astype(int), 99).max() < 1e-3
+
+
+def test_extremes():
+    assert uniformity_p_value(np.arange(100), 99) == 1.0
+    for rank in (0, 99):
+        assert uniformity_p_value(np.full(100, rank), 99) == LEAST
+    assert uniformity_p_value(np.repeat([0, 99], 50), 99) == LEAST
+    assert uniformity_p_value(np.arange(1000) % 2, 1) == 1.0
+    assert uniformity_p_value(np.ones(1000, dtype=bool), 1) == LEAST
+    assert uniformity_p_value([True, False] * 50, 1) == 1.0
+
+
+def test_one_rank_says_what_it_can():
+    """A single rank in the middle is nothing unusual; one at an end is, with a probability of two in a hundred."""
+    assert uniformity_p_value([50], 99) > 0.9
+    assert abs(uniformity_p_value([0], 99) - 0.02) <= five_errors(0.02, _SIMULATIONS)
+
+
+def test_order_does_not_matter_and_numbers_are_the_same_again():
+    ranks = uniform(1, 60, 4, seed=2)[0]
+    first = uniformity_p_value(ranks, 4)
+    _null.cache_clear()
+    assert uniformity_p_value(ranks[::-1], 4) == first
+    assert uniformity_p_value(list(map(int, ranks)), 4) == first
+
+
+# ---- the band itself
+
+
+def test_expected_shares_are_those_of_uniform_ranks():
+    np.testing.assert_allclose(expected_shares(4), [0.2, 0.4, 0.6, 0.8], rtol=1e-15)
+    shares = shares_of([np.arange(100)], 99)[0]
+    np.testing.assert_allclose(expected_shares(99), shares, rtol=1e-14)
+
+
+def test_band_lies_about_what_is_expected():
+    narrow, wide = simultaneous_band(40, 19, 0.5), simultaneous_band(40, 19, 0.99)
+    for low, high in (narrow, wide):
+        assert low.shape == high.shape == (19,)
+        assert np.all((low >= 0.0) & (low < expected_shares(19)) & (expected_shares(19) < high) & (high <= 1.0))
+        assert np.all(np.diff(low) >= 0.0)
+        assert np.all(np.diff(high) >= 0.0)
+        np.testing.assert_allclose(low * 40, np.round(low * 40), atol=1e-9)
+    assert np.all((wide[0] <= narrow[0]) & (narrow[1] <= wide[1]))
+    assert np.any(wide[1] > narrow[1])

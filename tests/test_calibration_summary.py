@@ -1,0 +1,247 @@
+"""What replicates say together, of replicates made up: right ones, wrong ones, few and failed ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+from scipy.special import ndtri
+
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
+from tactile_bayes.calibration.summary import CLAIMS, FALSE_ALARM, summary
+
+EXPERIMENT = experiment_of(
+    seed=1,
+    family="parabola",
+    load_cell=None,
+    rod=None,
+    base=(0.0, 0.0),
+    direction="both",
+    drive_angles=None,
+    priors=None,
+    nuisances=[],
+    friction=0.0,
+    events=True,
+    settings=None,
+    probability=0.9,
+    world=None,
+)
+
+NAMES = ("a", "q", "x_c", "rigidity_scale", "noise_scale", LOG_LIKELIHOOD, "snap_off_backward", "snap_off_forward")
+
+PLACES = {"pointwise_in_gap": 9, "pointwise_beside": 18, "contact_region": 6, "snap_off": 2}
+"""How many are judged in a replicate; of the other claims one."""
+
+
+def posteriors(rng, count, shift=0.0, scale=1.0):
+    """Ranks of standard normal truths among draws that are too low by a shift, and too narrow by a factor."""
+    truths = rng.normal(size=(count, 1))
+    return np.sum(-shift + scale * rng.normal(size=(count, DRAWS)) < truths, axis=1)
+
+
+def claims(rng, share):
+    """Shares of a replicate, of places that know of one another: nearly all of a band is in, or nearly none."""
+    found = {}
+    end = ndtri(0.5 + 0.5 * share)
+    for name in CLAIMS:
+        common, own = rng.normal(), rng.normal(size=PLACES.get(name, 1))
+        inside = np.abs(0.95 * common + np.sqrt(1.0 - 0.95**2) * own) < end
+        found[name] = float(np.mean(inside))
+    return found
+
+
+def replicates(count, seed=0, share=0.9, numbers=None, **wrong):
+    """Outcomes by number; `wrong` has what is wrong with the posterior of a quantity."""
+    rng = np.random.default_rng([seed, count])
+    ranks = {name: posteriors(rng, count, **wrong.get(name, {})) for name in NAMES}
+    return {
+        number: Outcome(
+            {name: int(ranks[name][number]) for name in NAMES},
+            {"converged": 1.0, "seconds": 1.0, "check_passed": 1.0, **claims(rng, share), **(numbers or {})},
+            "converged after 25 steps",
+        )
+        for number in range(count)
+    }
+
+
+def judged(*arguments, **options):
+    return summary(EXPERIMENT, replicates(*arguments, **options))
+
+
+FAILED = Outcome({}, {"seconds": 0.5}, "InferenceError: no contour fits")
+
+
+# ---- right
+
+
+def test_right_posteriors_are_calibrated():
+    found = judged(100)
+    assert found.attrs["calibrated"] == 1
+    verdict = found.attrs["verdict"]
+    assert verdict.startswith(
+        "Calibrated, as far as 100 replicates tell: ranks of the truth are uniform (smallest p of 8"
+    )
+    assert "and what is stated with 90% holds as often. Of those with 90% hold: band, in the gap" in verdict
+    assert verdict.endswith("The check of the record raises alarm in 0.0% of 100.")
+    assert found.sizes == {"replicate": 100, "quantity": 8, "claim": 6}
+    assert found.attrs["false_alarm"] == FALSE_ALARM == 0.01
+    assert (found.attrs["family"], found.attrs["seed"], found.attrs["probability"]) == ("parabola", "1", 0.9)
+
+
+def false_verdicts(sets, count):
+    return sum(judged(count, seed=seed).attrs["calibrated"] == 0 for seed in range(sets))
+
+
+def most(sets):
+    """False verdicts that are exceeded by chance once in 10 000, if they come with the probability that is stated."""
+    return stats.binom.isf(1e-4, sets, FALSE_ALARM)
+
+
+@pytest.mark.parametrize(
+    ("sets", "count"),
+    [
+        (40, 100),
+        pytest.param(200, 100, marks=pytest.mark.slow),
+        (30, 20),
+        pytest.param(300, 20, marks=pytest.mark.slow),
+    ],
+)
+def test_false_alarms_are_as_rare_as_stated(sets, count):
+    """Over sets of right replicates; this test's own false alarm is 1e-4."""
+    assert false_verdicts(sets, count) <= most(sets)
+
+
+# ---- wrong
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"q": {"shift": 1.0}}, "q: posteriors lie too low"),
+        ({"q": {"shift": -1.0}}, "q: posteriors lie too high"),
+        ({"x_c": {"scale": 0.4}}, "x_c: posteriors are too narrow"),
+        ({"x_c": {"scale": 3.0}}, "x_c: posteriors are too wide"),
+        ({LOG_LIKELIHOOD: {"shift": 1.0}}, "log_likelihood: the truth explains the records better than the draws do"),
+        ({LOG_LIKELIHOOD: {"shift": -1.0}}, "log_likelihood: the truth explains the records worse than the draws do"),
+        ({"snap_off_backward": {"shift": 1.0}}, "snap_off_backward: posteriors lie too low"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_direction(wrong, words):
+    found = judged(100, **wrong)
+    assert found.attrs["calibrated"] == 0
+    assert found.attrs["verdict"].startswith(f"Not calibrated, over 100 replicates: {words}. Of those with 90% hold")
+    assert float(found.rank_p_value.sel(quantity=next(iter(wrong)))) < 1e-3
+
+
+def test_the_worst_is_named_first():
+    verdict = judged(100, q={"shift": 0.8}, a={"shift": -1.4}, snap_off_forward={"scale": 0.3}).attrs["verdict"]
+    places = [
+        verdict.index(words)
+        for words in (
+            "a: posteriors lie too high; ",
+            "q: posteriors lie too low",
+            "snap_off_forward: posteriors are too narrow",
+        )
+    ]
+    assert min(places) == places[0]
+
+
+@pytest.mark.parametrize("share", [0.7, 0.9999])
+def test_what_does_not_hold_as_often_as_stated_is_named(share):
+    """Too often is wrong as well: always, in 100 replicates, is had by chance once in 40 000."""
+    found = judged(100, share=share)
+    assert found.attrs["calibrated"] == 0
+    told = float(found.coverage.sel(claim="simultaneous_beside"))
+    assert f"band as a whole, beside it: {told:.0%} hold, not 90%" in found.attrs["verdict"]
+    assert abs(told - share) < 5.0 * np.sqrt(share * (1.0 - share) / 100)  # false alarm 1e-6
+
+
+def test_a_little_is_not_told_from_nothing():
+    """Quantiles of some hundred draws miss a probability by a hundredth."""
+    rows = {
+        number: Outcome(row.ranks, {**row.numbers, **dict.fromkeys(CLAIMS, 0.905 + 1e-5 * (number % 2))}, row.message)
+        for number, row in replicates(100).items()
+    }
+    assert summary(EXPERIMENT, rows).attrs["calibrated"] == 1
+
+
+# ---- few, failed, missing
+
+
+@pytest.mark.parametrize("count", [1, 2, 19])
+def test_few_are_too_few(count):
+    found = judged(count, q={"shift": 9.0})
+    assert found.attrs["calibrated"] == 0
+    said = f"Too few replicates to judge: {count} posteriors, and 20 are the least."
+    assert found.attrs["verdict"].startswith(said)
+    assert np.isnan(found.rank_p_value).all()
+
+
+@pytest.mark.parametrize(("shift", "words"), [(9.0, "low"), (-9.0, "high")])
+def test_posteriors_that_lie_quite_elsewhere_are_not_called_narrow(shift, words):
+    """Every truth is beyond every draw, at the same side."""
+    assert f"q: posteriors lie too {words}" in judged(20, q={"shift": shift}).attrs["verdict"]
+
+
+def test_twenty_are_enough_for_what_is_very_wrong():
+    assert "q: posteriors" in judged(20, q={"shift": 9.0}).attrs["verdict"]
+
+
+def test_failures_are_counted():
+    rows = replicates(100) | {100: FAILED}
+    found = summary(EXPERIMENT, rows)
+    assert (found.attrs["calibrated"], found.attrs["replicates"], found.attrs["without_posterior"]) == (1, 101, 1)
+    assert found.attrs["verdict"].endswith("1 had no posterior (InferenceError), and are not counted.")
+    assert int(found["ranks"].sel(replicate=100, quantity="q")) == -1
+    assert np.isnan(float(found.converged.sel(replicate=100)))
+    assert int(found.coverage_replicates.sel(claim="snap_off")) == 100
+    found = summary(EXPERIMENT, rows | {101: FAILED, 102: FAILED._replace(message="ReachError: beyond")})
+    assert (found.attrs["calibrated"], found.attrs["without_posterior"]) == (0, 3)
+    assert "3 had no posterior (InferenceError, ReachError), and are not counted." in found.attrs["verdict"]
+    assert found.attrs["verdict"].endswith("These are too many to call it calibrated.")
+
+
+def test_nothing_but_failures():
+    found = summary(EXPERIMENT, dict.fromkeys(range(30), FAILED))
+    assert found.attrs["calibrated"] == 0
+    assert found.sizes["quantity"] == 0
+    assert found.attrs["verdict"] == (
+        "Too few replicates to judge: 0 posteriors, and 20 are the least. 30 had no posterior (InferenceError), and "
+        "are not counted."
+    )
+
+
+def test_those_that_did_not_converge_are_told():
+    found = judged(20, numbers={"converged": 0.0, "check_passed": 0.0})
+    assert found.attrs["not_converged"] == 20
+    assert "raises alarm in 100.0% of 20" in found.attrs["verdict"]
+    assert found.attrs["verdict"].endswith("20 did not converge, and are counted like all others.")
+
+
+def test_shares_that_are_missing_are_not_counted():
+    rows = replicates(100)
+    missing = {number: {**rows[number].numbers, "snap_off": np.nan} for number in range(40)}
+    rows |= {number: rows[number]._replace(numbers=numbers) for number, numbers in missing.items()}
+    found = summary(EXPERIMENT, rows)
+    known = [rows[number].numbers["snap_off"] for number in range(40, 100)]
+    assert int(found.coverage_replicates.sel(claim="snap_off")) == 60
+    np.testing.assert_allclose(found.coverage.sel(claim="snap_off"), np.mean(known))
+    np.testing.assert_allclose(found.coverage_error.sel(claim="snap_off"), np.std(known, ddof=1) / np.sqrt(60))
+
+
+def test_replicates_are_in_order_whatever_came_first():
+    rows = replicates(20)
+    backwards = summary(EXPERIMENT, dict(reversed(rows.items())))
+    assert list(backwards.replicate.values) == list(range(20))
+    assert backwards.identical(summary(EXPERIMENT, rows))
+    assert list(backwards["ranks"].sel(quantity="q").values) == [rows[number].ranks["q"] for number in range(20)]
+
+
+def test_a_summary_can_be_kept(tmp_path):
+    found = judged(20)
+    found.to_netcdf(tmp_path / "calibration.nc")
+    with xr.open_dataset(tmp_path / "calibration.nc") as again:
+        assert again.attrs["verdict"] == found.attrs["verdict"]
+        np.testing.assert_array_equal(again["ranks"], found["ranks"])
