@@ -80,12 +80,13 @@ def test_help_lists_the_commands():
     assert [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "] == [
         "infer",
         "compare",
+        "calibrate",
         "demo",
         "dataset",
     ]
 
 
-@pytest.mark.parametrize("command", ["infer", "compare", "demo"])
+@pytest.mark.parametrize("command", ["infer", "compare", "calibrate", "demo"])
 def test_help_of_a_command_ends_with_an_example(command):
     result = call(command, "--help")
     assert result.exit_code == 0

@@ -286,6 +286,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
 """
 
 
+@pytest.mark.slow
 @on_linux
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_disk_that_takes_no_more_is_told_and_leaves_no_half_files(tmp_path, workers):

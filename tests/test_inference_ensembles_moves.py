@@ -120,6 +120,7 @@ def test_moves_of_some_coordinates_leave_a_target_invariant(parameters, moves, w
     assert np.all(np.abs(error) < 4.0 * standard)
 
 
+@pytest.mark.slow
 def test_a_move_that_does_not_is_noticed():
     """The snooker move of emcee 3.1.6 draws walkers together: the spread of every parameter comes out too small."""
     error, standard = moments(Gaussian(8, 1.0, wall=False), MOVES["snooker"], ensembles=32, steps=50)

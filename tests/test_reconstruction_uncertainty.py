@@ -457,7 +457,14 @@ def test_the_radius_of_the_rod_moves_points_and_their_spread():
         assert not np.allclose(surface.tangent_sd.dropna("sample"), axis.tangent_sd.dropna("sample"), rtol=1e-3)
 
 
-@pytest.mark.parametrize(("frame", "drive_angle_noise"), [("fixed", 0.0), ("fixed", 0.01), ("turning", 0.01)])
+@pytest.mark.parametrize(
+    ("frame", "drive_angle_noise"),
+    [
+        ("fixed", 0.0),
+        pytest.param("fixed", 0.01, marks=pytest.mark.slow),
+        pytest.param("turning", 0.01, marks=pytest.mark.slow),
+    ],
+)
 def test_the_force_along_the_rod_agrees_with_the_moment(frame, drive_angle_noise):
     """Standard normal: mean of 60 within 4.5 standard errors, and spread within 4, of which χ² has 2e-4 each."""
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, frame=frame, drive_angle_noise=drive_angle_noise)

@@ -79,7 +79,7 @@ def test_estimates_are_right_within_their_errors():
     assert 2.0 < np.median(errors[1] / errors[0]) < 4.0
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.8])
+@pytest.mark.parametrize("kept", [0.0, pytest.param(0.8, marks=pytest.mark.slow)])
 def test_the_standard_error_is_the_scatter_of_estimates(kept):
     """Of 150 runs a standard deviation is known to 6 %, one that is not normal to 8 or so; chains of 250 tell their
     own autocorrelation to 20 %, together to little."""
