@@ -153,8 +153,8 @@ def calibrate(
     --------
     >>> from scipy import stats
     >>> found = calibrate(replicates=2, nuisances=[], priors={"a": stats.uniform(0.4, 0.4)}, seed=1, workers=1)
-    >>> list(found.quantity.values)
-    ['a', 'q', 'x_c', 'noise_scale', 'log_likelihood', 'snap_off_backward', 'snap_off_forward']
+    >>> found.quantity.values.tolist()
+    ['a', 'q', 'x_c', 'noise_scale', 'log_likelihood', 'snap_off_forward', 'snap_off_backward']
     >>> found.attrs["verdict"].partition(":")[0]
     'Too few replicates to judge'
     """
