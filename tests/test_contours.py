@@ -462,7 +462,7 @@ def test_shape_free_finds_the_circle_and_the_parabola():
 # --- as the rod sees it ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize("mirror", [pytest.param(False, marks=pytest.mark.slow), True])
 @every
 def test_seen_from_the_pivot(family, mirror, data):
     """Relative to the pivot, in rod lengths, mirrored: the same points, and rates that are derivatives still."""

@@ -31,7 +31,7 @@ def parameters(count, *ranges):
     ],
 )
 @pytest.mark.parametrize(("direction", "friction"), [("forward", 0.0), ("backward", 0.3)])
-@pytest.mark.parametrize("rod", [None, tb.Rod(0.2, 2.4e-3, 0.7e-3)])
+@pytest.mark.parametrize("rod", [pytest.param(None, marks=pytest.mark.slow), tb.Rod(0.2, 2.4e-3, 0.7e-3)])
 def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod):
     length = rod.length if rod else 1.0
     powers = {"a": 0 if family is Ellipse else -1, "n": 0, "b": 1, "r": 1, "q": 1, "x_c": 1}

@@ -116,8 +116,8 @@ CONTOURS = [
 ]
 
 
-@pytest.mark.parametrize("noise", [1e-4, 1e-2, 0.2])
-@pytest.mark.parametrize("step", [0.4, 1.0, 3.0])
+@pytest.mark.parametrize("noise", [pytest.param(1e-4, marks=pytest.mark.slow), 1e-2, 0.2])
+@pytest.mark.parametrize("step", [pytest.param(0.4, marks=pytest.mark.slow), 1.0, 3.0])
 @pytest.mark.parametrize("contour", CONTOURS)
 def test_events_of_real_sweeps_are_bracketed(contour, step, noise):
     ideal = scan(contour, drive_step=np.radians(step)).record
