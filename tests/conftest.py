@@ -59,3 +59,15 @@ def quick(monkeypatch):
 
     monkeypatch.setattr(run, "infer_contour", infer_quickly)
     monkeypatch.setattr(run, "_draw", lambda *arguments, **options: {})
+
+
+@pytest.fixture
+def settings_left_alone():
+    """Matplotlib's settings are the same after a test, and its figures are closed."""
+    import matplotlib as mpl
+    from matplotlib import pyplot as plt
+
+    before = dict(mpl.rcParams)
+    yield
+    plt.close("all")
+    assert dict(mpl.rcParams) == before

@@ -31,12 +31,7 @@ STEP = np.radians(4.0)
 PHASES = ("tip", "tangential")
 
 
-@pytest.fixture(autouse=True)
-def _settings_are_left_alone():
-    before = dict(mpl.rcParams)
-    yield
-    plt.close("all")
-    assert dict(mpl.rcParams) == before
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 @pytest.fixture(scope="module")

@@ -29,12 +29,7 @@ LOW = (DRAWS * np.linspace(0.0, 1.0, COUNT) ** 2).astype(int)
 LEVEL = 0.001
 
 
-@pytest.fixture(autouse=True)
-def _settings_are_left_alone():
-    before = dict(mpl.rcParams)
-    yield
-    plt.close("all")
-    assert dict(mpl.rcParams) == before
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 def calibration_of(p_values=None, **ranks):

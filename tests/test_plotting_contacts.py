@@ -24,12 +24,7 @@ from tactile_bayes.uncertainty.contact_region import contact_region
 SOME = np.array([2, 22, 24, 30, 45, 61, 120])
 
 
-@pytest.fixture(autouse=True)
-def _settings_are_left_alone():
-    before = dict(mpl.rcParams)
-    yield
-    plt.close("all")
-    assert dict(mpl.rcParams) == before
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 @pytest.fixture(scope="module")

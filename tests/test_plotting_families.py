@@ -21,12 +21,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 BRIEF = SamplerSettings(ensembles=2, max_steps=20)
 
 
-@pytest.fixture(autouse=True)
-def _settings_are_left_alone():
-    before = dict(mpl.rcParams)
-    yield
-    plt.close("all")
-    assert dict(mpl.rcParams) == before
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 @pytest.fixture(scope="module")

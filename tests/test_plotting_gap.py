@@ -18,12 +18,7 @@ from tactile_bayes.uncertainty.gap import gap
 TRUTH = Parabola(5.0, q=0.03)
 
 
-@pytest.fixture(autouse=True)
-def _settings_are_left_alone():
-    before = dict(mpl.rcParams)
-    yield
-    plt.close("all")
-    assert dict(mpl.rcParams) == before
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 def posterior(left, right, share=0.01):

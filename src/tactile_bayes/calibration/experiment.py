@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.calibration.world import World
+from tactile_bayes.calibration.world import NUMBERS, World
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem, prior_in_words
+from tactile_bayes.inference.contour_problem import ContourProblem, contour_priors, contour_problem, prior_in_words
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior, refuse_no_prior
 from tactile_bayes.inference.family_names import family_named
@@ -24,7 +24,7 @@ from tactile_bayes.inference.likelihood import FINE_ORDER, bases_of
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, make_record, rod_of
+from tactile_bayes.record import CHANNELS, make_record
 from tactile_bayes.rod import Rod
 
 __all__ = ["Experiment"]
@@ -101,9 +101,8 @@ class Experiment:
         noise = noise_of(self.template, self.load_cell)
         rig = nuisances_of(self.template, self.nuisances, self.priors, noise.cell, self.friction)
         family = family_named(self.world.family or self.family)
-        base = float(np.mean([x for x, _ in self.bases])), float(np.mean([y for _, y in self.bases]))
-        contour = family.default_priors(base, rod_of(self.template).length)
-        priors = {**contour, **rig.priors, **noise.priors, **self.priors, **self.world.priors}
+        defaults = {**contour_priors(self.template, family), **rig.priors, **noise.priors}
+        priors = {**defaults, **self.priors, **self.world.priors}
         priors = {name: priors[name] for name in (*family.parameters, *rig.names, *noise.names)}
         model = ContourModel(self.template, family, rig, noise, priors)
         model.likelihood.order = FINE_ORDER
@@ -141,7 +140,7 @@ class Experiment:
             "family": self.family,
             "load_cell": json.dumps(self.load_cell.entries()),
             "load_cell_frame": self.load_cell.frame or "fixed",
-            "drive_angles": _said(self.drive_angles),
+            "drive_angles": json.dumps(self.drive_angles),
             "rod": "dimensionless" if self.rod is None else json.dumps(asdict(self.rod)),
             "bases": json.dumps(self.bases),
             "directions": json.dumps(self.directions),
@@ -154,16 +153,10 @@ class Experiment:
             "seed": repr(self.seed),
         }
         told["world_family"] = world.family or self.family
-        for name in ("friction", "base_shift", "further_base_shift", "rigidity_scale", "drive_angle_offset"):
-            told[f"world_{name}"] = repr(getattr(world, name))
-        told |= {f"world_{name}": repr(getattr(world, name)) for name in ("bias", "drift", "flat_spot")}
+        told |= {f"world_{name}": repr(getattr(world, name)) for name in NUMBERS}
         told["world_load_cell"] = "as stated" if world.load_cell is None else json.dumps(world.load_cell.entries())
         told["world_priors"] = json.dumps({name: prior_in_words(prior) for name, prior in world.priors.items()})
         return told | {f"version of {name}": version(name) for name in _LIBRARIES}
-
-
-def _said(angles: tuple[float, ...]) -> str:
-    return json.dumps([float(angle) for angle in angles])
 
 
 def _plain(value: Any) -> Any:

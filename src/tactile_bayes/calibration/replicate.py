@@ -21,7 +21,7 @@ from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
 from tactile_bayes.uncertainty.record_check import check_record
 
-__all__ = ["DRAWS", "LOG_LIKELIHOOD", "REGIONS", "Outcome", "replicate"]
+__all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "replicate"]
 
 Floats = NDArray[np.float64]
 
@@ -30,9 +30,6 @@ DRAWS = 99
 
 LOG_LIKELIHOOD = "log_likelihood"
 """What is ranked besides parameters."""
-
-REGIONS = ("in_gap", "beside")
-"""Where bands are judged: between the last contacts of both directions, and from there to first contact."""
 
 _PLACES = 9
 """At which a band is judged in the gap, and on each side of it."""
@@ -164,7 +161,10 @@ def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dic
 
 
 def _places(simulation: Simulation) -> dict[str, Floats]:
-    """Values of x by region; none where the sweeps leave no gap, or are of one direction."""
+    """Values of x beside the gap, from last to first contact, and in it, between the last contacts of both directions.
+
+    None are in it where the sweeps leave no gap, or are of one direction.
+    """
     ends, begins = simulation.events["snap_off_contact_x"], simulation.events["first_contact_x"]
     is_forward = begins > ends
     beside = [np.linspace(end, begin, _PLACES + 1)[1:] for end, begin in zip(ends, begins, strict=True)]

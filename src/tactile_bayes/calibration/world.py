@@ -15,9 +15,21 @@ from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.load_cell import LoadCell
 
-__all__ = ["World"]
+__all__ = ["NUMBERS", "World"]
 
 Triple = tuple[float, float, float]
+
+NUMBERS = {
+    "friction": 1,
+    "rigidity_scale": 1,
+    "drive_angle_offset": 1,
+    "bias": 3,
+    "drift": 3,
+    "base_shift": 2,
+    "further_base_shift": 2,
+    "flat_spot": 2,
+}
+"""What of a world is numbers, and how many they are."""
 
 _NOTHING: Triple = (0.0, 0.0, 0.0)
 
@@ -76,9 +88,7 @@ class World:
     priors: Mapping[str, Prior] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        sizes = {"friction": 0, "rigidity_scale": 0, "drive_angle_offset": 0, "bias": 3, "drift": 3}
-        sizes |= {"base_shift": 2, "further_base_shift": 2, "flat_spot": 2}
-        for name, size in sizes.items():
+        for name, size in NUMBERS.items():
             if name == "flat_spot" and self.flat_spot is None:
                 continue
             object.__setattr__(self, name, _numbers(name, getattr(self, name), size))
@@ -137,8 +147,8 @@ def _numbers(name: str, value: Any, size: int) -> Any:
         numbers = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         numbers = np.full(1, np.nan)
-    if numbers.shape != ((size,) if size else ()) or not np.all(np.isfinite(numbers)):
+    if numbers.shape != ((size,) if size > 1 else ()) or not np.all(np.isfinite(numbers)):
         raise ParameterError(
-            f"{name} of the world is {value!r}: give {f'{size} finite numbers' if size else 'a finite number'}"
+            f"{name} of the world is {value!r}: give {f'{size} finite numbers' if size > 1 else 'a finite number'}"
         )
-    return tuple(numbers.tolist()) if size else float(numbers)
+    return tuple(numbers.tolist()) if size > 1 else float(numbers)

@@ -18,6 +18,7 @@ from tactile_bayes.cli.record_options import (
     rod_asked,
 )
 from tactile_bayes.cli.task_bar import task_bar
+from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -64,13 +65,8 @@ def calibrate(
         ),
     ] = None,
     probability: Annotated[float, typer.Option(help="Of the bands and regions that are judged.")] = 0.9,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes on this machine; by default one for each core.", min=1)
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Address of a Dask scheduler in place of --workers, like tcp://10.0.0.1:8786."),
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     seed: Seed = 1,
     quiet: Quiet = False,
 ) -> None:
@@ -81,10 +77,8 @@ def calibrate(
     import numpy as np
 
     from tactile_bayes.calibration_run import calibrate_into
-    from tactile_bayes.errors import ParameterError
 
-    if workers is not None and scheduler is not None:
-        raise ParameterError("--workers and --scheduler exclude each other: give one of them")
+    refuse_both(workers, scheduler)
     rod = rod_asked(length, flexural_rigidity, diameter)
     last: Calibrating | None = None
 
@@ -131,18 +125,16 @@ def _load_cell(rod: Rod | None, force_noise: float | None, moment_noise: float |
 
 
 def _world(options: Sequence[str]) -> World:
-    from tactile_bayes.calibration.world import World
+    from tactile_bayes.calibration.world import NUMBERS, World
     from tactile_bayes.errors import ParameterError
 
-    sizes = {"friction": 1, "rigidity_scale": 1, "drive_angle_offset": 1, "bias": 3, "drift": 3}
-    sizes |= {"base_shift": 2, "further_base_shift": 2, "flat_spot": 2}
     given: dict[str, Any] = {}
     for option in options:
         name, equals, value = (part.strip() for part in option.partition("="))
-        if not equals or name not in sizes:
-            raise ParameterError(f"--world {option}: write NAME=VALUE, with one of {', '.join(sizes)}")
-        numbers = _numbers(value, f"--world {name}", sizes[name])
-        given[name] = numbers[0] if sizes[name] == 1 else numbers
+        if not equals or name not in NUMBERS:
+            raise ParameterError(f"--world {option}: write NAME=VALUE, with one of {', '.join(NUMBERS)}")
+        numbers = _numbers(value, f"--world {name}", NUMBERS[name])
+        given[name] = numbers[0] if NUMBERS[name] == 1 else numbers
     return World(**given)
 
 

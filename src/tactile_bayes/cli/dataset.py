@@ -10,6 +10,7 @@ import typer
 
 from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.task_bar import counted, task_bar
+from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -45,13 +46,8 @@ def generate(
         Path, typer.Argument(metavar="SPEC.toml", help="What to draw, sweep and measure: see dataset example.")
     ],
     out: Annotated[Path, typer.Option(help="Folder for the data set; made if it is not there.", file_okay=False)],
-    workers: Annotated[
-        int | None, typer.Option(help="Processes on this machine; by default one for each core.", min=1)
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Address of a Dask scheduler in place of --workers, like tcp://10.0.0.1:8786."),
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False,
 ) -> None:
     """Make a data set, or go on where a run stopped.
@@ -60,10 +56,8 @@ def generate(
     """
     from tactile_bayes import datasets
     from tactile_bayes.datasets.manifest import read_manifest
-    from tactile_bayes.errors import ParameterError
 
-    if workers is not None and scheduler is not None:
-        raise ParameterError("--workers and --scheduler exclude each other: give one of them")
+    refuse_both(workers, scheduler)
     spec = datasets.read_specification(specification)
     last: Production | None = None
 

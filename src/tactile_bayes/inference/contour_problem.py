@@ -25,7 +25,7 @@ from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 
-__all__ = ["ContourProblem", "contour_problem", "default_priors", "prior_in_words"]
+__all__ = ["ContourProblem", "contour_priors", "contour_problem", "default_priors", "prior_in_words"]
 
 
 class ContourProblem(NamedTuple):
@@ -72,7 +72,7 @@ def contour_problem(
     chosen = family_named(family)
     noise = noise_of(measured, load_cell)
     rig = nuisances_of(measured, nuisances, priors or {}, noise.cell, friction)
-    chosen_priors = {**_contour_priors(measured, chosen), **rig.priors, **noise.priors}
+    chosen_priors = {**contour_priors(measured, chosen), **rig.priors, **noise.priors}
     for name, prior in (priors or {}).items():
         if name not in chosen_priors:
             raise ParameterError(
@@ -126,10 +126,11 @@ def default_priors(
     measured = validate(measured)
     noise = noise_of(measured, load_cell)
     rig = nuisances_of(measured, nuisances, {}, noise.cell, friction=0.0)
-    return {**_contour_priors(measured, family_named(family)), **rig.priors, **noise.priors}
+    return {**contour_priors(measured, family_named(family)), **rig.priors, **noise.priors}
 
 
-def _contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
+def contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
+    """Default priors of a contour, from where the pivots are, and how long the rod is."""
     base = float(measured.base_x.mean()), float(measured.base_y.mean())
     return family.default_priors(base, rod_of(measured).length)
 
