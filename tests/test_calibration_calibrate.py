@@ -225,11 +225,7 @@ def test_another_calibration_is_left_alone(noted, tmp_path, other, told):
         {"probability": np.float64(0.9)},
         {"friction": np.float64(0.0)},
         {"world": World(base_shift=[0.0, 0.0])},
-        {
-            "settings": SamplerSettings(
-                ensembles=np.int64(2), block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000
-            )
-        },
+        {"settings": SamplerSettings(ensembles=np.int64(2), walkers=24, max_r_hat=1.05, min_ess=200.0, max_steps=2000)},
     ],
     ids=lambda same: next(iter(same)),
 )
@@ -263,7 +259,7 @@ def test_what_an_experiment_is_follows_from_its_words():
         "base": [(0.0, 0.0)],
         "priors": {},
         "nuisances": (),
-        "settings": SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000),
+        "settings": SamplerSettings(ensembles=2, walkers=24, max_r_hat=1.05, min_ess=200.0, max_steps=2000),
         "world": World(),
     }
     assert experiment_of(**(asked | written_out)).words == words

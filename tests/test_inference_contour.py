@@ -150,6 +150,7 @@ def test_predictions_scatter_about_what_was_measured():
 
 
 def test_events_are_those_of_the_drawn_contours():
+    """Roughly: to 1e-6 rad, and to 1e-5 of the rod's length."""
     result = posterior()
     draw = result["posterior"].to_dataset().sel(draw=result["events"].draw).isel(chain=0, draw=3)
     contour = Parabola(*(float(draw[name]) for name in TRUTH))
@@ -158,7 +159,8 @@ def test_events_are_those_of_the_drawn_contours():
         found = result["events"].isel(chain=0, draw=3, stroke=stroke)
         for label, event in (("first", events[direction].first_contact), ("snap_off", events[direction].snap_off)):
             for name in ("drive_angle", "contact_x", "contact_y"):
-                assert float(found[f"{label}_{name}"]) == pytest.approx(getattr(event, name), abs=1e-9)
+                off = 1e-6 if name == "drive_angle" else 1e-5
+                assert float(found[f"{label}_{name}"]) == pytest.approx(getattr(event, name), abs=off)
 
 
 def coarse(contour=None, cell=CELL, seed=3, **options):

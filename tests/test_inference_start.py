@@ -31,6 +31,20 @@ def test_optimum_of_a_linear_problem():
     np.testing.assert_allclose(found.residuals, linear(data)(found.point[None])[0])
 
 
+def test_a_jump_at_the_optimum_is_no_slope():
+    """A sample that lets go of the object right there does not say how sure the rest is."""
+    data = DESIGN @ (TRUE / SPREAD)
+
+    def jumping(points):
+        lost = np.where(points[:, :1] > TRUE[0] + 2e-5 * SPREAD[0], 20.0, 0.0)
+        return np.hstack([linear(data)(points), lost])
+
+    found = best_optimum(jumping, np.zeros((1, 2)), MIDDLE, SPREAD)
+    assert abs(found.point[0] - TRUE[0]) < 5e-5 * SPREAD[0]
+    information = DESIGN.T @ DESIGN + np.eye(2)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(information) * np.outer(SPREAD, SPREAD), rtol=0.02)
+
+
 def test_an_outlier_pulls_little():
     data = DESIGN @ (TRUE / SPREAD)
     data[7] += 1000.0

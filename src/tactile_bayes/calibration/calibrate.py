@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -36,7 +37,9 @@ _NOTING = 0.05
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 """Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""
 
-_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
+_SETTINGS = SamplerSettings(ensembles=2, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
+_FEWEST_WALKERS, _MORE_WALKERS = 24, 6
+"""Walkers of an ensemble at least, and how many more than twice the parameters: few, as 200 draws are soon there."""
 
 
 class Calibrating(NamedTuple):
@@ -86,7 +89,7 @@ def calibrate(
     family : str
         As in `infer_contour`.
     replicates : int
-        How many; each takes about a second.
+        How many; each takes some two seconds on one core.
     load_cell : LoadCell, optional
         That measures and that inference is told, with noise, in the record's units; by default force_noise 0.05 EI/L²
         and moment_noise 0.02 EI/L.
@@ -101,8 +104,9 @@ def calibrate(
     priors, nuisances, friction, events
         As in `infer_contour`; truths are drawn from the same priors.
     settings : SamplerSettings, optional
-        By default 2 ensembles, until R̂ is below 1.05 and 200 effective draws are there, five for every walker, in 2000
-        steps at most. Runs that end unconverged stay in.
+        By default 2 ensembles of 24 walkers, or six more than twice the parameters where these are many, until R̂ is
+        below 1.05 and 200 effective draws are there, five for every walker, in 2000 steps at most. Runs that end
+        unconverged stay in.
     probability : float
         Of the bands, regions and intervals that are judged.
     world : World, optional
@@ -234,7 +238,7 @@ def experiment_of(
             raise ParameterError(f"{name} is {value!r}: give a number")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up")
-    return Experiment(
+    experiment = Experiment(
         family=family,
         load_cell=cell,
         drive_angles=tuple(np.unique(angles).tolist()),
@@ -250,6 +254,10 @@ def experiment_of(
         seed=int(seed),
         world=world or World(),
     )
+    if settings is not None:
+        return experiment
+    walkers = max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS)
+    return replace(experiment, settings=replace(_SETTINGS, walkers=walkers))
 
 
 def _floats(values: ArrayLike) -> Floats:

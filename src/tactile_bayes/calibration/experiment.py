@@ -116,6 +116,12 @@ class Experiment:
         return self.world.family in (None, self.family) and self.world.flat_spot is None
 
     @property
+    def parameters(self) -> int:
+        """How many are inferred."""
+        own = family_named(self.family).parameters
+        return len(own) + len(self.model.nuisances.names) + len(self.model.noise.names)
+
+    @property
     def pivots(self) -> int:
         return len(bases_of(self.template))
 

@@ -202,7 +202,7 @@ def _contacts(
     points = draws[rng.choice(len(draws), min(_CONTACT_DRAWS, len(draws)), replace=False)]
     asked = np.full(read.size, np.nan)
     asked[chosen] = (simulation.measured.drive_angle.values - experiment.load_cell.drive_angle_offset)[chosen]
-    found = contacts_of(model.likelihood, model.contours(points), model.rig(points), asked)
+    found = contacts_of(model.likelihood, model.contours(points), model.rig(points), asked, exact=False)
     dims = ("chain", "draw", "sample")
     columns = {name: (dims, found[name][None][..., chosen]) for name in ("contact_x", "contact_y")}
     implied = xr.Dataset(columns, coords={"sample": chosen})

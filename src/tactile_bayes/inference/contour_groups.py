@@ -36,7 +36,7 @@ def groups_of(model: ContourModel, draws: Draws, rng: np.random.Generator) -> di
         error = model.likelihood.encoder.draw(rng, (len(part), loads.shape[2]))
         predicted.append(np.take_along_axis(loads, error[:, None, :, None], axis=1)[:, 0])
         likelihood.append(model.likelihood.score(loads, reached, model.noise_scale(part), pointwise=True))
-        events.append(events_of(model.likelihood, model.contours(part), model.rig(part)))
+        events.append(events_of(model.likelihood, model.contours(part), model.rig(part), exact=False))
     shape = (chains, kept.size)
     coords = {"chain": np.arange(chains), "draw": kept}
     cell = model.likelihood.load_cell

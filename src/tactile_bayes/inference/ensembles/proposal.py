@@ -22,7 +22,7 @@ _DEGREES_OF_FREEDOM = 10.0
 _WIDENING = 1.1
 """Scale over that of the points it is fitted to: too wide a proposal costs less than too narrow a one."""
 
-_ROUNDS = 4
+_ROUNDS = 8
 _DRAWS = 60
 """For each parameter, in each round."""
 
