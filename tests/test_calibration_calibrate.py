@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,8 @@ ANGLES = np.radians(np.arange(-30.0, 211.0, 4.0))
 
 FEW_STEPS = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
 """Enough for numbers that are the same again, not for right ones."""
+
+BY_DEFAULT = SamplerSettings(ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
 
 
 def quickly(**options):
@@ -225,7 +228,7 @@ def test_another_calibration_is_left_alone(noted, tmp_path, other, told):
         {"probability": np.float64(0.9)},
         {"friction": np.float64(0.0)},
         {"world": World(base_shift=[0.0, 0.0])},
-        {"settings": SamplerSettings(ensembles=np.int64(2), walkers=24, max_r_hat=1.05, min_ess=200.0, max_steps=2000)},
+        {"settings": replace(BY_DEFAULT, ensembles=np.int64(2))},
     ],
     ids=lambda same: next(iter(same)),
 )
@@ -259,7 +262,9 @@ def test_what_an_experiment_is_follows_from_its_words():
         "base": [(0.0, 0.0)],
         "priors": {},
         "nuisances": (),
-        "settings": SamplerSettings(ensembles=2, walkers=24, max_r_hat=1.05, min_ess=200.0, max_steps=2000),
+        "settings": SamplerSettings(
+            ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000
+        ),
         "world": World(),
     }
     assert experiment_of(**(asked | written_out)).words == words

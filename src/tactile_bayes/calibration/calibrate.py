@@ -37,8 +37,8 @@ _NOTING = 0.05
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 """Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""
 
-_SETTINGS = SamplerSettings(ensembles=2, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
-_FEWEST_WALKERS, _MORE_WALKERS = 24, 6
+_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
+_FEWEST_WALKERS, _MORE_WALKERS = 20, 2
 """Walkers of an ensemble at least, and how many more than twice the parameters: few, as 200 draws are soon there."""
 
 
@@ -104,7 +104,7 @@ def calibrate(
     priors, nuisances, friction, events
         As in `infer_contour`; truths are drawn from the same priors.
     settings : SamplerSettings, optional
-        By default 2 ensembles of 24 walkers, or six more than twice the parameters where these are many, until R̂ is
+        By default 2 ensembles of 20 walkers, or two more than twice the parameters where these are many, until R̂ is
         below 1.05 and 200 effective draws are there, five for every walker, in 2000 steps at most. Runs that end
         unconverged stay in.
     probability : float
@@ -137,7 +137,7 @@ def calibrate(
         pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
         median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,
         effective_draws, evaluations, seconds, message (replicate)
-            Of each.
+            Of each; misfit_probability and axial_score, of single samples, only where a `world` is given.
 
         Attributes: verdict, in words; calibrated (0 or 1); false_alarm, the probability, at most, that right posteriors
         are not called so, and level, the p-value below which a single quantity or claim is at fault; the experiment.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -56,14 +57,17 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
     percentiles = np.quantile(candidates[:, :size], [0.16, 0.84], axis=0)
     rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
     spread = np.where(np.isfinite(spread), spread, rough)
-    costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
-    chosen = [candidates[i, :size] for i in np.argsort(costs)[:_CANDIDATES]]
-    by_contacts = contact_fit(model)
-    if by_contacts is not None:
-        chosen.insert(0, np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))
+
+    def starts() -> Iterator[Floats]:
+        by_contacts = contact_fit(model)
+        if by_contacts is not None:
+            yield np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0))
+        costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
+        yield from (candidates[i, :size] for i in np.argsort(costs)[:_CANDIDATES])
+
     ends = np.array([support_of(model.priors[name]) for name in model.located])
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
-    optimum = best_optimum(residuals, np.array(chosen), percentiles.mean(axis=0), spread, low, high)
+    optimum = best_optimum(residuals, starts(), percentiles.mean(axis=0), spread, low, high)
 
     noise = fitted_noise(model, optimum.residuals.reshape(measured.shape))
     possible = candidates[:, size:]

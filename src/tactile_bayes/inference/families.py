@@ -19,6 +19,9 @@ __all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior", "refuse_no_prior", 
 
 _MOST_STEPS = 100
 
+_SETTLED = 1e-5
+"""Change of parameters, in rod lengths and over their size, after which least squares are not repeated."""
+
 Floats = NDArray[np.float64]
 Values = Mapping[str, Any]
 
@@ -215,7 +218,9 @@ def _robust(miss: Callable[[Floats], Floats], point: Any) -> Floats:
         def scaled(p: Floats, unit: float = spread) -> Floats:
             return miss(p) / unit
 
-        point = least_squares(scaled, point, loss="soft_l1", max_nfev=_MOST_STEPS).x
+        before, point = point, least_squares(scaled, point, loss="soft_l1", max_nfev=_MOST_STEPS).x
+        if np.allclose(point, before, rtol=_SETTLED, atol=_SETTLED):
+            break
     return np.asarray(point)
 
 

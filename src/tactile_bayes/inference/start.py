@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -54,7 +54,7 @@ class Optimum(NamedTuple):
 
 def best_optimum(
     residuals: Residuals,
-    candidates: Floats,
+    candidates: Iterable[Floats],
     middle: Floats,
     spread: Floats,
     low: Floats | float = -np.inf,
@@ -69,7 +69,7 @@ def best_optimum(
     ----------
     residuals : callable
         From points (n, d) to residuals in standard deviations (n, k).
-    candidates : ndarray, shape (m, d)
+    candidates : iterable of ndarray, shape (d,)
     middle, spread : ndarray, shape (d,)
         Where each parameter lies a priori, and on which scale it varies there: it is drawn there like by one residual.
     low, high : ndarray, shape (d,), or float
