@@ -16,7 +16,7 @@ from scipy import stats
 
 from helpers.tasks import wait_until
 from tactile_bayes.calibration.calibrate import calibrate, experiment_of
-from tactile_bayes.calibration.ledger import LEDGER
+from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.world import World
 from tactile_bayes.errors import CalibrationError, ParameterError
@@ -89,7 +89,7 @@ def test_what_is_kept_is_all_there_is(small, monkeypatch):
     found, folder = small
     monkeypatch.setattr(module, "replicate", pytest.fail)
     assert quickly(settings=FEW_STEPS, out=folder).identical(found)
-    assert [path.name for path in folder.iterdir()] == [LEDGER]
+    assert [path.name for path in folder.iterdir()] == [REPLICATES.file]
 
 
 @pytest.mark.slow
@@ -117,14 +117,14 @@ def test_more_replicates_begin_with_those_that_are_there(noted, tmp_path):
     fewer = quickly(replicates=3, out=tmp_path)
     assert fewer.sizes["replicate"] == 3
     assert len(noted) == 5
-    assert len(json.loads((tmp_path / LEDGER).read_text())["replicates"]) == 5  # none is lost
+    assert len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"]) == 5  # none is lost
 
 
 def test_a_gap_is_filled(noted, tmp_path):
     whole = quickly(replicates=4, out=tmp_path)
-    table = json.loads((tmp_path / LEDGER).read_text())
+    table = json.loads((tmp_path / REPLICATES.file).read_text())
     del table["replicates"][1]
-    (tmp_path / LEDGER).write_text(json.dumps(table))
+    (tmp_path / REPLICATES.file).write_text(json.dumps(table))
     noted.clear()
     assert quickly(replicates=4, out=tmp_path).identical(whole)
     assert noted == [1]
@@ -145,21 +145,21 @@ def test_an_interrupt_keeps_what_is_done(noted, tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         quickly(replicates=9, out=tmp_path, progress=interrupt)
-    rows = json.loads((tmp_path / LEDGER).read_text())["replicates"]
+    rows = json.loads((tmp_path / REPLICATES.file).read_text())["replicates"]
     assert [row["number"] for row in rows] == [0, 1, 2]
-    assert [path.name for path in tmp_path.iterdir()] == [LEDGER]
+    assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
     quickly(replicates=9, out=tmp_path)
     assert noted == list(range(9))
 
 
 def test_what_is_done_is_noted_on_the_way(noted, tmp_path, monkeypatch):
     """A run that is killed without a word has lost little."""
-    monkeypatch.setattr(module, "_NOTING", 1e9)
+    monkeypatch.setattr("tactile_bayes.ledger._NOTING", 1e9)
     there = []
     quickly(
         replicates=3,
         out=tmp_path,
-        progress=lambda state: there.append(len(json.loads((tmp_path / LEDGER).read_text())["replicates"])),
+        progress=lambda state: there.append(len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"])),
     )
     assert there == [1, 2, 3]
 
@@ -182,16 +182,16 @@ quickly(replicates=10**5, out=sys.argv[1])
 def test_a_killed_run_goes_on(tmp_path, wait):
     """Whenever it is killed, what is noted is whole."""
     run = subprocess.Popen([sys.executable, "-c", ENDLESS, str(tmp_path)], cwd=Path(__file__).parent)
-    wait_until(lambda: (tmp_path / LEDGER).exists() or run.poll() is not None, seconds=60.0)
+    wait_until(lambda: (tmp_path / REPLICATES.file).exists() or run.poll() is not None, seconds=60.0)
     time.sleep(wait)
     run.kill()
     run.wait()
-    done = len(json.loads((tmp_path / LEDGER).read_text())["replicates"])
+    done = len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"])
     told = []
     found = quickly(replicates=done, out=tmp_path, progress=told.append)
     assert found.sizes["replicate"] == done > 0
     assert told == []
-    assert [path.name for path in tmp_path.iterdir()] == [LEDGER]
+    assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
 
 
 @pytest.mark.parametrize(
@@ -214,10 +214,10 @@ def test_a_killed_run_goes_on(tmp_path, wait):
 )
 def test_another_calibration_is_left_alone(noted, tmp_path, other, told):
     quickly(out=tmp_path)
-    before = (tmp_path / LEDGER).read_bytes()
+    before = (tmp_path / REPLICATES.file).read_bytes()
     with pytest.raises(CalibrationError, match=f"replicates of another experiment: .*{told}.*; give another folder"):
         quickly(out=tmp_path, **other)
-    assert (tmp_path / LEDGER).read_bytes() == before
+    assert (tmp_path / REPLICATES.file).read_bytes() == before
     assert noted == [0, 1]
 
 

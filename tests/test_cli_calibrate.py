@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from tactile_bayes.calibration.ledger import LEDGER
+from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.cli.app import app
 
 QUICK = ("--as-stated", "--drive-step", "4", "--workers", "1", "-q")
@@ -38,7 +38,7 @@ def test_the_verdict_comes_first_then_what_holds_then_the_files(done):
         path = next(line.split()[-1] for line in lines if line.startswith(f"{what} "))
         assert path.startswith(str(out))
     assert {path.name for path in out.iterdir()} == {
-        LEDGER,
+        REPLICATES.file,
         "calibration.nc",
         "verdict.txt",
         "ranks.png",
@@ -56,10 +56,10 @@ def test_the_file_holds_what_was_found(done):
 
 def test_the_same_command_makes_nothing_again(done):
     out, said = done
-    before = (out / LEDGER).read_bytes()
+    before = (out / REPLICATES.file).read_bytes()
     again = call("--out", out, "--replicates", 2, *QUICK)
     assert again.stdout == said
-    assert (out / LEDGER).read_bytes() == before
+    assert (out / REPLICATES.file).read_bytes() == before
 
 
 def test_another_experiment_is_refused(done):
@@ -73,7 +73,7 @@ def test_a_world_is_told_and_kept(tmp_path):
     worlds = ("--world", "friction=0.3", "--world", "base_shift=0.01,-0.02")
     result = call("--out", tmp_path, "--replicates", 1, *worlds, *QUICK)
     assert result.exit_code == 0, result.output
-    words = json.loads((tmp_path / LEDGER).read_text(encoding="utf-8"))["experiment"]
+    words = json.loads((tmp_path / REPLICATES.file).read_text(encoding="utf-8"))["experiment"]
     assert (words["world_friction"], words["world_base_shift"]) == ("0.3", "(0.01, -0.02)")
 
 

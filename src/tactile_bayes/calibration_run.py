@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.calibration.calibrate import calibrate
-from tactile_bayes.calibration.ledger import LEDGER
+from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.files import write_atomically
 
 __all__ = ["CalibrationRun", "calibrate_into"]
@@ -57,7 +57,7 @@ def calibrate_into(out: str | os.PathLike[str], **options: Any) -> CalibrationRu
     folder = Path(out)
     found = calibrate(out=folder, **options)
     files = {
-        "replicates": folder / LEDGER,
+        "replicates": folder / REPLICATES.file,
         "calibration": folder / "calibration.nc",
         "verdict": folder / "verdict.txt",
         "ranks": folder / "ranks.png",

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.calibration.experiment import Experiment
-from tactile_bayes.calibration.ledger import open_ledger
+from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import replicate
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.calibration.world import World
@@ -23,16 +21,13 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.ledger import TaskProgress, keep_outcomes, open_ledger
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rod import Rod
-from tactile_bayes.tasks import run_tasks
 
-__all__ = ["Calibrating", "calibrate", "experiment_of"]
+__all__ = ["calibrate", "experiment_of"]
 
 Floats = NDArray[np.float64]
-
-_NOTING = 0.05
-"""Share of the time that goes into notes of what is finished."""
 
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 """Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""
@@ -40,17 +35,6 @@ _ANGLES = np.arange(-30.0, 211.0, 2.0)
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
 _FEWEST_WALKERS, _MORE_WALKERS = 20, 2
 """Walkers of an ensemble at least, and how many more than twice the parameters: few, as 200 draws are soon there."""
-
-
-class Calibrating(NamedTuple):
-    """How far a calibration has come."""
-
-    done: int
-    wanted: int
-    made: int
-    """Of those that are done, in this run."""
-    seconds: float
-    """Since this run began."""
 
 
 def calibrate(
@@ -73,7 +57,7 @@ def calibrate(
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[Calibrating], object] | None = None,
+    progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.Dataset:
     """Show whether intervals hold: simulate records of truths that are drawn from the prior, infer, and compare.
 
@@ -119,7 +103,7 @@ def calibrate(
     scheduler : str, optional
         Address of a Dask scheduler, in place of `workers`.
     progress : callable, optional
-        Is given a `Calibrating` after each replicate.
+        Is given a `TaskProgress` after each replicate.
 
     Returns
     -------
@@ -180,19 +164,11 @@ def calibrate(
         probability=probability,
         world=world,
     )
-    began = time.monotonic()
-    with open_ledger(experiment.words, None if out is None else Path(out).resolve()) as ledger:
-        kept = {number: outcome for number, outcome in ledger.outcomes.items() if number < replicates}
-        tasks = [(experiment, number) for number in range(replicates) if number not in kept]
-        next_note, done = began, len(kept)
-        with closing(run_tasks(replicate, tasks, workers=workers, scheduler=scheduler)) as results:
-            for made, ((_, number), outcome) in enumerate(results, start=1):
-                ledger.outcomes[number] = kept[number] = outcome
-                if (now := time.monotonic()) >= next_note:
-                    ledger.write()
-                    next_note = time.monotonic() + (time.monotonic() - now) / _NOTING
-                if progress is not None:
-                    progress(Calibrating(done + made, replicates, made, time.monotonic() - began))
+    folder = None if out is None else Path(out).resolve()
+    with open_ledger(experiment.words, folder, REPLICATES) as ledger:
+        kept = keep_outcomes(
+            ledger, replicate, experiment, int(replicates), workers=workers, scheduler=scheduler, progress=progress
+        )
     return summary(experiment, kept)
 
 

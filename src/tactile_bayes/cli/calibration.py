@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from tactile_bayes.calibration.calibrate import Calibrating
     from tactile_bayes.calibration.world import World
     from tactile_bayes.calibration_run import CalibrationRun
+    from tactile_bayes.ledger import TaskProgress
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.rod import Rod
 
@@ -80,14 +80,14 @@ def calibrate(
 
     refuse_both(workers, scheduler)
     rod = rod_asked(length, flexural_rigidity, diameter)
-    last: Calibrating | None = None
+    last: TaskProgress | None = None
 
     def have() -> str:
         return f"{last.done:,} of {replicates:,} replicates are in {out}" if last else "no further replicate was done"
 
     with going_on(have) as raise_lost, task_bar(replicates, "replicate", quiet) as show:
 
-        def note(calibrating: Calibrating) -> None:
+        def note(calibrating: TaskProgress) -> None:
             nonlocal last
             last = calibrating
             show(calibrating.done)
