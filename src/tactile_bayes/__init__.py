@@ -22,6 +22,7 @@ _MODULES = ("contours", "datasets", "elastica", "errors", "plotting")
 _HOMES = {
     "LoadCell": "load_cell",
     "OrnsteinUhlenbeck": "load_cell",
+    "Plan": "planning.plan",
     "RandomWalk": "load_cell",
     "Rod": "rod",
     "SamplerSettings": "inference.ensembles",
@@ -33,6 +34,7 @@ _HOMES = {
     "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
     "equilibria": "scanning",
+    "error_map": "planning.error_map",
     "gap": "uncertainty.gap",
     "implied_contacts": "uncertainty.implied_contacts",
     "in_frame": "record",
@@ -45,8 +47,11 @@ _HOMES = {
     "read_record": "record",
     "read_result": "inference.result",
     "reconstruct": "reconstruction",
+    "required_noise": "planning.requirement",
+    "required_rod": "planning.requirement",
     "scan": "scanning",
     "scan_many": "scanning_many",
+    "sensitivity": "planning.sensitivity",
     "suspicions": "uncertainty.suspicions",
     "to_arviz": "inference.result",
     "verdicts": "uncertainty.verdicts",
@@ -76,6 +81,11 @@ if TYPE_CHECKING:
     from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
     from tactile_bayes.load_cell import RandomWalk as RandomWalk
     from tactile_bayes.load_cell import zero_load as zero_load
+    from tactile_bayes.planning.error_map import error_map as error_map
+    from tactile_bayes.planning.plan import Plan as Plan
+    from tactile_bayes.planning.requirement import required_noise as required_noise
+    from tactile_bayes.planning.requirement import required_rod as required_rod
+    from tactile_bayes.planning.sensitivity import sensitivity as sensitivity
     from tactile_bayes.reconstruction import reconstruct as reconstruct
     from tactile_bayes.record import in_frame as in_frame
     from tactile_bayes.record import make_record as make_record

@@ -51,6 +51,10 @@ class CalibrationError(TactileBayesError, ValueError):
     """A folder holds the replicates of another calibration."""
 
 
+class StudyError(TactileBayesError, ValueError):
+    """A folder holds the cells of another study."""
+
+
 class TaskError(TactileBayesError, RuntimeError):
     """Processes died over a task again and again."""
 

@@ -15,7 +15,7 @@ from tactile_bayes.inference.ensembles import Draws
 from tactile_bayes.inference.result import sample_stats
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 
-__all__ = ["groups_of", "prior_draws"]
+__all__ = ["groups_of", "prior_draws", "unit_of"]
 
 Floats = NDArray[np.float64]
 
@@ -84,14 +84,15 @@ def _labelled(model: ContourModel, samples: Floats, draw: NDArray[np.intp]) -> x
     coords = {"chain": np.arange(samples.shape[0]), "draw": draw}
     return xr.Dataset(
         {
-            name: (("chain", "draw"), samples[..., i], {"units": _unit(model, name)})
+            name: (("chain", "draw"), samples[..., i], {"units": unit_of(model, name)})
             for i, name in enumerate(model.names)
         },
         coords=coords,
     )
 
 
-def _unit(model: ContourModel, name: str) -> str:
+def unit_of(model: ContourModel, name: str) -> str:
+    """The unit of a parameter, in words."""
     if model.measured.attrs["units"] == "dimensionless":
         return "rad" if name in ("drive_angle_offset", "length_scale") else "1"
     if name in model.nuisances.names:

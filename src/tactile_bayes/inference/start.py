@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.differences import central_slopes
 
 __all__ = ["Cloud", "Optimum", "best_optimum", "gather"]
 
@@ -30,9 +31,6 @@ _INSIDE = 1e-3
 """Of the scale of a parameter, from its end, where a search begins that must not leave."""
 
 _ROUNDS = 30
-
-_JUMP = 0.01
-"""Bend of a residual over a step of the differences, in standard deviations, that may be a jump."""
 
 _FITS = 0.55
 """Cost per residual that says that the noise explains the record: 0.4 if the noise is guessed right."""
@@ -106,13 +104,8 @@ def _descend(
 
     def jacobian(point: Floats) -> Floats:
         """Central differences; loads are interpolated, so the step must not be too small."""
-        moves = 1e-4 * np.concatenate([np.eye(point.size), -np.eye(point.size), np.zeros((1, point.size))])
-        values = residuals((point + moves) * spread)
-        more, less, here = values[: point.size], values[point.size : -1], values[-1]
-        # A sample at a snap-off that lets go on one side jumps: that is no slope.
-        jump = np.abs(more + less - 2.0 * here)
-        slopes = np.where(jump > np.maximum(_JUMP, 0.5 * np.abs(more - less)), 0.0, (more - less) / 2e-4)
-        return np.concatenate([slopes.T, np.eye(point.size)])
+        slopes = central_slopes(lambda points: residuals(points * spread), point, 1e-4)
+        return np.concatenate([slopes, np.eye(point.size)])
 
     bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
     solution = least_squares(one, start / spread, jacobian, bounds, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)

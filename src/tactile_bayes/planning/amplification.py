@@ -1,0 +1,252 @@
+"""How errors of the sensor grow into errors of a contact point, along a sweep."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, place_by_wrench, touching_and_slopes
+
+__all__ = ["METHODS", "SOURCES", "Method", "amplification"]
+
+Floats = NDArray[np.float64]
+
+Method = Literal["raw", "constrained"]
+METHODS: tuple[Method, ...] = ("raw", "constrained")
+SOURCES = (*CHANNELS, "drive_angle")
+
+_COLUMNS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
+_TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_phase")
+
+_NEAR = np.geomspace(1e-5, 0.5, 41)
+"""Distances from first contact and from snap-off, over the sweep's length, where no drive angles are given."""
+
+_POWER_LAW = (1e-5, 1e-3)
+"""Distances between which errors grow like a power of it, over the sweep's length."""
+
+_FREE = {True: (FORCE, PSI1), False: (FORCE, ARCLENGTH)}
+"""Of touching rods, in tip contact and in tangential contact."""
+
+
+class _Forward(NamedTuple):
+    """Contacts of a sweep as forward ones, dimensionless."""
+
+    side: Floats
+    coordinates: Floats
+    """Force, ψ1, arc length and drive angle, shape (n, 4)."""
+    tip: NDArray[np.bool_]
+    slope_angle: Floats
+    from_readings: Floats
+    """Errors of the loads by those of the three readings, shape (n, 3, 3)."""
+    leaning: Floats
+    """Errors of the loads by that of the drive angle, for a load cell that turns with the drive, shape (n, 3)."""
+    covariance: Floats
+    """Of the readings, shape (n, 3, 3)."""
+
+    def take(self, where: NDArray[np.intp]) -> _Forward:
+        return _Forward._make(column[where] for column in self)
+
+
+def amplification(plan: Plan) -> xr.Dataset:
+    """Errors of contact points by errors of the sensor, to first order, in closed form.
+
+    Parameters
+    ----------
+    plan : Plan
+        Without drive angles of its own, a sweep is looked at closely where it begins and where it ends.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "sample", the loaded ones of all sweeps, with sweep, direction, drive_angle [rad], contact_phase and the
+        contact (contact_x, contact_y, slope_angle), after_first_contact and before_snap_off [rad]:
+
+        gain_along, gain_across (reconstruction, sample, source)
+            By how much the contact point moves along the contour, and across it, for an error of one in a reading
+            [length/(N m), length/N, length/rad]; NaN where the method has no answer.
+        sd_along, sd_across (reconstruction, sample)
+            Standard deviations from all errors of the load cell and the encoder together [length].
+        holds (reconstruction, sample)
+            Whether first order holds at this noise: `reconstruct` of an ideal sample has the status "ok".
+
+        Over "event" ("first contact", "snap-off") and "stroke": growth_along and growth_across (reconstruction, stroke,
+        event), the power of the distance in drive angle with which the standard deviation grows toward the event: −1
+        doubles it at half the distance, 0 leaves it bounded.
+
+    Notes
+    -----
+    Raw Step 2 is a function of four numbers, whose slopes are those of the closed form (`touching.place_by_wrench`).
+    The constrained estimate is, to first order, the weighted least-squares solution on the sheet of possible contacts.
+    """
+    refined = plan if plan.drive_angles is not None else _refined(plan)
+    record, rod = refined.scan.record, plan.taken_rod
+    loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
+    chosen = record.isel(sample=loaded)
+    contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.friction))
+    of_angle = plan.cell.drive_angle_deviation
+    gains = (_raw(contacts, delta), _constrained(contacts, delta, of_angle))
+    both = [_along_and_across(contacts, gain, 0.5 * rod.diameter / rod.length) for gain in gains]
+    deviations = [[_deviation(gain, contacts, of_angle) for gain in of_method] for of_method in both]
+    # A reading is in the unit of the record, not in EI/L or EI/L².
+    per_unit = rod.length / np.array([rod.moment_unit, rod.force_unit, rod.force_unit, 1.0])
+    distances = _distances(refined, chosen)
+    sweeps = [chosen.sweep.values == k for k in range(len(refined.scan.sweeps))]
+    growth = np.array(
+        [
+            [[[_growth(sd[of], far[of]) for far in distances] for of in sweeps] for sd in of_method]
+            for of_method in deviations
+        ]
+    )
+    unit = {"units": "1" if record.attrs["units"] == "dimensionless" else "m"}
+    dims = ("reconstruction", "sample")
+    gain, sd = np.array(both) * per_unit, np.array(deviations) * rod.length
+    return xr.Dataset(
+        {
+            **{name: ("sample", chosen[name].values, chosen[name].attrs) for name in _COLUMNS},
+            **{name: ("sample", chosen[f"truth_{name}"].values, chosen[f"truth_{name}"].attrs) for name in _TRUTHS},
+            "after_first_contact": ("sample", distances[0], {"units": "rad"}),
+            "before_snap_off": ("sample", distances[1], {"units": "rad"}),
+            "gain_along": ((*dims, "source"), gain[:, 0]),
+            "gain_across": ((*dims, "source"), gain[:, 1]),
+            "sd_along": (dims, sd[:, 0], unit),
+            "sd_across": (dims, sd[:, 1], unit),
+            "holds": (dims, np.array([_holds(refined, method)[loaded] for method in METHODS])),
+            "growth_along": (("reconstruction", "stroke", "event"), growth[:, 0]),
+            "growth_across": (("reconstruction", "stroke", "event"), growth[:, 1]),
+        },
+        coords={
+            "reconstruction": list(METHODS),
+            "source": list(SOURCES),
+            "event": ["first contact", "snap-off"],
+            "stroke": [
+                f"{sweep.direction} from ({sweep.base[0]:g}, {sweep.base[1]:g})" for sweep in refined.scan.sweeps
+            ],
+        },
+    )
+
+
+def _holds(plan: Plan, method: Method) -> NDArray[np.bool_]:
+    """Which samples `reconstruct` finds no fault with."""
+    answer = reconstruct(plan.record, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.friction)
+    return np.asarray(answer.status.values == "ok")
+
+
+def _refined(plan: Plan) -> Plan:
+    """The same with drive angles that come ever closer to first contact and snap-off."""
+    angles = []
+    for sweep in plan.scan.sweeps:
+        first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
+        angles += [first + (snap - first) * _NEAR, snap - (snap - first) * _NEAR]
+    return replace(plan, drive_angles=np.unique(np.concatenate(angles)))
+
+
+def _forward(plan: Plan, record: xr.Dataset, chosen: NDArray[np.intp]) -> _Forward:
+    rod, cell = plan.taken_rod, plan.cell.dimensionless(plan.taken_rod)
+    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    loads = np.stack([record[name].values for name in CHANNELS], axis=-1) / units
+    angle = record.drive_angle.values
+    turn, leaning = np.broadcast_to(np.eye(3), (angle.size, 3, 3)), np.zeros_like(loads)
+    in_cell = loads
+    if cell.frame == "turning":
+        leaning[:, 1], leaning[:, 2] = -loads[:, 2], loads[:, 1]
+        turn = np.zeros((angle.size, 3, 3))
+        turn[:, 0, 0] = 1.0
+        turn[:, 1, 1] = turn[:, 2, 2] = np.cos(angle)
+        turn[:, 2, 1] = np.sin(angle)
+        turn[:, 1, 2] = -turn[:, 2, 1]
+        in_cell = np.einsum("nji,nj->ni", turn, loads)
+    side = np.where(record.direction.values == "forward", 1.0, -1.0)
+    signs = np.where(side[:, None] < 0.0, [-1.0, -1.0, 1.0], 1.0)
+    from_readings = signs[:, :, None] * turn @ np.linalg.inv(cell.gain_matrix)
+    slope = side * record.truth_slope_angle.values
+    tip_angle = np.where(side < 0.0, np.pi - record.truth_tip_angle.values, record.truth_tip_angle.values)
+    tip = record.truth_contact_phase.values == "tip"
+    delta = float(np.arctan(plan.friction))
+    coordinates = np.stack(
+        [
+            np.hypot(loads[:, 1], loads[:, 2]),
+            np.where(tip, tip_angle - slope - delta, -delta),
+            np.where(tip, 1.0, record.truth_contact_arclength.values / rod.length),
+            np.where(side < 0.0, np.pi - angle, angle),
+        ],
+        axis=-1,
+    )
+    leaning = side[:, None] * signs * leaning
+    whole = _Forward(side, coordinates, tip, slope, from_readings, leaning, cell.covariance(in_cell))
+    return whole.take(chosen)
+
+
+def _raw(contacts: _Forward, delta: float) -> Floats:
+    """Errors of place and slope (x, y, slope angle, arc length) by those of the four readings, shape (n, 4, 4)."""
+    _, slopes = touching_and_slopes(contacts.coordinates, delta)
+    by_angle_and_loads = place_by_wrench(slopes)
+    by_loads = by_angle_and_loads[:, :, 1:]
+    by_angle = by_angle_and_loads[:, :, :1] + by_loads @ contacts.leaning[:, :, None]
+    return np.concatenate([by_loads @ contacts.from_readings, by_angle * contacts.side[:, None, None]], axis=2)
+
+
+def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Floats:
+    """The same of the most likely contact on the sheet of its phase."""
+    _, slopes = touching_and_slopes(contacts.coordinates, delta)
+    from_readings = contacts.from_readings
+    covariance = from_readings @ contacts.covariance @ np.swapaxes(from_readings, 1, 2)
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+    gains = np.empty((contacts.tip.size, 4, 4))
+    for tip, free in _FREE.items():
+        here = np.flatnonzero(contacts.tip == tip)
+        loads, place, white = slopes.loads[here], slopes.place[here], whiten[here]
+        by_angle = loads[:, :, DRIVE_ANGLE] - contacts.leaning[here]
+        known = np.concatenate([white @ loads[:, :, free], white @ by_angle[:, :, None]], axis=2)
+        errors = np.concatenate([white @ from_readings[here], np.zeros((here.size, 3, 1))], axis=2)
+        if angle_deviation:
+            # The drive angle is one more reading, and one more number to be found.
+            last = np.zeros((here.size, 1, 3))
+            last[:, 0, 2] = 1.0 / angle_deviation
+            found = np.linalg.pinv(np.concatenate([known, last], axis=1))
+            errors = np.concatenate([errors, np.zeros((here.size, 1, 4))], axis=1)
+            errors[:, 3, 3] = contacts.side[here] / angle_deviation
+            gains[here] = place[:, :, [*free, DRIVE_ANGLE]] @ found @ errors
+        else:
+            errors[:, :, 3] = -known[:, :, 2] * contacts.side[here, None]
+            gains[here] = place[:, :, free] @ np.linalg.pinv(known[:, :, :2]) @ errors
+            gains[here, :, 3] += place[:, :, DRIVE_ANGLE] * contacts.side[here, None]
+    return gains
+
+
+def _along_and_across(contacts: _Forward, gain: Floats, radius: float) -> tuple[Floats, Floats]:
+    """Of the contact on the object, in the world, shape (n, 4) each."""
+    cos, sin = np.cos(contacts.slope_angle)[:, None], np.sin(contacts.slope_angle)[:, None]
+    along = cos * gain[:, 0] + sin * gain[:, 1] - radius * gain[:, 2]  # the surface turns with the slope
+    return contacts.side[:, None] * along, cos * gain[:, 1] - sin * gain[:, 0]
+
+
+def _deviation(gain: Floats, contacts: _Forward, angle_deviation: float) -> Floats:
+    by_loads = gain[:, :3]
+    variance = np.einsum("ni,nij,nj->n", by_loads, contacts.covariance, by_loads)
+    return np.asarray(np.sqrt(variance + (gain[:, 3] * angle_deviation) ** 2))
+
+
+def _distances(plan: Plan, chosen: xr.Dataset) -> tuple[Floats, Floats]:
+    """From first contact and from snap-off [rad]."""
+    sweeps = plan.scan.sweeps
+    first = np.array([sweep.first_contact.drive_angle for sweep in sweeps])[chosen.sweep.values]
+    snap = np.array([sweep.snap_off.drive_angle for sweep in sweeps])[chosen.sweep.values]
+    angle = chosen.drive_angle.values
+    return np.abs(angle - first), np.abs(snap - angle)
+
+
+def _growth(deviation: Floats, distance: Floats) -> float:
+    """Power of the distance with which a deviation grows, from samples that are close; NaN where there are too few."""
+    longest = distance.max(initial=0.0)
+    near = (distance > _POWER_LAW[0] * longest) & (distance < _POWER_LAW[1] * longest) & (deviation > 0.0)
+    near &= np.isfinite(deviation)
+    if np.count_nonzero(near) < 3:
+        return np.nan
+    return float(np.polyfit(np.log(distance[near]), np.log(deviation[near]), 1)[0])

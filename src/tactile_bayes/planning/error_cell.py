@@ -1,0 +1,187 @@
+"""One cell of an error map: an object at a distance, swept and measured again and again."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.errors import ContourError, InferenceError, ReachError
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.planning.amplification import METHODS, amplification
+from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes, stretches
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.record_information import prior_precision, record_information
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.uncertainty.band import contour_band
+
+__all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
+
+Floats = NDArray[np.float64]
+
+_SETTINGS = SamplerSettings(ensembles=2, walkers=24, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
+"""Of posteriors, of which only a band is wanted."""
+
+
+@dataclass(frozen=True)
+class MapCell:
+    """Where a cell is in the map."""
+
+    contour: str
+    distance: float
+    """Of the contour's vertex above the pivot [length]."""
+    noise_factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class MapTask:
+    """The whole map: what every cell is made from."""
+
+    contours: Mapping[str, Contour]
+    cells: tuple[MapCell, ...]
+    plan: Plan
+    """With any of the contours; its pivot is the lateral one."""
+    replicates: int
+    posteriors: Mapping[int, int]
+    """How many replicates of a cell, by its number, are inferred as well."""
+    probability: float
+    seed: int
+
+
+class CellOutcome(NamedTuple):
+    """What came of a cell."""
+
+    numbers: Mapping[str, float]
+    message: str
+    """"ok", or why there is nothing."""
+
+
+def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
+    """Sweep, measure and reconstruct again and again, and infer some of it."""
+    study, number = task
+    cell = study.cells[number]
+    contour = study.contours[cell.contour]
+    plan = replace(study.plan, contour=contour, base=_pivot(contour, study.plan, cell.distance))
+    plan = plan.with_noise(cell.noise_factor)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            scan = plan.scan
+    except (ReachError, ContourError) as error:
+        return CellOutcome({}, f"{type(error).__name__}: {error}")
+    numbers: dict[str, float] = {}
+    numbers["gap_width"] = sum(stretch.end - stretch.begin for stretch in stretches(scan) if stretch.name == "gap")
+    numbers |= _expected(plan, study.probability)
+    seeds = np.random.SeedSequence(study.seed, spawn_key=(number,)).spawn(study.replicates)
+    measured = [plan.cell.measure(scan.record, seed=np.random.default_rng(seed)) for seed in seeds]
+    numbers |= _reconstructed(plan, measured)
+    numbers |= _inferred(plan, measured[: study.posteriors.get(number, 0)], study.probability, study.seed)
+    return CellOutcome(numbers, "ok")
+
+
+def _pivot(contour: Contour, plan: Plan, distance: float) -> tuple[float, float]:
+    """Below the contour's lowest point by a distance; sideways where the plan has it."""
+    lowest = float(contour.point(0.0)[1])
+    return float(np.atleast_2d(np.asarray(plan.base, dtype=float))[0, 0]), lowest - distance
+
+
+def _expected(plan: Plan, probability: float) -> dict[str, float]:
+    """Mean widths of the expected bands."""
+    model, point = plan.model, plan.point
+    precision = record_information(model, point).matrix + np.diag(prior_precision(model))
+    wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
+    widths: dict[str, list[Floats]] = {"touched": [], "gap": []}
+    for stretch in stretches(plan.scan):
+        widths[stretch.name].append(deviation_of_heights(height_slopes(model, point, stretch.x), precision))
+    return {
+        f"expected_{name}_width": wide * float(np.concatenate(found).mean()) if found else math.nan
+        for name, found in widths.items()
+    }
+
+
+def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
+    """Errors of contacts over all replicates: root mean squares of those that are "ok", beside those of first order."""
+    record = plan.scan.record
+    loaded = record.truth_contact_phase.values != "none"
+    grown = amplification(replace(plan, drive_angles=np.unique(record.drive_angle.values)))
+    first = {
+        name: {
+            (int(sweep), float(angle)): value
+            for sweep, angle, value in zip(grown.sweep.values, grown.drive_angle.values, values.T, strict=True)
+        }
+        for name, values in (("along", grown.sd_along.values), ("across", grown.sd_across.values))
+    }
+    keys = list(zip(record.sweep.values[loaded].tolist(), record.drive_angle.values[loaded].tolist(), strict=True))
+    slope = record.truth_slope_angle.values[loaded]
+    cos, sin = np.cos(slope), np.sin(slope)
+    numbers: dict[str, float] = {}
+    for m, method in enumerate(METHODS):
+        sd = {name: np.array([of[key][m] for key in keys]) for name, of in first.items()}
+        squares, counts = {"along": 0.0, "across": 0.0}, 0
+        foretold = {"along": 0.0, "across": 0.0}
+        unanswered, every = 0, 0
+        sizes: list[Floats] = []
+        for one in measured:
+            found = reconstruct(one, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.friction)
+            x = found.contact_x.values[loaded] - record.truth_contact_x.values[loaded]
+            y = found.contact_y.values[loaded] - record.truth_contact_y.values[loaded]
+            ok = found.status.values[loaded] == "ok"
+            errors = {"along": cos * x + sin * y, "across": cos * y - sin * x}
+            for name, error in errors.items():
+                squares[name] += float(np.sum(error[ok] ** 2))
+                foretold[name] += float(np.sum(sd[name][ok] ** 2))
+            counts += int(ok.sum())
+            missing = np.isnan(x)
+            unanswered, every = unanswered + int(missing.sum()), every + missing.size
+            sizes.append(np.hypot(x, y)[~missing])
+        for name in squares:
+            numbers[f"{method}_rms_{name}"] = math.sqrt(squares[name] / counts) if counts else math.nan
+            numbers[f"{method}_first_order_{name}"] = math.sqrt(foretold[name] / counts) if counts else math.nan
+        joined = np.concatenate(sizes)
+        numbers[f"{method}_median_error"] = float(np.median(joined)) if joined.size else math.nan
+        numbers[f"{method}_without_answer"] = unanswered / every if every else math.nan
+        numbers[f"{method}_ok"] = counts / every if every else math.nan
+    return numbers
+
+
+def _inferred(plan: Plan, measured: list[xr.Dataset], probability: float, seed: int) -> dict[str, float]:
+    """Mean widths of posterior bands, and in which share of the places they hold the contour."""
+    numbers: dict[str, float] = {}
+    widths: dict[str, list[float]] = {"touched": [], "gap": []}
+    held: dict[str, list[float]] = {"touched": [], "gap": []}
+    failed = 0
+    for k, one in enumerate(measured):
+        try:
+            posterior = infer_contour(
+                one,
+                family=plan.family,
+                load_cell=plan.cell,
+                priors=plan.priors,
+                friction=plan.friction,
+                nuisances=plan.nuisances,
+                settings=_SETTINGS,
+                seed=seed + k,
+            )
+        except InferenceError:
+            failed += 1
+            continue
+        for stretch in stretches(plan.scan):
+            band = contour_band(posterior, stretch.x, probability)
+            height = np.asarray(plan.contour.height(stretch.x))
+            widths[stretch.name].append(float(np.mean(band.upper.values - band.lower.values)))
+            held[stretch.name].append(float(np.mean((band.lower.values <= height) & (height <= band.upper.values))))
+    for name in widths:
+        numbers[f"posterior_{name}_width"] = float(np.mean(widths[name])) if widths[name] else math.nan
+        numbers[f"posterior_{name}_coverage"] = float(np.mean(held[name])) if held[name] else math.nan
+    if measured:
+        numbers["posterior_failed"] = failed / len(measured)
+    return numbers

@@ -1,0 +1,271 @@
+"""How wrong contacts and bands are, over noise level, distance and shape: a Monte-Carlo study."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.contours import Contour, paper_profile
+from tactile_bayes.errors import ParameterError, StudyError
+from tactile_bayes.inference.contour_problem import prior_in_words
+from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.ledger import Kind, TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.planning.amplification import METHODS
+from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
+from tactile_bayes.planning.family_parameters import enlarged
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.rod import Rod
+
+__all__ = ["CELLS", "error_map"]
+
+_LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee")
+
+_OF_METHODS = ("rms_along", "rms_across", "first_order_along", "first_order_across", "median_error")
+_SHARES_OF_METHODS = ("without_answer", "ok")
+_LENGTHS = (
+    "gap_width",
+    "expected_touched_width",
+    "expected_gap_width",
+    "posterior_touched_width",
+    "posterior_gap_width",
+)
+_SHARES = ("posterior_touched_coverage", "posterior_gap_coverage", "posterior_failed")
+
+
+def error_map(
+    contours: Mapping[str, Contour] | Sequence[str] = ("II",),
+    *,
+    seed: int,
+    distances: Sequence[float] = (0.5,),
+    noise_factors: Sequence[float] = (0.1, 0.3, 1.0, 3.0),
+    load_cell: LoadCell | None = None,
+    rod: Rod | None = None,
+    base_x: float = 0.0,
+    drive_step: float = float(np.radians(2.0)),
+    friction: float = 0.0,
+    nuisances: Sequence[str] = STANDARD,
+    priors: Mapping[str, Prior] | None = None,
+    replicates: int = 20,
+    posterior_cells: int = 0,
+    posterior_replicates: int = 2,
+    probability: float = 0.95,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[TaskProgress], object] | None = None,
+) -> xr.Dataset:
+    """Errors of reconstruction over contour, distance and noise, by simulating records again and again.
+
+    Parameters
+    ----------
+    contours : mapping of str to Contour, or sequence of str
+        Objects by name, in the unit of the rod's length; or names of the paper's profiles, for the dimensionless rod or
+        scaled to the rod's length.
+    seed : int
+        The same seed, the same numbers, whatever the number of workers.
+    distances : sequence of float
+        Of the lowest point of each contour above the pivot [rod lengths].
+    noise_factors : sequence of float
+        On the noise of the load cell.
+    load_cell : LoadCell, optional
+        By default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
+    rod, drive_step, friction
+        As in `scan`; every cell is a forward and a backward sweep.
+    base_x : float
+        Where the pivot is sideways [length].
+    nuisances, priors
+        As in `infer_contour`, for expected bands and posteriors.
+    replicates : int
+        Records in each cell.
+    posterior_cells : int
+        In how many cells, evenly over the map, posteriors are inferred as well: they take seconds each.
+    posterior_replicates : int
+        Records of such a cell that are inferred.
+    probability : float
+        Of the bands.
+    out : path-like, optional
+        Folder in which what is done is kept, in cells.json: a run that was killed goes on.
+    workers, scheduler
+        As in `calibrate`.
+    progress : callable, optional
+        Is given a `TaskProgress` after each cell.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "contour", "distance" and "noise_factor", and where it is named over "reconstruction" ("raw", "constrained"):
+
+        rms_along, rms_across (…, reconstruction)
+            Root mean square errors of contact points along and across the contour, of samples with the status "ok".
+        first_order_along, first_order_across (…, reconstruction)
+            What `amplification` foretells for the same samples.
+        median_error (…, reconstruction)
+            Median distance of contact points from the true ones, of all samples that have an answer.
+        without_answer, ok (…, reconstruction)
+            Shares of loaded samples that have no answer, and that have the status "ok".
+        gap_width
+            Of the arc in x that no sweep touches; 0 where there is none.
+        expected_touched_width, expected_gap_width
+            Mean widths of the bands that are to be expected, from Fisher's information.
+        posterior_touched_width, posterior_gap_width, posterior_touched_coverage, posterior_gap_coverage
+            Mean widths of posterior bands, and share of places at which they hold the contour; NaN in cells without.
+        posterior_failed
+            Share of records from which nothing could be inferred.
+        message
+            "ok", or why a cell is empty: the rod does not reach.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is impossible.
+    StudyError
+        If `out` holds cells of another study, or is being worked on.
+    TaskError
+        If processes died over a cell again and again.
+
+    Examples
+    --------
+    >>> found = error_map(["II"], noise_factors=[0.1, 1.0], replicates=2, seed=1, workers=1)
+    >>> found.rms_across.sel(reconstruction="constrained").values.ravel().round(4) < 0.02
+    array([ True,  True])
+    """
+    rod_taken = rod or Rod()
+    objects = _objects(contours, rod_taken)
+    grids = {"distances": distances, "noise_factors": noise_factors}
+    for name, values in grids.items():
+        numbers = np.atleast_1d(np.asarray(values, dtype=float))
+        if numbers.ndim != 1 or not numbers.size or not np.all(np.isfinite(numbers) & (numbers > 0.0)):
+            raise ParameterError(f"{name} are {values!r}: give a list of positive numbers")
+        if np.unique(numbers).size != numbers.size:
+            raise ParameterError(f"{name} are {values!r}: one of them is given twice")
+    counts = {"replicates": (replicates, 1), "posterior_cells": (posterior_cells, 0)}
+    counts["posterior_replicates"] = posterior_replicates, 1
+    for name, (count, least) in counts.items():
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
+            raise ParameterError(f"{name} is {count!r}: give a whole number from {least} up")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up")
+    if not 0.0 < probability < 1.0:
+        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    cells = tuple(
+        MapCell(name, float(distance) * rod_taken.length, float(factor))
+        for name, distance, factor in product(objects, distances, noise_factors)
+    )
+    plan = Plan(
+        next(iter(objects.values())),
+        load_cell=load_cell,
+        rod=rod,
+        base=(float(base_x), 0.0),
+        drive_step=drive_step,
+        friction=friction,
+        nuisances=tuple(nuisances),
+        priors=dict(priors or {}),
+    )
+    chosen = np.unique(np.linspace(0, len(cells) - 1, min(posterior_cells, len(cells))).round().astype(int))
+    task = MapTask(
+        objects,
+        cells,
+        plan,
+        int(replicates),
+        {int(number): min(int(posterior_replicates), int(replicates)) for number in chosen},
+        float(probability),
+        int(seed),
+    )
+    with open_ledger(_words(task), None if out is None else Path(out).resolve(), CELLS) as ledger:
+        kept = keep_outcomes(
+            ledger, error_cell, task, len(cells), workers=workers, scheduler=scheduler, progress=progress
+        )
+    return _labelled(task, kept, list(objects), list(distances), list(noise_factors))
+
+
+def _objects(contours: Mapping[str, Contour] | Sequence[str], rod: Rod) -> dict[str, Contour]:
+    if isinstance(contours, str) or not contours:
+        raise ParameterError(f"contours is {contours!r}: give names of the paper's profiles, or contours by name")
+    if isinstance(contours, Mapping):
+        return dict(contours)
+    return {name: enlarged(paper_profile(name, q=0.5), rod.length) for name in contours}  # type: ignore[arg-type]
+
+
+def _words(task: MapTask) -> dict[str, str]:
+    """What the cells follow from."""
+    plan = task.plan
+    return {
+        "contours": json.dumps({name: repr(contour) for name, contour in task.contours.items()}),
+        "cells": json.dumps([asdict(cell) for cell in task.cells]),
+        "load_cell": json.dumps(plan.cell.entries()),
+        "load_cell_frame": plan.cell.frame or "fixed",
+        "rod": "dimensionless" if plan.rod is None else json.dumps(asdict(plan.rod)),
+        "base": repr(plan.base),
+        "drive_step": repr(plan.drive_step),
+        "friction": repr(plan.friction),
+        "nuisances": json.dumps(list(plan.nuisances)),
+        "priors": json.dumps({name: prior_in_words(prior) for name, prior in plan.priors.items()}),
+        "replicates": repr(task.replicates),
+        "posteriors": json.dumps(dict(task.posteriors)),
+        "probability": repr(task.probability),
+        "seed": repr(task.seed),
+        **{f"version of {name}": version(name) for name in _LIBRARIES},
+    }
+
+
+def _labelled(
+    task: MapTask,
+    outcomes: Mapping[int, CellOutcome],
+    names: Sequence[str],
+    distances: Sequence[float],
+    factors: Sequence[float],
+) -> xr.Dataset:
+    shape = len(names), len(distances), len(factors)
+    dims = ("contour", "distance", "noise_factor")
+    length = {"units": "1" if task.plan.rod is None or task.plan.rod.is_dimensionless else "m"}
+
+    def values(name: str) -> Any:
+        return np.array([outcomes[k].numbers.get(name, math.nan) for k in range(len(task.cells))]).reshape(shape)
+
+    variables: dict[str, Any] = {}
+    for name in (*_OF_METHODS, *_SHARES_OF_METHODS):
+        stacked = np.stack([values(f"{method}_{name}") for method in METHODS], axis=-1)
+        variables[name] = ((*dims, "reconstruction"), stacked, {"units": "1"} if name in _SHARES_OF_METHODS else length)
+    for name in _LENGTHS:
+        variables[name] = (dims, values(name), length)
+    for name in _SHARES:
+        variables[name] = (dims, values(name), {"units": "1"})
+    messages = np.array([outcomes[k].message for k in range(len(task.cells))]).reshape(shape)
+    cell = task.plan.cell
+    return xr.Dataset(
+        variables | {"message": (dims, messages)},
+        coords={
+            "contour": list(names),
+            "distance": ("distance", np.asarray(distances, dtype=float), {"units": "rod lengths"}),
+            "noise_factor": np.asarray(factors, dtype=float),
+            "force_noise": ("noise_factor", np.asarray(factors, dtype=float) * cell.force_noise),
+            "moment_noise": ("noise_factor", np.asarray(factors, dtype=float) * cell.moment_noise),
+            "reconstruction": list(METHODS),
+        },
+        attrs={"replicates": task.replicates, "probability": task.probability, "seed": task.seed},
+    )
+
+
+def _encode(outcome: CellOutcome) -> dict[str, Any]:
+    numbers = {name: value if math.isfinite(value) else None for name, value in outcome.numbers.items()}
+    return {"numbers": numbers, "message": outcome.message}
+
+
+def _decode(row: dict[str, Any]) -> CellOutcome:
+    numbers = {name: math.nan if value is None else float(value) for name, value in row["numbers"].items()}
+    return CellOutcome(numbers, str(row["message"]))
+
+
+CELLS = Kind("cells", StudyError, _encode, _decode)

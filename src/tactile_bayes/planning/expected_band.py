@@ -1,0 +1,80 @@
+"""The band of a contour that is to be expected, to first order."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.differences import central_slopes
+from tactile_bayes.scanning import Scan
+
+__all__ = ["Stretch", "deviation_of_heights", "height_slopes", "stretches"]
+
+Floats = NDArray[np.float64]
+
+_STEP = 1e-5
+_PLACES = 25
+"""In every stretch."""
+
+
+class Stretch(NamedTuple):
+    """Places of one kind along x."""
+
+    name: str
+    """"touched", or "gap"."""
+    begin: float
+    end: float
+    x: Floats
+    """Evenly between the two, in a gap without them."""
+
+
+def stretches(scan: Scan) -> list[Stretch]:
+    """Where a contour is touched by the sweeps, and the gaps between: evenly in x, in its order."""
+    arcs = sorted(sorted((sweep.first_contact.contact_x, sweep.snap_off.contact_x)) for sweep in scan.sweeps)
+    merged = [list(arcs[0])]
+    for begin, end in arcs[1:]:
+        if begin <= merged[-1][1]:
+            merged[-1][1] = max(merged[-1][1], end)
+        else:
+            merged.append([begin, end])
+    found = []
+    for k, (begin, end) in enumerate(merged):
+        found.append(Stretch("touched", begin, end, np.linspace(begin, end, _PLACES)))
+        if k + 1 < len(merged):
+            onward = merged[k + 1][0]
+            found.append(Stretch("gap", end, onward, np.linspace(end, onward, _PLACES + 2)[1:-1]))
+    return found
+
+
+def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
+    """Derivatives of the contour's heights at x by all parameters, shape (x, d)."""
+    own = len(model.family.parameters)
+
+    def heights(points: Floats) -> Floats:
+        contours = model.family.build(*points.T)
+        every = np.arange(len(points))[:, None]
+        return np.asarray(np.broadcast_to(contours.take(every).height(x), (len(points), x.size)))
+
+    slopes = np.zeros((x.size, point.size))
+    scale = np.maximum(np.abs(point[:own]), 1e-3 * model.likelihood.rod.length)
+    slopes[:, :own] = central_slopes(heights, point[:own], _STEP * scale)
+    return slopes
+
+
+def deviation_of_heights(slopes: Floats, precision: Floats) -> Floats:
+    """Standard deviation of each height, given the precision (information) of the parameters, shape (x,).
+
+    Infinite where nothing is known of what a height depends on.
+    """
+    scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
+    scaled = precision / np.outer(scale, scale)
+    try:
+        root = np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        return np.full(len(slopes), np.inf)
+    half = solve_triangular(root, (slopes / scale).T, lower=True)
+    return np.asarray(np.sqrt(np.sum(half**2, axis=0)))

@@ -1,0 +1,153 @@
+"""A plan: which contour is swept how, and measured by what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import contour_priors
+from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.likelihood import FINE_ORDER
+from tactile_bayes.inference.noise import noise_of
+from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.planning.family_parameters import family_parameters
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.rod import Rod
+from tactile_bayes.scanning import Scan, scan
+
+__all__ = ["Plan", "usual_load_cell"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A contour, how it is swept, what measures it, and what is not known of the rig.
+
+    Parameters
+    ----------
+    contour : Contour
+    load_cell : LoadCell, optional
+        In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
+    rod : Rod, optional
+        By default the dimensionless rod.
+    base, direction, drive_step, drive_angles, friction
+        As in `scan`.
+    nuisances, priors
+        As in `infer_contour`; priors of the contour's parameters may be given, too.
+
+    Raises
+    ------
+    ParameterError
+        If a channel has no noise, or none that has a variance, or an argument is none that is offered.
+    """
+
+    contour: Contour
+    load_cell: LoadCell | None = None
+    rod: Rod | None = None
+    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0)
+    direction: Literal["both", "forward", "backward"] = "both"
+    drive_step: float = float(np.radians(1.0))
+    drive_angles: ArrayLike | None = None
+    friction: float = 0.0
+    nuisances: Sequence[str] = STANDARD
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.rod is not None and not isinstance(self.rod, Rod):
+            raise ParameterError(f"rod is {self.rod!r}: give a Rod, or None")
+        if self.load_cell is not None and not isinstance(self.load_cell, LoadCell):
+            raise ParameterError(f"load_cell is {self.load_cell!r}: give a LoadCell, or None")
+        if isinstance(self.nuisances, str):
+            raise ParameterError(f"nuisances is {self.nuisances!r}: give a list of names, like [{self.nuisances!r}]")
+        deviations = self.cell.standard_deviations
+        silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]
+        if silent:
+            raise ParameterError(
+                f"the load cell states no finite noise of {', '.join(silent)}: without it nothing can be said of "
+                "errors; give LoadCell(force_noise=..., moment_noise=...), from its data sheet, or from_zero_load"
+            )
+
+    @property
+    def taken_rod(self) -> Rod:
+        return self.rod or Rod()
+
+    @cached_property
+    def cell(self) -> LoadCell:
+        return self.load_cell or usual_load_cell(self.taken_rod)
+
+    @cached_property
+    def scan(self) -> Scan:
+        """The sweeps, without errors."""
+        return scan(
+            self.contour,
+            direction=self.direction,
+            base=self.base,
+            drive_step=self.drive_step,
+            drive_angles=self.drive_angles,
+            rod=self.rod,
+            friction=self.friction,
+        )
+
+    @cached_property
+    def record(self) -> xr.Dataset:
+        """What the load cell would read without errors that are drawn."""
+        certain = replace(
+            LoadCell(),
+            **{name: getattr(self.cell, name) for name in ("bias", "gain", "drive_angle_offset", "frame")},
+        )
+        return certain.measure(self.scan.record, seed=0)
+
+    @cached_property
+    def family(self) -> str:
+        return family_parameters(self.contour)[0]
+
+    @cached_property
+    def model(self) -> ContourModel:
+        """Of the contour's own family, and to full accuracy."""
+        family = family_named(self.family)
+        noise = noise_of(self.record, self.cell)
+        rig = nuisances_of(self.record, self.nuisances, self.priors, noise.cell, self.friction)
+        priors = {**contour_priors(self.record, family), **rig.priors, **noise.priors}
+        for name, prior in self.priors.items():
+            refuse_no_prior(name, prior)
+        strangers = sorted(set(self.priors) - set(priors))
+        if strangers:
+            raise ParameterError(
+                f"there is a prior of {', '.join(strangers)}, which is no parameter: there are {', '.join(priors)}"
+            )
+        model = ContourModel(self.record, family, rig, noise, {**priors, **self.priors})
+        model.likelihood.order = FINE_ORDER
+        return model
+
+    @cached_property
+    def point(self) -> Floats:
+        """The model's parameters, the rig as stated."""
+        own = family_parameters(self.contour)[1]
+        as_stated = {name: 1.0 for name in self.model.names if name.endswith(("_scale", "_gain"))}
+        return np.array([own.get(name, as_stated.get(name, 0.0)) for name in self.model.names])
+
+    def with_noise(self, factor: float) -> Plan:
+        """The same with the load cell's noise larger by a factor, and nothing else of it."""
+        noisier = replace(
+            self.cell,
+            force_noise=factor * self.cell.force_noise,
+            moment_noise=factor * self.cell.moment_noise,
+        )
+        return replace(self, load_cell=noisier)
+
+
+def usual_load_cell(rod: Rod) -> LoadCell:
+    """Noise of 0.05 EI/L² and 0.02 EI/L, in the units of a rod."""
+    return LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)

@@ -1,0 +1,212 @@
+"""How good the load cell has to be for a band of some width, and which rod a load cell wants."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.optimize import brentq
+
+from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
+from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes, stretches
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.record_information import prior_precision, record_information
+from tactile_bayes.rod import Rod
+
+__all__ = ["Where", "required_noise", "required_rod"]
+
+Floats = NDArray[np.float64]
+Where = Literal["gap", "touched", "everywhere"]
+
+_LEAST, _MOST = 1e-6, 1e4
+"""Factors on the noise between which the one that is wanted is sought."""
+
+
+class _Band:
+    """The expected width of a plan's band, as a function of a factor on its noise."""
+
+    def __init__(self, plan: Plan, x: Floats, probability: float) -> None:
+        model, point = plan.model, plan.point
+        self._slopes = height_slopes(model, point, x)
+        self._told = record_information(model, point).matrix
+        self._prior = np.diag(prior_precision(model))
+        self._wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
+
+    def width(self, factor: float) -> float:
+        """Mean over places."""
+        spread = deviation_of_heights(self._slopes, self._told / factor**2 + self._prior)
+        return self._wide * float(spread.mean())
+
+
+def required_noise(
+    plan: Plan, band_width: float | Sequence[float], *, where: Where = "everywhere", probability: float = 0.95
+) -> xr.Dataset:
+    """Noise of the load cell at which the expected band is as narrow as is wanted.
+
+    Force and moment keep the proportion that the plan's load cell has, and all else about it stays.
+
+    Parameters
+    ----------
+    plan : Plan
+    band_width : float or sequence of float
+        Mean width of the pointwise band [length].
+    where : {"everywhere", "gap", "touched"}
+    probability : float
+        Of the band.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "band_width": noise_factor, over what the plan's load cell has; force_noise and moment_noise [N, N m, or
+        EI/L², EI/L]; infinite where the priors alone give such a band. Numbers: present_width, of the plan as it is,
+        and prior_width, without any record.
+
+    Raises
+    ------
+    ParameterError
+        If a width is not positive, or no noise is small enough for it.
+    """
+    wanted = np.atleast_1d(np.asarray(band_width, dtype=float))
+    if wanted.ndim != 1 or not np.all(np.isfinite(wanted) & (wanted > 0.0)):
+        raise ParameterError(f"band_width is {band_width!r}: give a positive length, or several")
+    band = _Band(plan, _places(plan, where), probability)
+    least, most = band.width(_LEAST), band.width(_MOST)
+    if np.any(wanted <= least):
+        raise ParameterError(
+            f"a band of {wanted.min():g} cannot be had with any noise: without noise at all it would be {least:.3g} "
+            "wide, by what is not known of the rig; give tighter priors, or leave out nuisances"
+        )
+    factors = [
+        math.inf
+        if width >= most
+        else math.exp(
+            brentq(lambda log, width=width: band.width(math.exp(log)) - width, math.log(_LEAST), math.log(_MOST))
+        )
+        for width in wanted
+    ]
+    unit = {"units": "1" if plan.record.attrs["units"] == "dimensionless" else "m"}
+    si = plan.record.attrs["units"] != "dimensionless"
+    cell = plan.cell
+    return xr.Dataset(
+        {
+            "noise_factor": ("band_width", np.array(factors)),
+            "force_noise": (
+                "band_width",
+                np.array(factors) * cell.force_noise,
+                {"units": "N" if si else "EI/L²"},
+            ),
+            "moment_noise": (
+                "band_width",
+                np.array(factors) * cell.moment_noise,
+                {"units": "N m" if si else "EI/L"},
+            ),
+            "present_width": ((), band.width(1.0), unit),
+            "prior_width": ((), most, unit),
+        },
+        coords={"band_width": ("band_width", wanted, unit)},
+        attrs={"where": where, "probability": probability},
+    )
+
+
+def required_rod(
+    plan: Plan,
+    *,
+    lengths: Sequence[float],
+    diameters: Sequence[float],
+    youngs_modulus: float,
+    elastic_strain: float,
+    where: Where = "everywhere",
+    probability: float = 0.95,
+) -> xr.Dataset:
+    """Which rod a load cell wants: the expected band of every length and diameter, and whether the rod bears it.
+
+    A thicker rod makes larger loads, which drown in less noise, and is bent closer to its elastic limit. The object and
+    the pivot stay where they are.
+
+    Parameters
+    ----------
+    plan : Plan
+        In SI units, with a load cell; its rod is one to compare with.
+    lengths, diameters : sequence of float
+        Of rods of solid circular cross-section [m].
+    youngs_modulus : float
+        [Pa].
+    elastic_strain : float
+        Bending strain that the material takes without staying bent: about 0.005 for spring steel, 0.05 for nitinol.
+    where, probability
+        As in `required_noise`.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "length" and "diameter" [m]: width, the mean width of the expected band where the plan's own rod touches,
+        or leaves a gap [m]; strain, the largest on the way to the snap-offs; status, "ok", "bent too far", "does not
+        reach" or "cannot be swept". Numbers: best_length, best_diameter and best_width of the rod with the narrowest
+        band that is "ok"; NaN where none is.
+
+    Raises
+    ------
+    ParameterError
+        If the plan is not in SI units or states no load cell, or a length, a diameter, the modulus or the strain is not
+        positive.
+    """
+    if plan.rod is None or plan.rod.is_dimensionless or plan.load_cell is None:
+        raise ParameterError(
+            "a rod is sought for a load cell in N and N m: give a plan with a rod in SI, and a load_cell"
+        )
+    x = _places(plan, where)
+    sides = {"length": np.atleast_1d(lengths), "diameter": np.atleast_1d(diameters)}
+    for name, values in sides.items():
+        if values.ndim != 1 or not values.size or not np.all(np.isfinite(values) & (values > 0.0)):
+            raise ParameterError(f"{name}s are {values!r}: give a list of positive numbers [m]")
+    shape = (sides["length"].size, sides["diameter"].size)
+    width, strain = np.full(shape, np.nan), np.full(shape, np.nan)
+    status = np.full(shape, "does not reach", dtype="U16")
+    for i, length in enumerate(sides["length"]):
+        for j, diameter in enumerate(sides["diameter"]):
+            rod = Rod.circular(float(length), float(diameter), youngs_modulus, elastic_strain)
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", StrainWarning)
+                    tried = replace(plan, rod=rod)
+                    strain[i, j] = max(sweep.largest_strain for sweep in tried.scan.sweeps)
+                    width[i, j] = _Band(tried, x, probability).width(1.0)
+            except ReachError:
+                continue
+            except (ContourError, ParameterError):
+                status[i, j] = "cannot be swept"
+                continue
+            status[i, j] = "ok" if strain[i, j] <= elastic_strain else "bent too far"
+    usable = np.where(status == "ok", width, np.inf)
+    best = np.unravel_index(int(np.argmin(usable)), shape)
+    found = bool(np.isfinite(usable[best]))
+    metres = {"units": "m"}
+    return xr.Dataset(
+        {
+            "width": (("length", "diameter"), width, metres),
+            "strain": (("length", "diameter"), strain),
+            "status": (("length", "diameter"), status),
+            "best_length": ((), sides["length"][best[0]] if found else np.nan, metres),
+            "best_diameter": ((), sides["diameter"][best[1]] if found else np.nan, metres),
+            "best_width": ((), width[best] if found else np.nan, metres),
+        },
+        coords={name: (name, values, metres) for name, values in sides.items()},
+        attrs={"where": where, "probability": probability, "elastic_strain": elastic_strain},
+    )
+
+
+def _places(plan: Plan, where: Where) -> Floats:
+    """Values of x."""
+    places = [stretch.x for stretch in stretches(plan.scan) if where in ("everywhere", stretch.name)]
+    if not places:
+        if where in ("gap", "touched"):
+            raise ParameterError("the sweeps leave no gap: ask for the band where the contour is touched")
+        raise ParameterError(f"where is {where!r}: choose 'everywhere', 'gap' or 'touched'")
+    return np.concatenate(places)

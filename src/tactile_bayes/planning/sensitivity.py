@@ -1,0 +1,146 @@
+"""How good a load cell must be: everything that errors of the sensor do to a contour, in one answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from tactile_bayes.contours import Contour, paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.planning.amplification import amplification
+from tactile_bayes.planning.family_parameters import enlarged
+from tactile_bayes.planning.information import information
+from tactile_bayes.planning.noise_shares import noise_shares
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.requirement import required_noise
+from tactile_bayes.planning.sensitivity_words import sensitivity_in_words
+from tactile_bayes.rod import Rod
+
+__all__ = ["PARTS", "sensitivity"]
+
+PARTS = ("amplification", "information", "noise_shares", "required_noise")
+
+_WIDTHS = (0.0005, 0.001, 0.0025, 0.005, 0.01)
+"""Of bands that are asked for where none are given [rod lengths]."""
+
+
+def sensitivity(
+    contour: Contour | None = None,
+    *,
+    seed: int,
+    load_cell: LoadCell | None = None,
+    rod: Rod | None = None,
+    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
+    direction: Literal["both", "forward", "backward"] = "both",
+    drive_step: float = float(np.radians(1.0)),
+    drive_angles: ArrayLike | None = None,
+    friction: float = 0.0,
+    nuisances: Sequence[str] = STANDARD,
+    priors: Mapping[str, Prior] | None = None,
+    band_widths: Sequence[float] | None = None,
+    probability: float = 0.95,
+    samples: int = 1024,
+    parts: Sequence[str] = PARTS,
+) -> xr.DataTree:
+    """What errors of the sensor do to contact points and to a contour, and how small they have to be.
+
+    Parameters
+    ----------
+    contour : Contour, optional
+        Of a family with parameters, in the unit of the rod's length; by default profile II of Merker et al. 2018 at the
+        distance 0.5 rod lengths.
+    seed : int
+        Of the noise by which Sobol' indices are estimated.
+    load_cell : LoadCell, optional
+        In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
+    rod, base, direction, drive_step, drive_angles, friction
+        As in `scan`.
+    nuisances, priors
+        As in `infer_contour`.
+    band_widths : sequence of float, optional
+        Mean widths of bands for which the noise is sought [length]; by default 0.0005 to 0.01 rod lengths.
+    probability : float
+        Of the bands.
+    samples : int
+        For Sobol' indices, a power of two.
+    parts : sequence of str
+        Which of the groups are made.
+
+    Returns
+    -------
+    xr.DataTree
+        With the groups
+
+        amplification
+            Errors of single contacts by errors of each reading along the sweep, to first order: see
+            `tactile_bayes.planning.amplification.amplification`.
+        information
+            Bounds on every parameter and on the contour, and which readings they come from: see
+            `tactile_bayes.planning.information.information`.
+        noise_shares
+            Sobol' indices: whose noise it is, also where first order does not hold: see
+            `tactile_bayes.planning.noise_shares.noise_shares`.
+        required_noise
+            Which noise a band of some width allows: see `tactile_bayes.planning.requirement.required_noise`.
+
+        Attribute words: what they say, in sentences.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is impossible, a channel has no noise, or the contour is of no family.
+    ReachError
+        If the rod does not reach the contour.
+
+    Examples
+    --------
+    >>> found = sensitivity(seed=1, parts=["information", "required_noise"])
+    >>> found["information"].bound.sel(parameter="a").item().__round__(4)
+    0.001
+    """
+    unknown = [part for part in parts if part not in PARTS]
+    if isinstance(parts, str) or unknown or not parts:
+        raise ParameterError(f"parts is {parts!r}: give a list of some of {', '.join(PARTS)}")
+    taken = rod or Rod()
+    if contour is None:
+        contour = enlarged(paper_profile("II", q=0.5), taken.length)
+    plan = Plan(
+        contour,
+        load_cell=load_cell,
+        rod=rod,
+        base=base,
+        direction=direction,
+        drive_step=drive_step,
+        drive_angles=drive_angles,
+        friction=friction,
+        nuisances=tuple(nuisances) if not isinstance(nuisances, str) else nuisances,
+        priors=dict(priors or {}),
+    )
+    groups: dict[str, xr.Dataset] = {}
+    if "amplification" in parts:
+        groups["amplification"] = amplification(plan)
+    if "information" in parts:
+        groups["information"] = information(plan, probability=probability)
+    if "noise_shares" in parts:
+        groups["noise_shares"] = noise_shares(plan, seed=seed, samples=samples)
+    if "required_noise" in parts:
+        widths = band_widths if band_widths is not None else [width * taken.length for width in _WIDTHS]
+        groups["required_noise"] = required_noise(plan, widths, probability=probability)
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = {
+        "contour": repr(contour),
+        "units": plan.record.attrs["units"],
+        "rod_length": taken.length,
+        "rod_flexural_rigidity": taken.flexural_rigidity,
+        "force_noise": plan.cell.force_noise,
+        "moment_noise": plan.cell.moment_noise,
+        "words": "\n".join(sensitivity_in_words(tree, plan)),
+    }
+    return tree

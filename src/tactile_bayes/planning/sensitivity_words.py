@@ -1,0 +1,110 @@
+"""What a sensitivity analysis says, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.planning.plan import Plan
+
+__all__ = ["sensitivity_in_words"]
+
+Floats = NDArray[np.float64]
+
+_NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "force_y", "drive_angle": "the drive angle"}
+
+
+def sensitivity_in_words(tree: xr.DataTree, plan: Plan) -> tuple[str, ...]:
+    """One sentence for each thing that a user would ask."""
+    si = plan.record.attrs["units"] != "dimensionless"
+    return tuple(_sentences(tree, plan, si))
+
+
+def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
+    if "amplification" in tree:
+        grown = tree["amplification"].to_dataset()
+        for method in grown.reconstruction.values:
+            of = grown.sel(reconstruction=method)
+            ok, weight = of.holds.values, _spacing(of)
+            if not ok.any():
+                yield f"No {method} contact point is to be trusted to first order at this noise."
+                continue
+            along, across = (
+                _length(_median(of[name].values[ok], weight[ok]), si) for name in ("sd_along", "sd_across")
+            )
+            yield (
+                f"A {method} contact point is off by {along} along the contour and {across} across it (medians of "
+                f"standard deviations), where first order holds: over {weight[ok].sum() / weight.sum():.0%} of the sweep."
+            )
+        raw = grown.sel(reconstruction="raw")
+        powers = raw.growth_across.sel(event="first contact").values
+        known = powers[np.isfinite(powers)]
+        if known.size and known.min() < -0.3:
+            yield (
+                "Toward first contact the errors of raw contact points grow without bound, like the distance in drive "
+                f"angle to the power of {known.min():.1f}: loads vanish there."
+            )
+    if "noise_shares" in tree:
+        shares = tree["noise_shares"].to_dataset().sel(reconstruction="raw", error="across")
+        mean = shares.share.mean("sample", skipna=True)
+        if np.isfinite(mean.values).all():
+            largest = str(mean.source.values[int(np.argmax(mean.values))])
+            yield (
+                f"Across the contour the error of a raw contact point comes mostly from {_NAMES[largest]}: "
+                f"{float(mean.max()):.0%} of its variance on the mean over the sweep."
+            )
+    if "information" in tree:
+        told = tree["information"].to_dataset()
+        kinds = [("touched", "where it is touched"), ("gap", "in the gap")]
+        parts = [
+            f"{_length(float(told[f'{kind}_width']), si)} {words}"
+            for kind, words in kinds
+            if np.isfinite(float(told[f"{kind}_width"]))
+        ]
+        yield f"The {told.attrs['probability']:.0%} band of the contour is to be expected {' and '.join(parts)} wide."
+        lost = told.bound_without_channel.values / told.bound_with_priors.values
+        own = [i for i, name in enumerate(told.parameter.values) if str(name) != "noise_scale"]
+        worst = np.exp(np.log(lost[:, own]).mean(axis=1))
+        channel = str(told.channel.values[int(np.argmax(worst))])
+        yield (
+            f"Most is lost without {_NAMES[channel]}: bounds on the parameters would be {worst.max():.1f} times as "
+            "large, on the geometric mean."
+        )
+    if "required_noise" in tree:
+        needed = tree["required_noise"].to_dataset()
+        for width, force, moment in zip(
+            needed.band_width.values, needed.force_noise.values, needed.moment_noise.values, strict=True
+        ):
+            if np.isfinite(force):
+                yield f"A mean band of {_length(float(width), si)} needs {_noise(float(force), float(moment), si)}."
+            else:
+                yield f"A mean band of {_length(float(width), si)} is what the priors give without any record."
+
+
+def _spacing(grown: xr.Dataset) -> Floats:
+    """Of states in drive angle: they are close where a sweep begins and ends."""
+    spacing = np.empty(grown.sizes["sample"])
+    for sweep in np.unique(grown.sweep.values):
+        here = np.flatnonzero(grown.sweep.values == sweep)
+        angle = grown.drive_angle.values[here]
+        spacing[here] = np.abs(np.gradient(angle)) if here.size > 1 else 1.0
+    return spacing
+
+
+def _median(values: Floats, weights: Floats) -> float:
+    order = np.argsort(values)
+    share = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(share, 0.5 * share[-1])])
+
+
+def _length(value: float, si: bool) -> str:
+    return f"{1e3 * value:.3g} mm" if si else f"{value:.3g} L"
+
+
+def _noise(force: float, moment: float, si: bool) -> str:
+    if not si:
+        return f"{force:.2g} EI/L² of noise in the forces and {moment:.2g} EI/L in the moment"
+    return f"{1e3 * force:.2g} mN of noise in the forces and {1e3 * moment:.2g} mN m in the moment"
