@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.blank_record import blank_record
 from tactile_bayes.calibration.world import NUMBERS, World
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
@@ -24,7 +25,6 @@ from tactile_bayes.inference.likelihood import FINE_ORDER, bases_of
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, make_record
 from tactile_bayes.rod import Rod
 
 __all__ = ["Experiment"]
@@ -79,21 +79,8 @@ class Experiment:
     @cached_property
     def template(self) -> xr.Dataset:
         """The record without loads: its drive angles are those read where the encoder makes no error of its own."""
-        angles = np.sort(np.asarray(self.drive_angles, dtype=float))
-        parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
-        sweep = 0
-        for x, y in self.bases:
-            for direction in self.directions:
-                parts["sweep"].append(np.full(angles.size, sweep))
-                parts["direction"].append(np.full(angles.size, direction))
-                parts["base_x"].append(np.full(angles.size, x))
-                parts["base_y"].append(np.full(angles.size, y))
-                parts["drive_angle"].append(angles if direction == "forward" else angles[::-1])
-                sweep += 1
-        columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
-        columns["drive_angle"] = columns["drive_angle"] + self.load_cell.drive_angle_offset
-        loads = {name: np.zeros(columns["sweep"].size) for name in CHANNELS}
-        return make_record(columns | loads, rod=self.rod, load_cell_frame=self.load_cell.frame or "fixed")
+        angles = np.asarray(self.drive_angles, dtype=float)
+        return blank_record(self.bases, self.directions, angles, self.rod, self.load_cell)
 
     @cached_property
     def model(self) -> ContourModel:

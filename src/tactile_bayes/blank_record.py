@@ -1,0 +1,52 @@
+"""A record that is yet to be made: drive angles without loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, make_record
+from tactile_bayes.rod import Rod
+
+__all__ = ["blank_record"]
+
+
+def blank_record(
+    bases: Sequence[tuple[float, float]],
+    directions: Sequence[str],
+    drive_angles: NDArray[np.float64],
+    rod: Rod | None,
+    load_cell: LoadCell,
+) -> xr.Dataset:
+    """Every pivot in turn, swept in every direction; angles are those read where the encoder makes no error of its own.
+
+    Parameters
+    ----------
+    bases : sequence of (float, float)
+    directions : sequence of {"forward", "backward"}
+    drive_angles : ndarray, shape (n,)
+        Of the rod, in any order [rad].
+    rod : Rod, optional
+    load_cell : LoadCell
+        Its frame, and its encoder's offset.
+    """
+    angles = np.sort(drive_angles)
+    parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
+    sweep = 0
+    for x, y in bases:
+        for direction in directions:
+            parts["sweep"].append(np.full(angles.size, sweep))
+            parts["direction"].append(np.full(angles.size, direction))
+            parts["base_x"].append(np.full(angles.size, x))
+            parts["base_y"].append(np.full(angles.size, y))
+            parts["drive_angle"].append(angles if direction == "forward" else angles[::-1])
+            sweep += 1
+    columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
+    columns["drive_angle"] = columns["drive_angle"] + load_cell.drive_angle_offset
+    loads = {name: np.zeros(columns["sweep"].size) for name in CHANNELS}
+    return make_record(columns | loads, rod=rod, load_cell_frame=load_cell.frame or "fixed")
