@@ -81,12 +81,14 @@ def test_help_lists_the_commands():
         "infer",
         "compare",
         "calibrate",
+        "sensitivity",
+        "design",
         "demo",
         "dataset",
     ]
 
 
-@pytest.mark.parametrize("command", ["infer", "compare", "calibrate", "demo"])
+@pytest.mark.parametrize("command", ["infer", "compare", "calibrate", "sensitivity", "design", "demo"])
 def test_help_of_a_command_ends_with_an_example(command):
     result = call(command, "--help")
     assert result.exit_code == 0

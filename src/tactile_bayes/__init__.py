@@ -33,6 +33,7 @@ _HOMES = {
     "contact_moments": "uncertainty.contact_moments",
     "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
+    "design": "planning.design",
     "equilibria": "scanning",
     "error_map": "planning.error_map",
     "gap": "uncertainty.gap",
@@ -81,6 +82,7 @@ if TYPE_CHECKING:
     from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
     from tactile_bayes.load_cell import RandomWalk as RandomWalk
     from tactile_bayes.load_cell import zero_load as zero_load
+    from tactile_bayes.planning.design import design as design
     from tactile_bayes.planning.error_map import error_map as error_map
     from tactile_bayes.planning.plan import Plan as Plan
     from tactile_bayes.planning.requirement import required_noise as required_noise

@@ -11,6 +11,8 @@ from tactile_bayes.cli.analysis import demo, infer
 from tactile_bayes.cli.calibration import calibrate
 from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
+from tactile_bayes.cli.design import design
+from tactile_bayes.cli.sensitivity import sensitivity
 
 __all__ = ["app", "main"]
 
@@ -46,6 +48,8 @@ app = typer.Typer(
 app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")(infer)
 app.command(epilog="Example: tactile-bayes compare record.csv --out run/")(compare)
 app.command(epilog="Example: tactile-bayes calibrate --family parabola --replicates 200 --out calibration/")(calibrate)
+app.command(epilog="Example: tactile-bayes sensitivity --profile II --distance 0.5 --out sensitivity/")(sensitivity)
+app.command(epilog="Example: tactile-bayes design run/ --base 0.05,0 --base 0.1,0 --out design/")(design)
 app.command(epilog="Example: tactile-bayes demo --out results/demo")(demo)
 app.add_typer(dataset, name="dataset")
 

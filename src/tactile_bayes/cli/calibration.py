@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactile_bayes.cli.interrupts import going_on
+from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
     AsStated,
     Friction,
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from tactile_bayes.calibration.world import World
     from tactile_bayes.calibration_run import CalibrationRun
     from tactile_bayes.ledger import TaskProgress
-    from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.rod import Rod
 
 __all__ = ["calibrate"]
 
@@ -97,9 +96,9 @@ def calibrate(
             out,
             family=family,
             replicates=replicates,
-            load_cell=_load_cell(rod, force_noise, moment_noise),
+            load_cell=load_cell_asked(force_noise, moment_noise),
             rod=rod,
-            base=[_numbers(pivot, "--base", 2) for pivot in base or ["0,0"]],
+            base=[numbers_asked(pivot, "--base", 2) for pivot in base or ["0,0"]],
             drive_angles=np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
             friction=friction,
             nuisances=nuisances_asked(nuisance, as_stated),
@@ -113,17 +112,6 @@ def calibrate(
     _print_run(run)
 
 
-def _load_cell(rod: Rod | None, force_noise: float | None, moment_noise: float | None) -> LoadCell | None:
-    from tactile_bayes.errors import ParameterError
-    from tactile_bayes.load_cell import LoadCell
-
-    if force_noise is None and moment_noise is None:
-        return None
-    if not force_noise or not moment_noise:
-        raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
-    return LoadCell(force_noise=force_noise, moment_noise=moment_noise)
-
-
 def _world(options: Sequence[str]) -> World:
     from tactile_bayes.calibration.world import NUMBERS, World
     from tactile_bayes.errors import ParameterError
@@ -133,22 +121,9 @@ def _world(options: Sequence[str]) -> World:
         name, equals, value = (part.strip() for part in option.partition("="))
         if not equals or name not in NUMBERS:
             raise ParameterError(f"--world {option}: write NAME=VALUE, with one of {', '.join(NUMBERS)}")
-        numbers = _numbers(value, f"--world {name}", NUMBERS[name])
+        numbers = numbers_asked(value, f"--world {name}", NUMBERS[name])
         given[name] = numbers[0] if NUMBERS[name] == 1 else numbers
     return World(**given)
-
-
-def _numbers(text: str, option: str, count: int) -> tuple[float, ...]:
-    from tactile_bayes.errors import ParameterError
-
-    try:
-        numbers = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != count:
-        wanted = "a number" if count == 1 else f"{count} numbers with commas between them"
-        raise ParameterError(f"{option} is {text!r}: give {wanted}")
-    return numbers
 
 
 def _print_run(run: CalibrationRun) -> None:

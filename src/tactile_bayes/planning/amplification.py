@@ -28,6 +28,9 @@ _TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_phase")
 _NEAR = np.geomspace(1e-5, 0.5, 41)
 """Distances from first contact and from snap-off, over the sweep's length, where no drive angles are given."""
 
+_EVENLY = (np.arange(60) + 0.5) / 60
+"""And between."""
+
 _POWER_LAW = (1e-5, 1e-3)
 """Distances between which errors grow like a power of it, over the sweep's length."""
 
@@ -143,7 +146,7 @@ def _refined(plan: Plan) -> Plan:
     angles = []
     for sweep in plan.scan.sweeps:
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
-        angles += [first + (snap - first) * _NEAR, snap - (snap - first) * _NEAR]
+        angles += [first + (snap - first) * ways for ways in (_NEAR, 1.0 - _NEAR, _EVENLY)]
     return replace(plan, drive_angles=np.unique(np.concatenate(angles)))
 
 

@@ -24,7 +24,7 @@ from tactile_bayes.ledger import Kind, TaskProgress, keep_outcomes, open_ledger
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
-from tactile_bayes.planning.family_parameters import enlarged
+from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.rod import Rod
 
@@ -105,7 +105,8 @@ def error_map(
     Returns
     -------
     xr.Dataset
-        Over "contour", "distance" and "noise_factor", and where it is named over "reconstruction" ("raw", "constrained"):
+        Over "contour", "distance" and "noise_factor", and where it is named over "reconstruction" ("raw" and
+        "constrained"):
 
         rms_along, rms_across (…, reconstruction)
             Root mean square errors of contact points along and across the contour, of samples with the status "ok".
@@ -143,13 +144,7 @@ def error_map(
     """
     rod_taken = rod or Rod()
     objects = _objects(contours, rod_taken)
-    grids = {"distances": distances, "noise_factors": noise_factors}
-    for name, values in grids.items():
-        numbers = np.atleast_1d(np.asarray(values, dtype=float))
-        if numbers.ndim != 1 or not numbers.size or not np.all(np.isfinite(numbers) & (numbers > 0.0)):
-            raise ParameterError(f"{name} are {values!r}: give a list of positive numbers")
-        if np.unique(numbers).size != numbers.size:
-            raise ParameterError(f"{name} are {values!r}: one of them is given twice")
+    distances, noise_factors = _grid("distances", distances), _grid("noise_factors", noise_factors)
     counts = {"replicates": (replicates, 1), "posterior_cells": (posterior_cells, 0)}
     counts["posterior_replicates"] = posterior_replicates, 1
     for name, (count, least) in counts.items():
@@ -163,6 +158,8 @@ def error_map(
         MapCell(name, float(distance) * rod_taken.length, float(factor))
         for name, distance, factor in product(objects, distances, noise_factors)
     )
+    if isinstance(nuisances, str):
+        raise ParameterError(f"nuisances is {nuisances!r}: give a list of names, like [{nuisances!r}]")
     plan = Plan(
         next(iter(objects.values())),
         load_cell=load_cell,
@@ -190,11 +187,27 @@ def error_map(
     return _labelled(task, kept, list(objects), list(distances), list(noise_factors))
 
 
+def _grid(name: str, values: Sequence[float]) -> list[float]:
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.ndim != 1 or not numbers.size or not np.all(np.isfinite(numbers) & (numbers > 0.0)):
+        raise ParameterError(f"{name} are {values!r}: give a list of positive numbers")
+    if np.unique(numbers).size != numbers.size:
+        raise ParameterError(f"{name} are {values!r}: one of them is given twice")
+    return [float(number) for number in numbers]
+
+
 def _objects(contours: Mapping[str, Contour] | Sequence[str], rod: Rod) -> dict[str, Contour]:
     if isinstance(contours, str) or not contours:
         raise ParameterError(f"contours is {contours!r}: give names of the paper's profiles, or contours by name")
     if isinstance(contours, Mapping):
+        for contour in contours.values():
+            family_parameters(contour)  # or a refusal
         return dict(contours)
+    if len(set(contours)) < len(contours):
+        raise ParameterError(f"contours is {contours!r}: one of them is given twice")
     return {name: enlarged(paper_profile(name, q=0.5), rod.length) for name in contours}  # type: ignore[arg-type]
 
 
@@ -229,7 +242,8 @@ def _labelled(
 ) -> xr.Dataset:
     shape = len(names), len(distances), len(factors)
     dims = ("contour", "distance", "noise_factor")
-    length = {"units": "1" if task.plan.rod is None or task.plan.rod.is_dimensionless else "m"}
+    si = not task.plan.taken_rod.is_dimensionless
+    length = {"units": "m" if si else "1"}
 
     def values(name: str) -> Any:
         return np.array([outcomes[k].numbers.get(name, math.nan) for k in range(len(task.cells))]).reshape(shape)
@@ -250,8 +264,10 @@ def _labelled(
             "contour": list(names),
             "distance": ("distance", np.asarray(distances, dtype=float), {"units": "rod lengths"}),
             "noise_factor": np.asarray(factors, dtype=float),
-            "force_noise": ("noise_factor", np.asarray(factors, dtype=float) * cell.force_noise),
-            "moment_noise": ("noise_factor", np.asarray(factors, dtype=float) * cell.moment_noise),
+            **{
+                name: ("noise_factor", np.asarray(factors, dtype=float) * getattr(cell, name), {"units": unit})
+                for name, unit in (("force_noise", "N" if si else "EI/L²"), ("moment_noise", "N m" if si else "EI/L"))
+            },
             "reconstruction": list(METHODS),
         },
         attrs={"replicates": task.replicates, "probability": task.probability, "seed": task.seed},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -91,14 +92,14 @@ def noise_shares(
             seen.append(found)
             return np.nan_to_num(found).reshape(-1, drawn.shape[1])
 
-        found = stats.sobol_indices(func=errors, n=int(samples), dists=laws, rng=np.random.default_rng(seed))
+        found = first_and_total(errors, laws, int(samples), seed)
         every = np.concatenate(seen, axis=-1)
         missing = np.isnan(every)
         lost[m] = np.mean(missing[:, 0], axis=-1)
         with np.errstate(invalid="ignore"):
             rms[m] = np.sqrt(np.nansum(every**2, axis=-1) / (~missing).sum(axis=-1))
         answered = np.asarray(~np.any(missing, axis=-1))
-        for out, index in ((first, found.first_order), (total, found.total_order)):
+        for out, index in zip((first, total), found, strict=True):
             out[m] = np.where(answered[..., None], index.reshape(shape[1:]), np.nan)
     length = {"units": "1" if quiet.attrs["units"] == "dimensionless" else "m"}
     dims = ("reconstruction", "sample", "error")
@@ -124,6 +125,25 @@ def noise_shares(
         coords={"reconstruction": list(methods), "error": list(_ERRORS), "source": sources},
         attrs={"seed": int(seed), "samples": int(samples)},
     )
+
+
+def first_and_total(
+    function: Callable[[Floats], Floats], laws: Sequence[Any], samples: int, seed: int
+) -> tuple[Floats, Floats]:
+    """Sobol' indices of first order and total ones of a function's values, shape (values, laws) each.
+
+    Parameters
+    ----------
+    function : callable
+        From numbers (laws, n) to values (values, n).
+    laws : sequence of frozen scipy.stats distribution
+        Of independent numbers.
+    samples : int
+        A power of two.
+    seed : int
+    """
+    found = stats.sobol_indices(func=function, n=samples, dists=laws, rng=np.random.default_rng(seed))
+    return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)  # of one value SciPy gives one row
 
 
 def _law(plan: Plan, source: str, deviation: float) -> Any:

@@ -11,15 +11,27 @@ from numpy.typing import NDArray
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.differences import central_slopes
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["RecordInformation", "prior_precision", "record_information"]
+__all__ = ["ReadingSlopes", "RecordInformation", "prior_precision", "reading_slopes", "record_information"]
 
 Floats = NDArray[np.float64]
 
 _STEP = 1e-5
 """Of the differences, over the scale of each parameter."""
+
+
+class ReadingSlopes(NamedTuple):
+    """What a record would show, and how that changes, whatever the noise; dimensionless."""
+
+    loads: Floats
+    """Shape (samples, 3)."""
+    by_parameters: Floats
+    """Derivatives of the readings by the parameters of contour and rig, shape (samples, 3, parameters)."""
+    by_angle: Floats
+    """And by the drive angle, shape (samples, 3); zero where the encoder makes no errors."""
 
 
 class RecordInformation(NamedTuple):
@@ -37,8 +49,46 @@ class RecordInformation(NamedTuple):
         return np.asarray(flat.T @ flat + np.diag(self.of_noise))
 
 
+def reading_slopes(model: ContourModel, point: Floats, step: float = _STEP) -> ReadingSlopes:
+    """Derivatives of what a record would show, at a point of the model's parameters.
+
+    Parameters
+    ----------
+    model : ContourModel
+    point : ndarray, shape (d,)
+    step : float
+        Of differences, over the scale of each parameter; larger where loads are interpolated roughly.
+
+    Raises
+    ------
+    ReachError
+        If the rod does not reach the contour in every sweep.
+    """
+    cell, located = model.likelihood.load_cell, len(model.located)
+    if not model.likelihood.usable(model.contours(point[None]), model.rig(point[None]))[0]:
+        raise ReachError("the rod does not reach the contour in every sweep, or does not come free of it")
+    loads = model.loads(point[None])[0]
+    rough = np.where(cell.noise > 0.0, cell.noise, 1.0)
+
+    def readings(points: Floats) -> Floats:
+        whole = np.hstack([points, np.broadcast_to(point[located:], (len(points), point.size - located))])
+        return (cell.expected(model.loads(whole)) / rough).reshape(len(points), -1)
+
+    steps = step * parameter_scales(model, point)[:located]
+    # What cannot be less than it is, like no friction at all, is looked at one step further.
+    inside = np.clip(point[:located], model.low[:located] + steps, model.high[:located] - steps)
+    slopes = central_slopes(readings, inside, steps).reshape(len(loads), len(CHANNELS), located)
+    by_angle = _by_angle(model, point) if cell.drive_angle_deviation else np.zeros_like(loads)
+    return ReadingSlopes(loads, slopes * rough[:, None], by_angle)
+
+
 def record_information(
-    model: ContourModel, point: Floats, channels: NDArray[np.bool_] | None = None
+    model: ContourModel,
+    point: Floats,
+    channels: NDArray[np.bool_] | None = None,
+    *,
+    slopes: ReadingSlopes | None = None,
+    load_cell: LoadCell | None = None,
 ) -> RecordInformation:
     """Expected information at a point of the model's parameters.
 
@@ -52,30 +102,21 @@ def record_information(
     point : ndarray, shape (d,)
     channels : ndarray of bool, shape (3,), optional
         Those that are used, of those that were measured.
+    slopes : ReadingSlopes, optional
+        At this point, where they are known already.
+    load_cell : LoadCell, optional
+        Another than the model's, in its units, that differs in the noise of its channels alone.
 
     Raises
     ------
     ReachError
         If the rod does not reach the contour in every sweep.
     """
-    cell, located = model.likelihood.load_cell, len(model.located)
+    located = len(model.located)
+    cell = model.likelihood.load_cell if load_cell is None else load_cell.dimensionless(model.likelihood.rod)
     present = model.present if channels is None else model.present & channels
-    if not model.likelihood.usable(model.contours(point[None]), model.rig(point[None]))[0]:
-        raise ReachError("the rod does not reach the contour in every sweep, or does not come free of it")
-    loads = model.loads(point[None])[0]
-    rough = np.where(cell.noise > 0.0, cell.noise, 1.0)
-
-    def readings(points: Floats) -> Floats:
-        whole = np.hstack([points, np.broadcast_to(point[located:], (len(points), point.size - located))])
-        return (cell.expected(model.loads(whole)) / rough).reshape(len(points), -1)
-
-    scale = np.array([_scale(model, name, value) for name, value in zip(model.located, point[:located], strict=True)])
-    slopes = central_slopes(readings, point[:located], _STEP * scale).reshape(len(loads), len(CHANNELS), located)
-    slopes = slopes * rough[:, None]
-    by_angle = np.zeros_like(loads)
-    if cell.drive_angle_deviation:
-        by_angle = _by_angle(model, point)
-    white = whitening(cell, loads, by_angle, present)(slopes)
+    loads, by_parameters, by_angle = reading_slopes(model, point) if slopes is None else slopes
+    white = whitening(cell, loads, by_angle, present)(by_parameters)
     nu = cell.degrees_of_freedom
     if not math.isinf(nu):  # the covariance is wider than the scale by ν/(ν − 2)
         white = white * math.sqrt((nu + 1.0) / (nu + 3.0) * nu / (nu - 2.0))
@@ -96,11 +137,13 @@ def prior_precision(model: ContourModel) -> Floats:
     return np.where(np.isfinite(variance) & (variance > 0.0), 1.0 / np.where(variance > 0.0, variance, 1.0), 0.0)
 
 
-def _scale(model: ContourModel, name: str, value: float) -> float:
-    """On which a parameter varies: its own size, or the spread of its prior where that is smaller or it is zero."""
-    spread = float(model.priors[name].std())
-    sizes = [size for size in (abs(value), spread) if 0.0 < size < np.inf]
-    return min(sizes) if sizes else 1.0
+def parameter_scales(model: ContourModel, point: Floats) -> Floats:
+    """On which each parameter varies: its own size, or the spread of its prior where that is smaller or it is zero."""
+    scales = []
+    for name, value in zip(model.names, point, strict=True):
+        sizes = [size for size in (abs(float(value)), float(model.priors[name].std())) if 0.0 < size < np.inf]
+        scales.append(min(sizes) if sizes else 1.0)
+    return np.array(scales)
 
 
 def _by_angle(model: ContourModel, point: Floats) -> Floats:

@@ -17,13 +17,16 @@ from scipy.optimize import brentq
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
 from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.planning.record_information import prior_precision, record_information
+from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
 from tactile_bayes.rod import Rod
 
 __all__ = ["Where", "required_noise", "required_rod"]
 
 Floats = NDArray[np.float64]
 Where = Literal["gap", "touched", "everywhere"]
+
+_SEEN = 0.5
+"""Share of what the plan's own rod touches that another has to touch."""
 
 _LEAST, _MOST = 1e-6, 1e4
 """Factors on the noise between which the one that is wanted is sought."""
@@ -34,14 +37,17 @@ class _Band:
 
     def __init__(self, plan: Plan, x: Floats, probability: float) -> None:
         model, point = plan.model, plan.point
+        self._plan = plan
         self._slopes = height_slopes(model, point, x)
-        self._told = record_information(model, point).matrix
+        self._by = reading_slopes(model, point)
         self._prior = np.diag(prior_precision(model))
         self._wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
 
     def width(self, factor: float) -> float:
         """Mean over places."""
-        spread = deviation_of_heights(self._slopes, self._told / factor**2 + self._prior)
+        plan, cell = self._plan, self._plan.with_noise(factor).cell
+        told = record_information(plan.model, plan.point, slopes=self._by, load_cell=cell).matrix
+        spread = deviation_of_heights(self._slopes, told + self._prior)
         return self._wide * float(spread.mean())
 
 
@@ -111,7 +117,12 @@ def required_noise(
             "prior_width": ((), most, unit),
         },
         coords={"band_width": ("band_width", wanted, unit)},
-        attrs={"where": where, "probability": probability},
+        attrs={
+            "where": where,
+            "probability": probability,
+            "present_force_noise": cell.force_noise,
+            "present_moment_noise": cell.moment_noise,
+        },
     )
 
 
@@ -147,9 +158,10 @@ def required_rod(
     -------
     xr.Dataset
         Over "length" and "diameter" [m]: width, the mean width of the expected band where the plan's own rod touches,
-        or leaves a gap [m]; strain, the largest on the way to the snap-offs; status, "ok", "bent too far", "does not
-        reach" or "cannot be swept". Numbers: best_length, best_diameter and best_width of the rod with the narrowest
-        band that is "ok"; NaN where none is.
+        or leaves a gap [m]; strain, the largest on the way to the snap-offs; status, "ok", "bent too far", "touches
+        little" (less than half of what the plan's own rod does, gap included, so that the band is the family's affair
+        alone), "does not reach" or "cannot be swept". Numbers: best_length, best_diameter and best_width of the
+        rod with the narrowest band that is "ok"; NaN where none is.
 
     Raises
     ------
@@ -183,7 +195,10 @@ def required_rod(
             except (ContourError, ParameterError):
                 status[i, j] = "cannot be swept"
                 continue
-            status[i, j] = "ok" if strain[i, j] <= elastic_strain else "bent too far"
+            arcs = stretches(tried.scan)
+            seen = np.mean((x >= arcs[0].begin) & (x <= arcs[-1].end))
+            bears = strain[i, j] <= elastic_strain
+            status[i, j] = "bent too far" if not bears else "ok" if seen >= _SEEN else "touches little"
     usable = np.where(status == "ok", width, np.inf)
     best = np.unravel_index(int(np.argmin(usable)), shape)
     found = bool(np.isfinite(usable[best]))

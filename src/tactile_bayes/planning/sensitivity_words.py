@@ -37,7 +37,8 @@ def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
             )
             yield (
                 f"A {method} contact point is off by {along} along the contour and {across} across it (medians of "
-                f"standard deviations), where first order holds: over {weight[ok].sum() / weight.sum():.0%} of the sweep."
+                "standard deviations), where first order holds: over "
+                f"{weight[ok].sum() / weight.sum():.0%} of the sweep."
             )
         raw = grown.sel(reconstruction="raw")
         powers = raw.growth_across.sel(event="first contact").values
@@ -60,11 +61,11 @@ def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
         told = tree["information"].to_dataset()
         kinds = [("touched", "where it is touched"), ("gap", "in the gap")]
         parts = [
-            f"{_length(float(told[f'{kind}_width']), si)} {words}"
+            f"{_length(float(told[f'{kind}_width']), si)} wide {words}"
             for kind, words in kinds
             if np.isfinite(float(told[f"{kind}_width"]))
         ]
-        yield f"The {told.attrs['probability']:.0%} band of the contour is to be expected {' and '.join(parts)} wide."
+        yield f"The {told.attrs['probability']:.0%} band of the contour is to be expected {' and '.join(parts)}."
         lost = told.bound_without_channel.values / told.bound_with_priors.values
         own = [i for i, name in enumerate(told.parameter.values) if str(name) != "noise_scale"]
         worst = np.exp(np.log(lost[:, own]).mean(axis=1))

@@ -1,0 +1,205 @@
+"""A candidate for the next record: where to put the pivot, how fine to step, and what to expect of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.special import logsumexp
+
+from tactile_bayes.errors import ReachError
+from tactile_bayes.inference.contour_events import events_of
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.differences import central_slopes
+from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes
+from tactile_bayes.planning.knowledge import Base, Knowledge
+from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["Candidate", "Expected", "Question", "expected_of"]
+
+Floats = NDArray[np.float64]
+
+_ROUGH_STEP = 1e-3
+"""Of the differences by which loads are made linear, over the scale of each parameter: they are interpolated."""
+
+_COARSE = float(np.radians(5.0))
+"""Step of a drive of which only the events are asked."""
+
+_DEGREES_OF_FREEDOM = 8
+_WIDENING = 1.2
+"""Of the t distribution from which nested draws come, over that of Laplace's approximation."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Where and how the next record is made."""
+
+    base: Base
+    drive_step: float
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked of every candidate."""
+
+    known: Knowledge
+    x: Floats
+    """Places at which the band matters [length]."""
+    probability: float
+    """Of the pointwise band."""
+    nested: int
+    """Draws of each nested posterior; 0 for Laplace's approximation alone."""
+    seed: int
+
+
+class Expected(NamedTuple):
+    """What is to be expected of a candidate: means over draws of what is known, each with its standard error."""
+
+    width: tuple[float, float]
+    gap: tuple[float, float]
+    information: tuple[float, float]
+    """In nats."""
+    reached: float
+    """Share of the draws that the rod reaches."""
+    nested_width: tuple[float, float]
+    nested_information: tuple[float, float]
+    nested_draws: float
+    """Effective draws of the nested posteriors, the median."""
+
+
+def expected_of(task: tuple[Question, Candidate]) -> Expected:
+    """Of one candidate."""
+    question, candidate = task
+    known = question.known
+    model = known.model(known.blank([candidate.base], candidate.drive_step))
+    wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * question.probability))
+    usable = model.likelihood.usable(model.contours(known.points), model.rig(known.points))
+    rows: dict[str, list[float]] = {
+        name: [] for name in ("width", "information", "nested_width", "nested_information", "draws")
+    }
+    prior_logdet = _logdet(known.precision)
+    rng = np.random.default_rng([question.seed, *np.asarray([*candidate.base, candidate.drive_step]).view(np.uint32)])
+    for point, is_usable in zip(known.points, usable, strict=True):
+        slopes = height_slopes(model, point, question.x)
+        told = np.zeros_like(known.precision)
+        if is_usable:
+            try:
+                told = record_information(model, point, slopes=reading_slopes(model, point, _ROUGH_STEP)).matrix
+            except ReachError:
+                told = np.zeros_like(known.precision)
+        precision = known.precision + told
+        rows["width"].append(wide * float(deviation_of_heights(slopes, precision).mean()))
+        rows["information"].append(0.5 * (_logdet(precision) - prior_logdet))
+        if question.nested and is_usable:
+            found = _nested(question, model, point, precision, rng)
+            for name, value in zip(("nested_width", "nested_information", "draws"), found, strict=True):
+                rows[name].append(value)
+    gaps = _gaps(question, candidate, usable)
+    means = {name: _mean(np.array(values)) for name, values in rows.items()}
+    return Expected(
+        means["width"],
+        _mean(gaps),
+        means["information"],
+        float(usable.mean()),
+        means["nested_width"],
+        means["nested_information"],
+        float(np.median(rows["draws"])) if rows["draws"] else np.nan,
+    )
+
+
+def _nested(
+    question: Question, model: ContourModel, point: Floats, precision: Floats, rng: np.random.Generator
+) -> tuple[float, float, float]:
+    """Width of the band, information gained, and effective draws, of the posterior of one record of one truth.
+
+    By importance sampling from a t distribution about the mode of the record that Laplace's approximation foresees.
+    """
+    known = question.known
+    measured = _measured(model, point, rng)
+    after = known.model(measured)
+    steps = _ROUGH_STEP * parameter_scales(after, point)
+
+    def densities(points: Floats) -> Floats:
+        inside = ((points > after.low) & (points < after.high)).all(axis=1)
+        values = np.full((len(points), measured.sizes["sample"]), -np.inf)
+        values[inside] = after.likelihood.score(
+            *after.loads_with_errors(points[inside]), after.noise_scale(points[inside]), pointwise=True
+        )
+        return values
+
+    score = central_slopes(densities, point, steps).sum(axis=0)
+    middle = known.points.mean(axis=0)
+    covariance = np.linalg.inv(precision)
+    centre = point + covariance @ (score + known.precision @ (middle - point))
+    root = _WIDENING * np.linalg.cholesky(covariance)
+    law = stats.multivariate_t(centre, root @ root.T, _DEGREES_OF_FREEDOM)
+    points = law.rvs(question.nested, random_state=rng)
+    log_known = stats.multivariate_normal(middle, np.linalg.inv(known.precision)).logpdf(points)
+    log_weights = densities(points).sum(axis=1) + log_known - law.logpdf(points)
+    evidence = float(logsumexp(log_weights) - np.log(question.nested))
+    weights = np.exp(log_weights - logsumexp(log_weights))
+    likely = weights > 0.0
+    contours = model.family.build(*points[likely, : len(model.family.parameters)].T)
+    heights = np.asarray(contours.take(np.arange(contours.shape[0])[:, None]).height(question.x))
+    width = float(_band_widths(heights, weights[likely], question.probability).mean())
+    own = float(densities(point[None]).sum())
+    return width, own - evidence, float(1.0 / np.sum(weights**2))
+
+
+def _measured(model: ContourModel, point: Floats, rng: np.random.Generator) -> xr.Dataset:
+    """A record of one truth."""
+    loads = model.loads(point[None])[0]
+    rod = model.likelihood.rod
+    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    cell = model.likelihood.load_cell
+    readings = cell.simulate(loads, seed=rng, noise_scale=model.noise_scale(point[None])[0]) * units
+    blank = model.measured
+    return blank.assign({name: ("sample", readings[:, i], blank[name].attrs) for i, name in enumerate(CHANNELS)})
+
+
+def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats:
+    """Of central intervals at each place, from weighted draws, shape (places,)."""
+    order = np.argsort(heights, axis=0)
+    share = np.cumsum(weights[order], axis=0)
+    ends = []
+    for level in (0.5 - 0.5 * probability, 0.5 + 0.5 * probability):
+        row = np.minimum((share < level).sum(axis=0), len(heights) - 1)
+        ends.append(np.take_along_axis(heights, np.take_along_axis(order, row[None], axis=0), axis=0)[0])
+    return np.asarray(ends[1] - ends[0])
+
+
+def _gaps(question: Question, candidate: Candidate, usable: NDArray[np.bool_]) -> Floats:
+    """Width of what neither the sweeps so far nor the candidate's touch, between the outermost first contacts."""
+    known = question.known
+    model = known.model(known.blank([*known.bases, candidate.base], _COARSE))
+    points = known.points[usable]
+    if not len(points):
+        return np.array([np.nan])
+    found = events_of(model.likelihood, model.contours(points), model.rig(points), exact=False)
+    ends = np.sort(np.stack([found["first_contact_x"], found["snap_off_contact_x"]], axis=-1), axis=-1)
+    gaps = []
+    for of_draw in ends:
+        arcs = sorted(map(tuple, of_draw[np.isfinite(of_draw).all(axis=1)]))
+        reach, open_width = arcs[0][1], 0.0
+        for begin, end in arcs[1:]:
+            open_width += max(0.0, begin - reach)
+            reach = max(reach, end)
+        gaps.append(open_width)
+    return np.array(gaps)
+
+
+def _mean(values: Floats) -> tuple[float, float]:
+    """With its standard error."""
+    if not values.size:
+        return np.nan, np.nan
+    error = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else np.nan
+    return float(values.mean()), error
+
+
+def _logdet(precision: Floats) -> float:
+    return float(np.linalg.slogdet(precision)[1])

@@ -1,0 +1,247 @@
+"""Where to put the whisker, or its next base, and how fine to step the drive."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from itertools import product
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contour_events import events_of
+from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.ledger import TaskProgress
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
+from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes
+from tactile_bayes.planning.knowledge import Base, Knowledge, known_from_posterior, known_from_prior
+from tactile_bayes.rod import Rod
+from tactile_bayes.tasks import run_tasks
+
+__all__ = ["CRITERIA", "design"]
+
+Floats = NDArray[np.float64]
+
+Criterion = Literal["band", "gap", "information"]
+CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
+
+_PLACES = 25
+_ACROSS = np.linspace(-0.5, 0.5, 11)
+_NESTED = 400
+_COARSE = float(np.radians(5.0))
+
+
+def design(
+    known: xr.DataTree | str = "parabola",
+    *,
+    seed: int,
+    bases: Sequence[tuple[float, float]] | None = None,
+    drive_steps: Sequence[float] = (float(np.radians(2.0)),),
+    criterion: Criterion = "band",
+    nested: bool = False,
+    draws: int = 24,
+    span: tuple[float, float] | None = None,
+    probability: float = 0.95,
+    load_cell: LoadCell | None = None,
+    rod: Rod | None = None,
+    friction: float = 0.0,
+    nuisances: Sequence[str] = STANDARD,
+    priors: Mapping[str, Prior] | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    progress: Callable[[TaskProgress], object] | None = None,
+) -> xr.Dataset:
+    """What to expect of the next record from every place a pivot could have, and which is the best.
+
+    Objects are drawn from what is known; of each the information of the next record is added to what is known, and the
+    band that results is averaged. Every record is a forward and a backward sweep.
+
+    Parameters
+    ----------
+    known : xr.DataTree or str
+        What `infer_contour` made of the records so far, for the next base or a second whisker of the same kind; or the
+        name of a family, of which nothing but its prior is known.
+    seed : int
+    bases : sequence of (float, float), optional
+        Pivots to choose from [length]; by default eleven from half a rod's length to the left to half to the right, at
+        the height of the pivot so far.
+    drive_steps : sequence of float
+        Steps of the drive to choose from [rad].
+    criterion : {"band", "gap", "information"}
+        What the best is to have: the narrowest band, the smallest gap, or the most information.
+    nested : bool
+        Whether each candidate's posteriors are sampled, too, by nested Monte Carlo, which checks Laplace's
+        approximation, and counts what the snap-off tells.
+    draws : int
+        Objects that are drawn.
+    span : (float, float), optional
+        Between which x the band matters [length]; by default between the outermost first contacts of the sweeps so far,
+        or, of a prior, of sweeps from the origin; medians over the draws.
+    probability : float
+        Of the pointwise band.
+    load_cell, rod, friction, nuisances, priors
+        As in `infer_contour`, where a family is given; a posterior has its own.
+    workers, scheduler
+        As in `calibrate`; by default in this process.
+    progress : callable, optional
+        Is given a `TaskProgress` after each candidate.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "candidate", with base_x, base_y [length] and drive_step [rad]:
+
+        width, width_error
+            Mean width of the band over the span that is to be expected [length], and its standard error over draws.
+        gap, gap_error
+            Width of what no sweep touches, those so far included, between the outermost contacts [length].
+        information, information_error
+            Expected gain in information [nats].
+        reached
+            Share of the draws that the rod reaches from there.
+        nested_width, nested_width_error, nested_information, nested_information_error, nested_draws
+            The same by nested Monte Carlo, of the draws that are reached; NaN without. Effective draws are the median.
+
+        Numbers: present_width, of the band without a further record [length]; best, the index of the best candidate.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is impossible, or the contour is shape-free.
+    InferenceError
+        If the tree is no posterior of a contour.
+    ReachError
+        If the rod hardly ever reaches a contour of the prior.
+
+    Notes
+    -----
+    To first order, the precision of a posterior is what was known plus Fisher's information of the record (Laplace's
+    approximation); its mean over objects is that of the expected band, and half its logarithmic determinant over that
+    before is the expected information (Lindley 1956; Long et al. 2013, doi 10.1016/j.cma.2013.02.017). Nested Monte
+    Carlo draws a record of each object, and its posterior by importance sampling from a t distribution about the mode
+    (Ryan 2003; Beck et al. 2018, doi 10.1016/j.cma.2018.01.053).
+
+    Examples
+    --------
+    >>> from scipy import stats
+    >>> priors = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
+    >>> found = design("parabola", priors=priors, bases=[(0.0, 0.0), (0.0, -0.3)], draws=4, seed=1)
+    >>> bool(found.width[1] > found.width[0])  # farther away
+    True
+    """
+    if criterion not in CRITERIA:
+        raise ParameterError(f"criterion is {criterion!r}: choose {', '.join(CRITERIA)}")
+    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 2:
+        raise ParameterError(f"draws is {draws!r}: give a whole number from 2 up")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up")
+    if not 0.0 < probability < 1.0:
+        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    rng = np.random.default_rng([int(seed), 1])
+    if isinstance(known, str):
+        told = known_from_prior(
+            known,
+            draws=int(draws),
+            rng=rng,
+            load_cell=load_cell,
+            rod=rod,
+            friction=friction,
+            nuisances=nuisances,
+            priors=priors,
+            base=(0.0, 0.0),
+        )
+    else:
+        given = {"load_cell": load_cell, "rod": rod, "priors": priors}
+        taken = [name for name, value in given.items() if value is not None]
+        if taken:
+            raise ParameterError(f"{', '.join(taken)} and a posterior, which has its own: leave one of the two")
+        told = known_from_posterior(known, draws=int(draws), rng=rng)
+    steps = np.atleast_1d(np.asarray(drive_steps, dtype=float))
+    if steps.ndim != 1 or not steps.size or not np.all((steps > 0.0) & (steps <= 0.5)):
+        raise ParameterError(f"drive_steps are {drive_steps!r}: give positive angles in radians, at most 0.5")
+    candidates = [Candidate(base, float(step)) for base, step in product(_bases(bases, told), steps)]
+    x = np.linspace(*_span(span, told), _PLACES)
+    question = Question(told, x, float(probability), _NESTED if nested else 0, int(seed))
+    found: dict[Candidate, Expected] = {}
+    tasks = [(question, candidate) for candidate in candidates]
+    began = time.monotonic()
+    with closing(run_tasks(expected_of, tasks, workers=workers, scheduler=scheduler)) as results:
+        for made, ((_, candidate), expected) in enumerate(results, start=1):
+            found[candidate] = expected
+            if progress is not None:
+                progress(TaskProgress(made, len(tasks), made, time.monotonic() - began))
+    return _labelled(question, [(candidate, found[candidate]) for candidate in candidates], criterion)
+
+
+def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:
+    if bases is None:
+        x, y = told.bases[0] if told.bases else (0.0, 0.0)
+        return [(float(x + told.length * across), float(y)) for across in _ACROSS]
+    pivots = np.asarray(bases, dtype=float)
+    if pivots.ndim != 2 or pivots.shape[1] != 2 or not pivots.size or not np.all(np.isfinite(pivots)):
+        raise ParameterError(f"bases are {bases!r}: give a list of pivots, [(x, y), (x, y)]")
+    if len(np.unique(pivots, axis=0)) < len(pivots):
+        raise ParameterError("bases: one of them is given twice")
+    return [(float(x), float(y)) for x, y in pivots]
+
+
+def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, float]:
+    if span is not None:
+        ends = np.asarray(span, dtype=float)
+        if ends.shape != (2,) or not np.all(np.isfinite(ends)) or not ends[0] < ends[1]:
+            raise ParameterError(f"span is {span!r}: give two values of x, the smaller first")
+        return float(ends[0]), float(ends[1])
+    model = told.model(told.blank(told.bases or [(0.0, 0.0)], _COARSE))
+    events = events_of(model.likelihood, model.contours(told.points), model.rig(told.points), exact=False)
+    first = events["first_contact_x"]
+    return float(np.nanmedian(np.nanmin(first, axis=1))), float(np.nanmedian(np.nanmax(first, axis=1)))
+
+
+def _labelled(question: Question, rows: Sequence[tuple[Candidate, Expected]], criterion: Criterion) -> xr.Dataset:
+    known = question.known
+    metres = {"units": "1" if known.rod is None or known.rod.is_dimensionless else "m"}
+    expected = [row for _, row in rows]
+
+    def column(name: str, part: int, attrs: Mapping[str, Any]) -> tuple[str, Floats, Mapping[str, Any]]:
+        return "candidate", np.array([getattr(row, name)[part] for row in expected]), attrs
+
+    variables: dict[str, Any] = {
+        "base_x": ("candidate", np.array([candidate.base[0] for candidate, _ in rows]), metres),
+        "base_y": ("candidate", np.array([candidate.base[1] for candidate, _ in rows]), metres),
+        "drive_step": ("candidate", np.array([candidate.drive_step for candidate, _ in rows]), {"units": "rad"}),
+        "reached": ("candidate", np.array([row.reached for row in expected])),
+        "nested_draws": ("candidate", np.array([row.nested_draws for row in expected])),
+    }
+    for name, attrs in (
+        ("width", metres),
+        ("gap", metres),
+        ("information", {"units": "nat"}),
+        ("nested_width", metres),
+        ("nested_information", {"units": "nat"}),
+    ):
+        variables[name], variables[f"{name}_error"] = column(name, 0, attrs), column(name, 1, attrs)
+    wanted = {"band": "width", "gap": "gap", "information": "information"}[criterion]
+    values = variables[wanted][1]
+    order = -values if criterion == "information" else values
+    best = int(np.nanargmin(np.where(np.isfinite(order), order, np.inf)))
+    return xr.Dataset(
+        {**variables, "present_width": ((), _present_width(question), metres), "best": ((), best)},
+        coords={"x": ("x", question.x, metres)},
+        attrs={"criterion": criterion, "probability": question.probability, "family": known.family},
+    )
+
+
+def _present_width(question: Question) -> float:
+    """Of the band without a further record."""
+    known = question.known
+    model = known.model(known.blank(known.bases or [(0.0, 0.0)], _COARSE))
+    wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * question.probability))
+    slopes = [height_slopes(model, point, question.x) for point in known.points]
+    return wide * float(np.mean([deviation_of_heights(of, known.precision).mean() for of in slopes]))

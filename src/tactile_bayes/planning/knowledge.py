@@ -1,0 +1,180 @@
+"""What is known of a contour and a rig before the next record: a prior, or a posterior so far."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.blank_record import blank_record
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import contour_priors
+from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.noise import noise_of
+from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.planning.plan import usual_load_cell
+from tactile_bayes.record import rod_of
+from tactile_bayes.rod import Rod
+
+__all__ = ["Base", "Knowledge", "known_from_posterior", "known_from_prior"]
+
+Floats = NDArray[np.float64]
+
+Base = tuple[float, float]
+
+_COARSE = float(np.radians(5.0))
+"""Step of a drive of which only the events are asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """Points that may be the truth, and what sweeps from other pivots would show of them.
+
+    Attributes
+    ----------
+    family : str
+    points : ndarray, shape (n, d)
+        Draws of the contour's parameters, the rig's and the noise's, in the order of the names of `model`.
+    precision : ndarray, shape (d, d)
+        One over the covariance of what is known.
+    bases : tuple of (float, float)
+        From which the object was swept already.
+    """
+
+    family: str
+    points: Floats
+    precision: Floats
+    bases: tuple[Base, ...]
+    rod: Rod | None
+    load_cell: LoadCell
+    friction: float
+    nuisances: tuple[str, ...]
+    priors: Mapping[str, Prior]
+
+    @property
+    def length(self) -> float:
+        return 1.0 if self.rod is None else self.rod.length
+
+    def blank(self, bases: Sequence[Base], drive_step: float) -> xr.Dataset:
+        """A record from these pivots, each swept forward and backward, that is yet to be made."""
+        return blank_record(bases, ("forward", "backward"), _angles(drive_step), self.rod, self.load_cell)
+
+    def model(self, record: xr.Dataset) -> ContourModel:
+        """Of a record, blank or measured."""
+        family = family_named(self.family)
+        noise = noise_of(record, self.load_cell)
+        rig = nuisances_of(record, self.nuisances, self.priors, noise.cell, self.friction)
+        priors = {**contour_priors(record, family), **rig.priors, **noise.priors, **self.priors}
+        names = (*family.parameters, *rig.names, *noise.names)
+        return ContourModel(record, family, rig, noise, {name: priors[name] for name in names})
+
+
+def known_from_prior(
+    family: str,
+    *,
+    draws: int,
+    rng: np.random.Generator,
+    load_cell: LoadCell | None,
+    rod: Rod | None,
+    friction: float,
+    nuisances: Sequence[str],
+    priors: Mapping[str, Prior] | None,
+    base: Base,
+) -> Knowledge:
+    """Truths drawn from the prior, of those that the rod reaches from a pivot.
+
+    Raises
+    ------
+    ParameterError
+        If the family is shape-free, or a prior is of no parameter.
+    ReachError
+        If the rod hardly ever reaches a contour of the prior.
+    """
+    _refuse_shape_free(family)
+    cell = load_cell or usual_load_cell(rod or Rod())
+    empty = np.zeros((0, 0))
+    known = Knowledge(family, empty, empty, (), rod, cell, friction, tuple(nuisances), dict(priors or {}))
+    model = known.model(known.blank([base], _COARSE))
+    strangers = sorted(set(known.priors) - set(model.names))
+    if strangers:
+        raise ParameterError(
+            f"there is a prior of {', '.join(strangers)}, which is no parameter: there are {', '.join(model.names)}"
+        )
+    for name, prior in known.priors.items():
+        refuse_no_prior(name, prior)
+    points, _ = model.draw_prior(rng, draws)
+    many, _ = model.draw_prior(rng, 1000)
+    return replace(known, points=points, precision=_precision(many))
+
+
+def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.Generator) -> Knowledge:
+    """Draws of a posterior of `infer_contour`, with the rig, the load cell and the pivots that it is of.
+
+    Raises
+    ------
+    InferenceError
+        If the tree is none of a contour.
+    ParameterError
+        If the contour is shape-free.
+    """
+    attrs: dict[Any, Any] = posterior.attrs
+    if "family" not in attrs:
+        raise InferenceError("this is no posterior of a contour: give what infer_contour has returned")
+    _refuse_shape_free(str(attrs["family"]))
+    record = record_of(posterior)
+    samples = posterior_draws(posterior)
+    rod = None if attrs["units"] == "dimensionless" else rod_of(record)
+    cell = LoadCell.from_record(record) or LoadCell()
+    unknown: dict[str, Any] = {n: float(samples[n].mean()) for n in ("force_noise", "moment_noise") if n in samples}
+    cell = replace(cell, **unknown)
+    pairs = np.unique(np.column_stack([record.base_x.values, record.base_y.values]), axis=0)
+    names = [str(name) for name in samples.data_vars if name not in unknown]
+    columns = {name: samples[name].values.ravel() for name in names}
+    if unknown:
+        columns["noise_scale"] = np.ones(samples[next(iter(unknown))].size)
+    nuisances = [name for name in json.loads(attrs.get("nuisances", "[]")) if not name.startswith("base_")]
+    known = Knowledge(
+        str(attrs["family"]),
+        np.zeros((0, 0)),
+        np.zeros((0, 0)),
+        tuple((float(x), float(y)) for x, y in pairs),
+        rod,
+        cell,
+        float(attrs["friction"]),
+        tuple(nuisances),
+        {},
+    )
+    model = known.model(known.blank(known.bases, _COARSE))
+    every = np.stack([columns[name] for name in model.names], axis=1)
+    if unknown:  # a scale that does not vary has no precision of its own
+        every[:, -1] *= np.exp(0.05 * rng.standard_normal(len(every)))
+    chosen = rng.choice(len(every), min(draws, len(every)), replace=False)
+    return replace(known, points=every[chosen], precision=_precision(every))
+
+
+def _refuse_shape_free(family: str) -> None:
+    if isinstance(family_named(family), ShapeFreeFamily):
+        raise ParameterError(
+            "a design is for a family with parameters, like parabola or parabola/power-law; for a shape-free contour "
+            "take the family that comes nearest"
+        )
+
+
+def _precision(points: Floats) -> Floats:
+    scale = points.std(axis=0)
+    return np.asarray(np.linalg.inv(np.cov((points / scale).T)) / np.outer(scale, scale))
+
+
+def _angles(drive_step: float) -> Floats:
+    """From before any first contact to after any snap-off, where the object lies above the pivot."""
+    return np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)

@@ -1,0 +1,79 @@
+"""The command design, and the figure."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from tactile_bayes.cli.app import app
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting import design as draw
+
+ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--draws", "2", "--as-stated"]
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [*ASKED, "--workers", "1", *map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    out = tmp_path_factory.mktemp("design")
+    result = run("--out", out, "--quiet")
+    assert result.exit_code == 0, result.output
+    return result, out
+
+
+def test_it_says_where_and_writes_what_it_found(made):
+    result, out = made
+    assert result.stdout.startswith("Put the pivot at (")
+    assert sorted(path.name for path in out.iterdir()) == ["candidates.csv", "design.nc", "design.png", "words.txt"]
+    found = xr.load_dataset(out / "design.nc", engine="h5netcdf")
+    table = np.genfromtxt(out / "candidates.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(table["width"], found.width.values, rtol=1e-8)
+    np.testing.assert_allclose(table["base_x"], [0.0, 0.2])
+
+
+def test_json_for_scripts(tmp_path):
+    result = run("--out", tmp_path, "--json")
+    answer = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert len(answer["candidates"]) == 2
+    assert answer["candidates"][0]["nested_width"] is None
+    assert answer["words"][0].startswith("Put the pivot")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (["--base", "0"], "--base is '0': give 2 numbers"),
+        (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
+        (["--family", "square"], "there is no family 'square'"),
+        (["nowhere.nc"], "there is no file nowhere.nc"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
+    result = run("--out", tmp_path / "out", *wrong)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_figure_shows_the_numbers(made):
+    found = xr.load_dataset(made[1] / "design.nc", engine="h5netcdf")
+    ax = draw(found)
+    line = ax.containers[0].lines[0]
+    np.testing.assert_allclose(line.get_xdata(), found.base_x.values)
+    np.testing.assert_allclose(line.get_ydata(), found.width.values)
+    best = next(line for line in ax.lines if line.get_label() == "best")
+    assert best.get_xdata() == [found.base_x.values[int(found.best)]]
+
+
+def test_the_figure_of_something_else_is_refused():
+    with pytest.raises(ParameterError, match="this is no design"):
+        draw(xr.Dataset())

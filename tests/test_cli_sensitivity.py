@@ -1,0 +1,269 @@
+"""The command `sensitivity`, as a user calls it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import tactile_bayes as tb
+import tactile_bayes.planning.error_map as error_map_module
+from tactile_bayes import sensitivity_run
+from tactile_bayes.cli.app import app
+from tactile_bayes.contours import Joined, Parabola
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.planning.amplification import amplification
+from tactile_bayes.planning.error_cell import CellOutcome
+
+QUICK = ("--samples", "8", "--drive-step", "6", "-q")
+STUDY = ("--study", "--noise-factor", "0.3", "--noise-factor", "1", "--replicates", "1", "--workers", "1")
+
+FIGURES = {"amplification.png", "information.png", "noise_shares.png", "required_noise.png"}
+
+
+def call(*words):
+    return CliRunner().invoke(app, ["sensitivity", *map(str, words)])
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """An analysis with a study, and what was said of it."""
+    out = tmp_path_factory.mktemp("sensitivity") / "run"
+    result = call("--out", out, *STUDY, *QUICK)
+    assert result.exit_code == 0, result.output
+    return out, result.stdout
+
+
+@pytest.fixture(scope="module")
+def analysed():
+    return tb.sensitivity(seed=1, drive_step=float(np.radians(6.0)), samples=8)
+
+
+@pytest.fixture(scope="module")
+def short(analysed):
+    """What the command speaks of, without the rest."""
+    groups = {name: analysed[name].to_dataset() for name in ("information", "required_noise")}
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = analysed.attrs
+    return tree
+
+
+@pytest.fixture
+def asked(monkeypatch, short):
+    """What the library is asked for; it answers at once, and nothing is drawn."""
+    given = {}
+
+    def answer(**options):
+        given["sensitivity"] = options
+        return short
+
+    def cell(task):
+        given.setdefault("cells", []).append(task)
+        return CellOutcome({"constrained_rms_across": 0.01}, "ok")
+
+    monkeypatch.setattr(sensitivity_run, "sensitivity", answer)
+    monkeypatch.setattr(sensitivity_run, "_write_figure", lambda *arguments: None)
+    monkeypatch.setattr(error_map_module, "error_cell", cell)
+    return given
+
+
+# --- What it says ---------------------------------------------------------------------------------------------------
+
+
+def test_words_come_first_then_bounds_then_the_files(done, analysed):
+    out, said = done
+    words, table, files = said.split("\n\n")
+    assert words.splitlines() == (out / "words.txt").read_text(encoding="utf-8").splitlines()
+    assert words == analysed.attrs["words"]
+    rows = [line.split() for line in table.splitlines()]
+    assert rows[0] == ["parameter", "value", "known", "to", "±", "unit"]
+    told = analysed["information"].to_dataset()
+    assert [row[0] for row in rows[1:]] == list(told.parameter.values)
+    for row in rows[1:]:
+        of = told.sel(parameter=row[0])
+        assert row[1:3] == [f"{float(of.value):.3g}", f"{float(of.bound_with_priors):.3g}"]
+    assert rows[1 + list(told.parameter.values).index("drive_angle_offset")][-1] == "rad"
+    paths = dict(line.split(maxsplit=1) for line in files.splitlines())
+    parts = {name.removesuffix(".png") for name in FIGURES}
+    assert set(paths) == {"sensitivity", "words", "cells", "study", "errors"} | parts
+    assert all(path.startswith(str(out)) for path in paths.values())
+
+
+def test_files_are_written(done):
+    out, _ = done
+    assert {path.name for path in out.iterdir()} == {"sensitivity.nc", "words.txt", "study", *FIGURES}
+    assert {path.name for path in (out / "study").iterdir()} == {"cells.json", "study.nc", "study.png"}
+    for path in [*out.glob("*.png"), out / "study" / "study.png"]:
+        assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_files_hold_what_was_found(done, analysed):
+    out, _ = done
+    with xr.open_datatree(out / "sensitivity.nc", engine="h5netcdf") as kept:
+        assert kept.attrs["words"] == analysed.attrs["words"]
+        for name, group in analysed.children.items():
+            xr.testing.assert_allclose(kept[name].to_dataset(), group.to_dataset())
+    with xr.open_dataset(out / "study" / "study.nc", engine="h5netcdf") as study:
+        assert dict(study.sizes) == {"contour": 1, "distance": 1, "noise_factor": 2, "reconstruction": 2}
+        assert np.isfinite(study.rms_across.values).all()
+        assert study.attrs["replicates"] == 1
+
+
+def test_json_has_the_words_and_the_numbers(asked, analysed, tmp_path):
+    result = call("--out", tmp_path, "--json", *STUDY)
+    assert result.exit_code == 0, result.output
+    answer = json.loads(result.stdout)
+    assert answer["words"] == analysed.attrs["words"].splitlines()
+    told = analysed["information"].to_dataset()
+    assert answer["parameters"]["a"] == {
+        "value": 0.5,
+        "bound": float(told.bound.sel(parameter="a")),
+        "bound_with_priors": float(told.bound_with_priors.sel(parameter="a")),
+        "unit": "1",
+    }
+    assert answer["band"] == {
+        "touched": float(told.touched_width),
+        "gap": float(told.gap_width),
+        "probability": 0.95,
+    }
+    needed = analysed["required_noise"].to_dataset()
+    assert [row["force_noise"] for row in answer["required_noise"]] == list(needed.force_noise.values)
+    assert answer["files"]["words"] == str(tmp_path / "words.txt")
+    assert [cell["noise_factor"] for cell in answer["study"]] == [0.3, 1.0]
+    assert {cell["rms_across"] for cell in answer["study"]} == {0.01}
+    assert {cell["expected_gap_width"] for cell in answer["study"]} == {None}
+
+
+# --- What it asks for -----------------------------------------------------------------------------------------------
+
+
+def test_without_options_it_is_profile_ii_at_half_a_rod_length(asked, tmp_path):
+    assert call("--out", tmp_path).exit_code == 0
+    options = asked["sensitivity"]
+    assert options["contour"] == Parabola(0.5, 0.5)
+    assert (options["rod"], options["load_cell"], options["seed"], options["samples"]) == (None, None, 1, 1024)
+    assert options["base"] == [(0.0, 0.0)]
+    assert options["drive_step"] == pytest.approx(np.radians(1.0))
+    assert options["band_widths"] is None
+    assert list(options["nuisances"]) == list(STANDARD)
+    assert not (tmp_path / "study").exists()
+
+
+def test_profiles_are_scaled_to_the_rod(asked, tmp_path):
+    rod = ("--length", 0.2, "--flexural-rigidity", 1e-4, "--diameter", 5e-4)
+    assert call("--out", tmp_path, "--profile", "IV", "--distance", 0.4, *rod).exit_code == 0
+    options = asked["sensitivity"]
+    assert options["rod"] == tb.Rod(0.2, 1e-4, 5e-4)
+    assert isinstance(options["contour"], Joined)
+    assert float(options["contour"].height(0.0)) == pytest.approx(0.08)
+    assert float(options["contour"].height(0.2)) == pytest.approx(0.28)
+
+
+def test_options_arrive(asked, tmp_path):
+    cell = ("--force-noise", 0.1, "--moment-noise", 0.03, "--drive-angle-noise", 0.5)
+    rig = ("--base", "0.1,0", "--base", "0.2,0", "--friction", 0.2, "--as-stated", "--seed", 3)
+    assert call("--out", tmp_path, *cell, *rig, "--band-width", 0.01, "--band-width", 0.02).exit_code == 0
+    options = asked["sensitivity"]
+    assert options["load_cell"] == tb.LoadCell(
+        force_noise=0.1, moment_noise=0.03, drive_angle_noise=float(np.radians(0.5))
+    )
+    assert options["base"] == [(0.1, 0.0), (0.2, 0.0)]
+    assert (options["friction"], options["nuisances"], options["seed"]) == (0.2, [], 3)
+    assert options["band_widths"] == [0.01, 0.02]
+
+
+def test_noise_of_the_drive_angle_alone_goes_with_the_usual_load_cell(asked, tmp_path):
+    rod = ("--length", 0.1, "--flexural-rigidity", 1e-5)
+    assert call("--out", tmp_path, "--drive-angle-noise", 1, *rod).exit_code == 0
+    cell = asked["sensitivity"]["load_cell"]
+    assert cell.force_noise == pytest.approx(0.05e-3)
+    assert cell.moment_noise == pytest.approx(0.02e-4)
+    assert cell.drive_angle_noise == pytest.approx(np.radians(1.0))
+
+
+def test_the_study_is_of_the_profile_or_of_those_that_are_given(asked, tmp_path):
+    assert call("--out", tmp_path / "one", "--profile", "III", "--distance", 0.6, *STUDY).exit_code == 0
+    (study, _), *_ = asked["cells"]
+    assert [(cell.contour, cell.distance, cell.noise_factor) for cell in study.cells] == [
+        ("III", 0.6, 0.3),
+        ("III", 0.6, 1.0),
+    ]
+    assert study.replicates == 1
+    asked["cells"].clear()
+    more = ("--study-profile", "I", "--study-profile", "II", "--study-distance", 0.3, "--study-distance", 0.5)
+    assert call("--out", tmp_path / "more", *STUDY, *more, "--posterior-cells", 2).exit_code == 0
+    (study, _), *_ = asked["cells"]
+    assert len(study.cells) == 8
+    assert sorted(study.posteriors) == [0, 7]
+
+
+# --- Stopping and going on ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("stopped_at", "have"), [(1, "1 of 2 cells are in {}"), (0, "no further cell was done")])
+def test_control_c_says_how_to_go_on_and_the_same_command_does(asked, monkeypatch, tmp_path, stopped_at, have):
+    whole = error_map_module.error_cell
+
+    def interrupted(task):
+        if task[1] == stopped_at:
+            raise KeyboardInterrupt
+        return whole(task)
+
+    monkeypatch.setattr(error_map_module, "error_cell", interrupted)
+    result = call("--out", tmp_path, *STUDY)
+    assert result.exit_code == 130
+    told = have.format(tmp_path / "study")
+    assert result.stderr == f"tactile-bayes: interrupted, {told}: the same command goes on\n"
+    assert result.stdout == ""
+    assert (tmp_path / "words.txt").exists()  # the analysis is there before the study begins
+    monkeypatch.setattr(error_map_module, "error_cell", whole)
+    before = len(asked.get("cells", []))
+    assert call("--out", tmp_path, *STUDY).exit_code == 0
+    assert [number for _, number in asked["cells"][before:]] == list(range(stopped_at, 2))
+    assert (tmp_path / "study" / "study.nc").exists()
+
+
+def test_another_study_is_refused(asked, tmp_path):
+    assert call("--out", tmp_path, *STUDY).exit_code == 0
+    result = call("--out", tmp_path, *STUDY, "--seed", 2)
+    assert result.exit_code == 2
+    assert "holds cells of another experiment: seed is 1 there and 2 here" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+# --- Refusals -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--base", "0"], "--base is '0': give 2 numbers with commas between them"),
+        (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
+        (["--length", "0.2"], "--length and --flexural-rigidity go together"),
+        (["--as-stated", "--nuisance", "bias"], "--as-stated and --nuisance contradict each other"),
+        (["--samples", "9"], "samples is 9: give a power of two"),
+        (["--distance", "1.5", "--samples", "8"], "the contour is out of reach"),
+        (["--band-width", "1e-12", "--samples", "8"], "a band of 1e-12 cannot be had with any noise"),
+        (["--study", "--study-profile", "V"], "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
+        (["--study", "--workers", "1", "--scheduler", "tcp://a:1"], "--workers and --scheduler exclude each other"),
+        (["--noise-factor", "1"], "--noise-factor is for a study: give --study as well, or leave it out"),
+        (["--replicates", "3"], "--replicates is for a study: give --study as well, or leave it out"),
+    ],
+)
+def test_refusals(tmp_path, monkeypatch, options, words):
+    monkeypatch.setattr("tactile_bayes.planning.sensitivity.amplification", lambda plan: amplification_at_once(plan))
+    result = call("--out", tmp_path / "out", "--drive-step", 6, *options)
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def amplification_at_once(plan):
+    """On the drive angles of the record, and not close to its ends."""
+    from dataclasses import replace
+
+    return amplification(replace(plan, drive_angles=np.radians(np.arange(-30.0, 211.0, 10.0))))

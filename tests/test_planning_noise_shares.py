@@ -1,0 +1,141 @@
+"""Whose noise it is: functions with known indices, first order at small noise, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import tactile_bayes as tb
+from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.planning.amplification import SOURCES, amplification
+from tactile_bayes.planning.noise_shares import first_and_total, noise_shares
+from tactile_bayes.planning.plan import Plan
+
+PROFILE = paper_profile("II", q=0.5)
+QUIET = Plan(PROFILE, tb.LoadCell(force_noise=5e-6, moment_noise=2e-6, drive_angle_noise=2e-6))
+
+
+def ishigami(x):
+    one, two, three = x
+    return np.sin(one) + 7.0 * np.sin(two) ** 2 + 0.1 * three**4 * np.sin(one)
+
+
+def known_indices():
+    """Of Ishigami's function (Ishigami and Homma 1990): first order and total."""
+    pi4, pi8 = np.pi**4, np.pi**8
+    of_one, of_two = 0.5 * (1.0 + 0.1 * pi4 / 5.0) ** 2, 49.0 / 8.0
+    both = 0.01 * pi8 * (1.0 / 18.0 - 1.0 / 50.0)
+    whole = of_one + of_two + both
+    return np.array([of_one, of_two, 0.0]) / whole, np.array([of_one + both, of_two, both]) / whole
+
+
+SIZES = np.array([1.0, 2.0, 0.5])
+
+
+def functions(x):
+    """Ishigami's, and a linear one."""
+    return np.stack([ishigami(x), SIZES @ x])
+
+
+def test_indices_of_known_functions():
+    """Means over 16 seeds, within 4.5 of their standard errors: 12 numbers, false alarms in less than 1 of 200 runs."""
+    laws = [stats.uniform(-np.pi, 2.0 * np.pi)] * 3
+    found = np.array([first_and_total(functions, laws, 1024, seed) for seed in range(16)])
+    mean, error = found.mean(axis=0), found.std(axis=0, ddof=1) / 4.0
+    linear = SIZES**2 / np.sum(SIZES**2)
+    first, total = known_indices()
+    right = np.array([[first, linear], [total, linear]])
+    assert error.max() < 0.005
+    # An estimator of a ratio is biased by about the square of its scatter.
+    assert np.all(np.abs(mean - right) < 4.5 * error + 1e-3), (mean - right) / error
+
+
+def test_indices_of_normal_and_outlying_numbers():
+    """Of a linear function: shares of the variances. Squares of Student's t converge slowly: to 0.03 for ν = 10."""
+    laws = [stats.norm(0.0, 2.0), stats.t(10.0, scale=1.0)]
+    first, total = first_and_total(lambda x: (x[0] - x[1])[None], laws, 4096, seed=1)
+    variances = np.array([4.0, 10.0 / 8.0])
+    np.testing.assert_allclose(first[0], variances / variances.sum(), atol=0.03)
+    np.testing.assert_allclose(total[0], variances / variances.sum(), atol=0.03)
+
+
+def test_shares_at_small_noise_are_those_of_first_order():
+    """Of a linear function with the gains for slopes, by the same random numbers: bends are of the order of 1e-5."""
+    found = noise_shares(QUIET, seed=1, samples=64, places=3)
+    grown = amplification(replace(QUIET, drive_angles=np.unique(found.drive_angle.values)))
+    keys = list(zip(grown.sweep.values, grown.drive_angle.values, strict=True))
+    where = [keys.index(key) for key in zip(found.sweep.values, found.drive_angle.values, strict=True)]
+    sizes = np.array([*QUIET.cell.standard_deviations.values(), QUIET.cell.drive_angle_noise])
+    assert list(found.source.values) == list(SOURCES)
+    for error in ("along", "across"):
+        gains = grown[f"gain_{error}"].values[:, where]
+        first, total = first_and_total(
+            gains.reshape(-1, 4).__matmul__, [stats.norm(0.0, size) for size in sizes], 64, 1
+        )
+        for name, right in (("share", first), ("total_share", total)):
+            made = found[name].sel(error=error).values
+            np.testing.assert_allclose(made, right.reshape(made.shape), rtol=0.0, atol=1e-3)
+        # Root mean squares of 384 numbers of a scrambled sequence: within 4.5 standard errors of as many random ones.
+        sd = np.sqrt(np.sum((gains * sizes) ** 2, axis=-1))
+        np.testing.assert_allclose(found.rms_error.sel(error=error).values, sd, rtol=4.5 / np.sqrt(2.0 * 384))
+    assert not found.without_answer.values.any()
+
+
+def test_shares_do_not_depend_on_the_unit():
+    rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
+    cell = tb.LoadCell(force_noise=5e-6 * rod.force_unit, moment_noise=2e-6 * rod.moment_unit, drive_angle_noise=2e-6)
+    si = noise_shares(Plan(Parabola(2.5, 0.1), cell, rod), seed=1, samples=64, places=2, methods=("raw",))
+    plain = noise_shares(QUIET, seed=1, samples=64, places=2, methods=("raw",))
+    np.testing.assert_allclose(si.share.values, plain.share.values, rtol=0.0, atol=1e-4)
+    np.testing.assert_allclose(si.rms_error.values, 0.2 * plain.rms_error.values, rtol=1e-4)
+    assert si.rms_error.attrs["units"] == "m"
+
+
+def test_first_order_fails_at_large_noise_and_this_says_so():
+    found = noise_shares(Plan(PROFILE).with_noise(10.0), seed=1, samples=64, places=4, methods=("raw",))
+    assert found.without_answer.values.max() > 0.05
+    lost = found.without_answer.values > 0.0
+    assert np.isnan(found.share.values[lost]).all()
+    assert np.isfinite(found.share.values[~lost]).all()
+
+
+def test_a_noise_of_zero_is_left_out():
+    cell = replace(QUIET.cell, drive_angle_noise=0.0)
+    found = noise_shares(replace(QUIET, load_cell=cell), seed=1, samples=128, places=2, methods=("raw",))
+    assert list(found.source.values) == ["holding_moment", "force_x", "force_y"]
+    # Of additive noises, shares sum to one: but for the estimators' scatter, three times 0.02.
+    np.testing.assert_allclose(found.share.sum("source").values, 1.0, atol=0.06)
+
+
+def test_places_are_evenly_within_the_sweeps():
+    found = noise_shares(QUIET, seed=1, samples=4, places=6, methods=("raw",))
+    assert found.sizes["sample"] == 12
+    for k, sweep in enumerate(QUIET.scan.sweeps):
+        of = found.sweep.values == k
+        length = abs(sweep.snap_off.drive_angle - sweep.first_contact.drive_angle)
+        np.testing.assert_allclose(np.sort(found.after_first_contact.values[of]), length * (np.arange(6) + 0.5) / 6)
+        np.testing.assert_allclose((found.after_first_contact + found.before_snap_off).values[of], length)
+
+
+def test_the_same_seed_gives_the_same_and_another_one_not():
+    def made(seed):
+        return noise_shares(QUIET, seed=seed, samples=16, places=2, methods=("raw",)).share.values
+
+    np.testing.assert_array_equal(made(1), made(1))
+    assert np.any(made(1) != made(2))
+
+
+@pytest.mark.parametrize("samples", [1000, 1, 0, -4, 64.0, True, "64"])
+def test_samples_that_are_no_power_of_two_are_refused(samples):
+    with pytest.raises(ParameterError, match="give a power of two"):
+        noise_shares(QUIET, seed=1, samples=samples)
+
+
+@pytest.mark.parametrize("places", [1, 0, 2.0, True])
+def test_too_few_places_are_refused(places):
+    with pytest.raises(ParameterError, match="places is"):
+        noise_shares(QUIET, seed=1, samples=16, places=places)

@@ -1,0 +1,246 @@
+"""A plan, the family of its contour, and the covariance of errors over a whole record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import tactile_bayes as tb
+from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.planning.error_covariance import whitening
+from tactile_bayes.planning.family_parameters import enlarged, family_parameters
+from tactile_bayes.planning.plan import Plan, usual_load_cell
+from tactile_bayes.record import CHANNELS
+
+PROFILE = paper_profile("II", q=0.5)
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+X = np.linspace(-0.19, 0.19, 9)
+
+CONTOURS = {
+    "parabola": Parabola(0.7, 0.3, 0.1),
+    "circle": Circle(0.4, 0.3, -0.1),
+    "ellipse": Ellipse(0.5, 0.3, 0.4, 0.05),
+    "power-law": PowerLaw(2.0, 3.0, 0.4, 0.1),
+    "parabola/power-law": paper_profile("IV", q=0.5),
+    "circle/ellipse": Joined(Circle(0.3, 0.4, 0.1), Ellipse(0.6, 0.2, 0.4, 0.1)),
+}
+
+# ---- family and parameters
+
+
+@pytest.mark.parametrize("name", CONTOURS)
+def test_the_family_builds_the_contour_back(name):
+    contour = CONTOURS[name]
+    found, values = family_parameters(contour)
+    assert found == name
+    family = family_named(found)
+    assert tuple(values) == family.parameters
+    np.testing.assert_allclose(family.build(*values.values()).height(X), contour.height(X), rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", CONTOURS)
+@pytest.mark.parametrize("factor", [0.2, 3.0])
+def test_an_enlarged_contour_has_all_lengths_enlarged(name, factor):
+    contour = CONTOURS[name]
+    larger = enlarged(contour, factor)
+    np.testing.assert_allclose(larger.height(factor * X), factor * contour.height(X), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("contour", "match"),
+    [
+        (tb.contours.from_points(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21) ** 2 + 0.5), "of no family"),
+        (Parabola([0.5, 0.6], 0.5), "give a single one"),
+        ("II", "'II' is no contour: give one of tb.contours"),
+        (None, "None is no contour"),
+    ],
+)
+def test_what_has_no_parameters_is_refused_with_the_remedy(contour, match):
+    with pytest.raises(ParameterError, match=match):
+        family_parameters(contour)
+
+
+def test_halves_without_a_common_family_are_refused():
+    with pytest.raises(ParameterError, match="give a parabola, circle, ellipse or power law, or two of these joined"):
+        family_parameters(tb.contours.from_function(lambda x: np.cosh(x) - 0.5, (-1.0, 1.0)))
+
+
+# ---- plans
+
+
+def test_a_plan_has_the_record_of_its_scan():
+    plan = Plan(PROFILE, CELL, drive_step=0.05)
+    scanned = tb.scan(PROFILE, drive_step=0.05).record
+    for name in (*CHANNELS, "drive_angle"):
+        np.testing.assert_array_equal(plan.record[name].values, scanned[name].values)
+
+
+def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
+    bias, gain = (0.1, -0.2, 0.3), ((1.1, 0.0, 0.0), (0.0, 0.9, 0.1), (0.0, 0.0, 1.0))
+    cell = replace(
+        CELL, bias=bias, gain=gain, drive_angle_offset=0.05, drive_angle_noise=0.01, bias_uncertainty=(1.0, 1.0, 1.0)
+    )
+    plan = Plan(PROFILE, cell, drive_step=0.05)
+    scanned = tb.scan(PROFILE, drive_step=0.05).record
+    loads, read = (np.stack([r[name].values for name in CHANNELS]) for r in (scanned, plan.record))
+    np.testing.assert_allclose(read, np.array(gain) @ loads + np.array(bias)[:, None], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(plan.record.drive_angle.values, scanned.drive_angle.values + 0.05, rtol=0.0, atol=1e-12)
+
+
+def test_the_model_shows_the_record_at_the_point():
+    """Contour as it is, rig as stated."""
+    for options in ({}, {"nuisances": ["gain", "friction", "suspension_compliance"]}):
+        plan = Plan(PROFILE, replace(CELL, frame="turning"), drive_step=0.05, **options)
+        values = dict(zip(plan.model.names, plan.point, strict=True))
+        assert (values["a"], values["q"], values["x_c"], values["noise_scale"]) == (0.5, 0.5, 0.0, 1.0)
+        loads = plan.model.loads(plan.point[None])[0]
+        right = np.stack([plan.record[name].values for name in CHANNELS], axis=-1)
+        np.testing.assert_allclose(loads, right, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", [n for n in CONTOURS if n != "circle/ellipse"])
+def test_every_family_has_a_model(name):
+    plan = Plan(CONTOURS[name], CELL, drive_step=0.1, nuisances=())
+    assert plan.family == name
+    np.testing.assert_array_equal(plan.point[:-1], list(family_parameters(CONTOURS[name])[1].values()))
+
+
+def test_priors_that_are_given_are_those_of_the_model():
+    prior = stats.norm(0.5, 0.01)
+    plan = Plan(PROFILE, CELL, priors={"q": prior, "friction": stats.halfnorm(scale=0.1)}, nuisances=())
+    assert plan.model.priors["q"] is prior
+    assert plan.model.located == ("a", "q", "x_c", "friction")
+
+
+def test_noise_grows_by_a_factor_and_nothing_else():
+    cell = replace(CELL, drive_angle_noise=0.01, bias=(0.1, 0.0, 0.0))
+    louder = Plan(PROFILE, cell, friction=0.2).with_noise(3.0)
+    assert louder.cell == replace(cell, force_noise=3.0 * 0.05, moment_noise=3.0 * 0.02)
+    assert (louder.friction, louder.contour) == (0.2, PROFILE)
+
+
+def test_without_a_load_cell_there_is_the_usual_one():
+    rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
+    assert Plan(PROFILE).cell == tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+    usual = usual_load_cell(rod)
+    assert (usual.force_noise, usual.moment_noise) == pytest.approx((0.05 * 0.05, 0.02 * 0.01))
+    assert usual.dimensionless(rod).entries() == pytest.approx({"force_noise": 0.05, "moment_noise": 0.02})
+    assert Plan(Parabola(2.5, 0.1), rod=rod).cell == usual_load_cell(rod)
+
+
+@pytest.mark.parametrize(
+    ("cell", "silent"),
+    [
+        (tb.LoadCell(force_noise=0.05), "holding_moment"),
+        (tb.LoadCell(moment_noise=0.02), "force_x, force_y"),
+        (tb.LoadCell(), "holding_moment, force_x, force_y"),
+        (replace(CELL, degrees_of_freedom=2.0), "holding_moment, force_x, force_y"),
+    ],
+)
+def test_a_channel_without_noise_is_refused_by_name(cell, silent):
+    with pytest.raises(ParameterError, match=f"no finite noise of {silent}: .*give LoadCell"):
+        Plan(PROFILE, cell)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"rod": 0.2}, "rod is 0.2: give a Rod"),
+        ({"load_cell": 0.05}, "load_cell is 0.05: give a LoadCell"),
+        ({"nuisances": "bias"}, r"nuisances is 'bias': give a list of names, like \['bias'\]"),
+    ],
+)
+def test_what_is_none_is_refused(options, match):
+    with pytest.raises(ParameterError, match=match):
+        Plan(PROFILE, **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"nuisances": ["rust"]}, "there is no nuisance parameter 'rust'"),
+        ({"priors": {"b": stats.norm()}}, "a prior of b, which is no parameter: there are a, q, x_c"),
+        ({"priors": {"a": 0.5}}, "the prior of a is 0.5: give a frozen distribution"),
+        ({"friction": 0.1, "nuisances": ["friction"]}, "to be inferred as well"),
+    ],
+)
+def test_a_model_that_is_none_is_refused(options, match):
+    plan = Plan(PROFILE, drive_step=0.1, **options)
+    with pytest.raises(ParameterError, match=match):
+        _ = plan.model
+
+
+# ---- covariance over a whole record
+
+SAMPLES = 7
+SHARED = {
+    "none": CELL,
+    "correlated": replace(CELL, correlation=(0.3, -0.2, 0.6)),
+    "in proportion": replace(CELL, relative_noise=0.1),
+    "outliers": replace(CELL, degrees_of_freedom=5.0),
+    "bias": replace(CELL, bias_uncertainty=(0.03, 0.1, 0.0)),
+    "walk": replace(CELL, drift=RandomWalk(moment=0.004, force=0.01)),
+    "wandering": replace(CELL, drift=OrnsteinUhlenbeck(moment=0.02, force=0.03, time=3.0), correlation=(0.1, 0.2, 0.3)),
+    "all": replace(CELL, drift=RandomWalk(moment=0.01), bias_uncertainty=(0.1, 0.0, 0.1), drive_angle_noise=0.02),
+}
+
+
+def some_loads():
+    rng = np.random.default_rng(1)
+    return rng.normal(size=(SAMPLES, 3)), rng.normal(size=(SAMPLES, 3))
+
+
+def dense(cell, loads, by_angle):
+    """Covariance of all readings, entry by entry, shape (samples · 3,) twice."""
+    nu = cell.degrees_of_freedom
+    widening = 1.0 if np.isinf(nu) else nu / (nu - 2.0)
+    m, x, y = cell.correlation
+    correlation = np.array([[1.0, m, x], [m, 1.0, y], [x, y, 1.0]])
+    scale = np.hypot([cell.moment_noise, cell.force_noise, cell.force_noise], cell.relative_noise * loads)
+    out = np.zeros((SAMPLES, 3, SAMPLES, 3))
+    for i in range(SAMPLES):
+        out[i, :, i, :] = widening * np.outer(scale[i], scale[i]) * correlation
+        out[i, :, i, :] += cell.drive_angle_noise**2 * np.outer(by_angle[i], by_angle[i])
+    for i in range(SAMPLES):
+        for j in range(SAMPLES):
+            for c in range(3):
+                shared = cell.bias_uncertainty[c] ** 2
+                size = 0.0 if cell.drift is None else cell.drift.moment if c == 0 else cell.drift.force
+                if isinstance(cell.drift, RandomWalk):
+                    shared += size**2 * min(i, j)
+                elif cell.drift is not None:
+                    shared += size**2 * np.exp(-abs(i - j) / cell.drift.time)
+                out[i, c, j, c] += shared
+    return out.reshape(3 * SAMPLES, 3 * SAMPLES)
+
+
+@pytest.mark.parametrize("present", [(True, True, True), (True, False, True), (False, False, True)])
+@pytest.mark.parametrize("name", SHARED)
+def test_whitened_slopes_have_the_products_of_the_dense_covariance(name, present):
+    cell, (loads, by_angle) = SHARED[name], some_loads()
+    here = np.array(present)
+    slopes = np.random.default_rng(2).normal(size=(SAMPLES, 3, 4))
+    white = whitening(cell, loads, by_angle, here)(slopes)
+    assert white.shape == (SAMPLES, here.sum(), 4)
+    every = np.tile(here, SAMPLES)
+    covariance = dense(cell, loads, by_angle)[np.ix_(every, every)]
+    flat = slopes[:, here].reshape(-1, 4)
+    right = flat.T @ np.linalg.solve(covariance, flat)
+    found = np.einsum("nci,ncj->ij", white, white)
+    np.testing.assert_allclose(found, right, rtol=1e-9, atol=1e-9 * np.abs(right).max())
+
+
+def test_errors_that_are_drawn_become_independent():
+    """Covariance of 20000 records: every entry within five standard errors of the identity's, of 231 in all."""
+    cell = replace(SHARED["all"], drive_angle_noise=0.0)
+    draws = cell.simulate(np.zeros((20000, SAMPLES, 3)), seed=1)
+    white = whitening(cell, np.zeros((SAMPLES, 3)), np.zeros((SAMPLES, 3)), np.ones(3, dtype=bool))
+    flat = white(np.moveaxis(draws, 0, -1)).reshape(3 * SAMPLES, -1)
+    error = 5.0 * np.sqrt((1.0 + np.eye(3 * SAMPLES)) / 20000)
+    assert np.all(np.abs(flat @ flat.T / 20000 - np.eye(3 * SAMPLES)) < error)

@@ -1,0 +1,203 @@
+"""How good a load cell must be, and which rod: round trips, proportions, and what cannot be had."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import tactile_bayes as tb
+from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import RandomWalk
+from tactile_bayes.planning.information import information
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.requirement import required_noise, required_rod
+
+PROFILE = paper_profile("II", q=0.5)
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+PLAN = Plan(PROFILE, CELL, drive_step=np.radians(6.0))
+
+CELLS = {
+    "white": CELL,
+    "encoder": replace(CELL, drive_angle_noise=0.01),
+    "bias": replace(CELL, bias_uncertainty=(0.02, 0.1, 0.1)),
+    "drift": replace(CELL, drift=RandomWalk(moment=0.002, force=0.005)),
+    "in proportion": replace(CELL, relative_noise=0.01),
+}
+
+
+SHARED = [pytest.param(name, "gap", marks=pytest.mark.slow) for name in ("bias", "drift")]
+"""Errors that samples share take seconds."""
+
+
+@pytest.mark.parametrize(
+    ("name", "where"),
+    [*((name, "gap") for name in CELLS if name not in ("bias", "drift")), ("white", "touched"), *SHARED],
+)
+def test_a_load_cell_as_asked_for_gives_the_band_that_was_wanted(name, where):
+    """Whatever else about it stays as it is."""
+    plan = replace(PLAN, load_cell=CELLS[name])
+    present = float(information(plan)[f"{where}_width"])
+    needed = required_noise(plan, 0.7 * present, where=where)
+    assert float(needed.present_width) == pytest.approx(present, rel=1e-9)
+    factor = float(needed.noise_factor[0])
+    assert factor < 0.7 + 1e-6  # what stays takes its share
+    better = replace(plan.cell, force_noise=float(needed.force_noise[0]), moment_noise=float(needed.moment_noise[0]))
+    assert better.force_noise == pytest.approx(factor * 0.05)
+    got = information(replace(plan, load_cell=better))
+    assert float(got[f"{where}_width"]) == pytest.approx(0.7 * present, rel=1e-4)
+
+
+def test_everywhere_is_the_mean_of_all_places():
+    found = information(PLAN)
+    needed = required_noise(PLAN, 0.01)
+    assert float(needed.present_width) == pytest.approx(2.0 * 1.959963985 * float(found.height_sd.mean()), rel=1e-6)
+
+
+def test_noise_is_in_proportion_to_the_band_where_priors_say_little():
+    needed = required_noise(PLAN, [1e-4, 2e-4, 4e-4], probability=0.9)
+    np.testing.assert_allclose(needed.noise_factor / needed.noise_factor[0], [1.0, 2.0, 4.0], rtol=1e-3)
+    wider = required_noise(PLAN, 1e-4, probability=0.5)
+    ratio = stats.norm.ppf(0.95) / stats.norm.ppf(0.75)
+    assert float(wider.noise_factor[0]) == pytest.approx(float(needed.noise_factor[0]) * ratio, rel=1e-3)
+
+
+def test_a_rod_in_si_needs_the_same():
+    rod = tb.Rod(length=0.2, flexural_rigidity=2e-3)
+    cell = tb.LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
+    si = required_noise(Plan(Parabola(2.5, 0.1), cell, rod, drive_step=PLAN.drive_step), 0.2 * 0.003)
+    plain = required_noise(PLAN, 0.003)
+    np.testing.assert_allclose(si.noise_factor, plain.noise_factor, rtol=1e-5)
+    np.testing.assert_allclose(si.force_noise, plain.force_noise * rod.force_unit, rtol=1e-5)
+    np.testing.assert_allclose(si.moment_noise, plain.moment_noise * rod.moment_unit, rtol=1e-5)
+    assert float(si.prior_width) == pytest.approx(0.2 * float(plain.prior_width), rel=1e-5)
+    assert (si.force_noise.attrs["units"], plain.force_noise.attrs["units"]) == ("N", "EI/L²")
+    assert (si.moment_noise.attrs["units"], plain.moment_noise.attrs["units"]) == ("N m", "EI/L")
+    assert (si.band_width.attrs["units"], plain.band_width.attrs["units"]) == ("m", "1")
+
+
+def test_a_band_that_priors_give_needs_no_load_cell():
+    priors = {"a": stats.norm(0.5, 0.001), "q": stats.norm(0.5, 0.002), "x_c": stats.norm(0.0, 0.001)}
+    plan = replace(PLAN, priors=priors)
+    needed = required_noise(plan, [0.001, 1.0], where="gap")
+    assert np.isfinite(needed.noise_factor.values).tolist() == [True, False]
+    # In the gap the height is q, and little else: 2 · 1.96 · 0.002.
+    assert float(needed.prior_width) == pytest.approx(0.00784, rel=0.01)
+
+
+def test_a_band_that_no_load_cell_gives_is_refused():
+    """Because the zero of the cell is not known."""
+    plan = replace(PLAN, load_cell=replace(CELL, bias_uncertainty=(0.02, 0.1, 0.1)))
+    with pytest.raises(ParameterError, match=r"a band of 1e-12 cannot be had with any noise.*give tighter priors"):
+        required_noise(plan, [1e-3, 1e-12])
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf, [0.1, 0.0], [[0.1]]])
+def test_widths_that_are_none_are_refused(width):
+    with pytest.raises(ParameterError, match="give a positive length"):
+        required_noise(PLAN, width)
+
+
+def test_a_gap_is_asked_for_where_there_is_one():
+    with pytest.raises(ParameterError, match="leave no gap: ask for the band where"):
+        required_noise(replace(PLAN, direction="forward"), 0.01, where="gap")
+    with pytest.raises(ParameterError, match="choose 'everywhere', 'gap' or 'touched'"):
+        required_noise(PLAN, 0.01, where="nowhere")
+
+
+# ---- rods
+
+ROD = tb.Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
+METAL = Plan(Parabola(2.5, 0.1), tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3), ROD, drive_step=np.radians(6.0))
+LENGTHS, DIAMETERS = [0.09, 0.17, 0.2], [0.3e-3, 0.7e-3, 3e-3]
+
+
+@cache
+def rods():
+    return required_rod(METAL, lengths=LENGTHS, diameters=DIAMETERS, youngs_modulus=206e9, elastic_strain=0.012)
+
+
+def test_every_rod_has_the_band_and_the_strain_of_its_own_plan():
+    """The band where the plan's own rod touches, or leaves a gap."""
+    found = rods()
+    x = information(METAL).x.values
+    plan = replace(METAL, rod=tb.Rod.circular(0.17, 0.3e-3, 206e9))
+    of = found.sel(length=0.17, diameter=0.3e-3)
+    assert float(of.strain) == pytest.approx(max(sweep.largest_strain for sweep in plan.scan.sweeps))
+    bounds = information(plan)
+    names = ["a", "q", "x_c"]
+    here = bounds.sel(parameter=names, parameter_=names)
+    covariance = here.correlation.values * np.outer(here.bound_with_priors, here.bound_with_priors)
+    slopes = np.stack([x**2, np.ones_like(x), -5.0 * x], axis=1)
+    sd = np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes))
+    assert float(of.width) == pytest.approx(2.0 * 1.959963985 * sd.mean(), rel=1e-4)
+    own = found.sel(length=0.2, diameter=0.7e-3)
+    assert float(own.width) == pytest.approx(float(required_noise(METAL, 0.01).present_width), rel=1e-9)
+
+
+def test_rods_are_told_apart():
+    found = rods()
+    status = found.status.values
+    assert (status[0] == "does not reach").all()
+    assert np.isnan(found.width.values[0]).all()
+    reached = status[1:]
+    np.testing.assert_array_equal(reached == "ok", found.strain.values[1:] <= 0.012)
+    assert set(reached.ravel()) == {"ok", "bent too far"}
+    assert np.isfinite(found.width.values[1:]).all()  # also of those that would stay bent
+
+
+def test_the_best_rod_has_the_narrowest_band_of_those_that_bear_it():
+    found = rods()
+    ok = found.status.values == "ok"
+    best = float(found.best_width)
+    assert best == found.width.values[ok].min()
+    assert best > np.nanmin(found.width.values)  # a thicker one would see more, and stay bent
+    at = found.sel(length=float(found.best_length), diameter=float(found.best_diameter))
+    assert (float(at.width), str(at.status.values)) == (best, "ok")
+
+
+def test_a_thicker_rod_has_a_narrower_band_in_proportion_to_its_rigidity():
+    """But for its thickness, and priors: the fourth power of 0.7/0.3."""
+    plan = replace(METAL, nuisances=())
+    found = required_rod(
+        plan, lengths=[0.2], diameters=[0.3e-3, 0.33e-3], youngs_modulus=206e9, elastic_strain=1.0
+    ).width.values[0]
+    assert found[0] / found[1] == pytest.approx(1.1**4, rel=0.02)
+
+
+def test_a_rod_that_hardly_touches_is_no_answer():
+    """A band that the family makes out of a short arc is its affair, not the rod's."""
+    found = required_rod(METAL, lengths=[0.105], diameters=[0.3e-3], youngs_modulus=206e9, elastic_strain=0.012)
+    assert found.status.values.tolist() == [["touches little"]]
+    assert np.isnan(float(found.best_width))
+
+
+def test_no_rod_will_do():
+    found = required_rod(METAL, lengths=[0.2], diameters=[1e-3], youngs_modulus=206e9, elastic_strain=1e-5)
+    assert found.status.values.tolist() == [["bent too far"]]
+    assert np.isnan([found.best_length, found.best_diameter, found.best_width]).all()
+
+
+def test_a_rod_wants_a_load_cell_and_units():
+    options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
+    for plan in (PLAN, replace(METAL, load_cell=None), replace(METAL, rod=None)):
+        with pytest.raises(ParameterError, match="give a plan with a rod in SI, and a load_cell"):
+            required_rod(plan, **options)
+
+
+@pytest.mark.parametrize("wrong", [{"lengths": []}, {"diameters": [0.0]}, {"lengths": [-0.1]}, {"diameters": [np.nan]}])
+def test_sizes_that_are_none_are_refused(wrong):
+    options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
+    with pytest.raises(ParameterError, match="give a list of positive numbers"):
+        required_rod(METAL, **{**options, **wrong})
+
+
+@pytest.mark.parametrize("wrong", [{"elastic_strain": 0.0}, {"elastic_strain": np.nan}, {"youngs_modulus": -1.0}])
+def test_a_material_that_is_none_is_refused(wrong):
+    options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
+    with pytest.raises(ParameterError):
+        required_rod(METAL, **{**options, **wrong})

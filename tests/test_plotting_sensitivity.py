@@ -1,0 +1,397 @@
+"""The figures of a plan: what they draw, and what they say."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+
+mpl.use("Agg")
+
+from matplotlib import pyplot as plt
+from matplotlib.colors import same_color
+
+from tactile_bayes import LoadCell, Rod, error_map, plotting, sensitivity
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.planning_groups import METHOD_COLOURS, READING_COLOURS
+
+ROD = Rod(0.1, 1e-5)
+
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
+
+
+@pytest.fixture(scope="module")
+def found():
+    return sensitivity(seed=1, drive_step=0.1, samples=8)
+
+
+@pytest.fixture(scope="module")
+def in_si():
+    cell = LoadCell(force_noise=2e-5, moment_noise=1e-6)
+    return sensitivity(seed=1, rod=ROD, load_cell=cell, drive_step=0.1, parts=["information", "required_noise"])
+
+
+@pytest.fixture(scope="module")
+def study():
+    """Profile II at three distances, of which the last is out of reach."""
+    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "seed": 1, "workers": 1, "drive_step": 0.1}
+    return error_map(["II"], distances=[0.4, 0.8, 1.5], **options)
+
+
+def rods(status, width):
+    """Of 2 lengths and 3 diameters."""
+    metres = {"units": "m"}
+    width = np.array(width, dtype=float)
+    usable = np.where(np.array(status) == "ok", width, np.inf)
+    i, j = np.unravel_index(np.argmin(usable), usable.shape)
+    lengths, diameters = np.array([0.1, 0.2]), np.array([2e-4, 4e-4, 8e-4])
+    is_any = np.isfinite(usable[i, j])
+    return xr.Dataset(
+        {
+            "width": (("length", "diameter"), width, metres),
+            "status": (("length", "diameter"), status),
+            "best_length": ((), lengths[i] if is_any else np.nan, metres),
+            "best_diameter": ((), diameters[j] if is_any else np.nan, metres),
+            "best_width": ((), width[i, j] if is_any else np.nan, metres),
+        },
+        coords={"length": ("length", lengths, metres), "diameter": ("diameter", diameters, metres)},
+        attrs={"probability": 0.95, "where": "gap"},
+    )
+
+
+SOME = rods(
+    [["ok", "ok", "bent too far"], ["does not reach", "ok", "cannot be swept"]],
+    [[4e-4, 2e-4, 1e-4], [np.nan, 3e-4, np.nan]],
+)
+
+
+def labels(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts]
+
+
+def lines_of(ax, colour, style):
+    """Lines that have data."""
+    return [
+        line
+        for line in ax.lines
+        if same_color(line.get_color(), colour) and line.get_linestyle() == style and len(line.get_xdata()) > 1
+    ]
+
+
+def are_apart(*things):
+    boxes = [thing.get_window_extent() for thing in things]
+    return not any(box.overlaps(other) for i, box in enumerate(boxes) for other in boxes[:i])
+
+
+def is_inside_its_figure(ax):
+    figure = ax.figure
+    figure.canvas.draw()
+    box, whole = ax.get_tightbbox(), figure.bbox
+    return box.x0 >= whole.x0 and box.x1 <= whole.x1 and box.y0 >= whole.y0 and box.y1 <= whole.y1
+
+
+# --- Every figure ---------------------------------------------------------------------------------------------------
+
+OF_GROUPS = {
+    "amplification": plotting.amplification,
+    "information": plotting.information,
+    "noise_shares": plotting.noise_shares,
+    "required_noise": plotting.required_noise,
+}
+
+
+@pytest.mark.parametrize("name", OF_GROUPS)
+def test_groups_are_taken_alone_and_in_their_tree_and_drawn_where_it_is_wanted(found, name):
+    draw = OF_GROUPS[name]
+    group = found[name]
+    drawn = [draw(of) for of in (found, group, group.to_dataset())]
+    assert len({(ax.get_xlabel(), ax.get_ylabel(), ax.get_ylim(), len(ax.lines)) for ax in drawn}) == 1
+    assert is_inside_its_figure(drawn[0])
+    _, ax = plt.subplots()
+    assert draw(found, ax=ax) is ax
+
+
+@pytest.mark.parametrize("name", OF_GROUPS)
+def test_another_group_is_refused(found, name):
+    other = found["information" if name == "required_noise" else "required_noise"].to_dataset()
+    for wrong in (other, None, found["amplification"]["sd_along"]):
+        with pytest.raises(ParameterError, match=f"there is no {name} in this: give what sensitivity returned"):
+            OF_GROUPS[name](wrong)
+
+
+@pytest.mark.parametrize("draw", [plotting.amplification, plotting.noise_shares])
+def test_a_sweep_that_is_not_there_is_refused(found, draw):
+    with pytest.raises(ParameterError, match=r"sweep is 2: there are 0, 1$"):
+        draw(found, sweep=2)
+
+
+# --- Amplification --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sweep", [0, 1])
+def test_curves_are_the_standard_deviations_thick_where_first_order_holds(found, sweep):
+    grown = found["amplification"].to_dataset()
+    grown = grown.isel(sample=grown.sweep.values == sweep).sortby("drive_angle")
+    ax = plotting.amplification(found, sweep=sweep)
+    for method, colour in METHOD_COLOURS.items():
+        of = grown.sel(reconstruction=method)
+        for side, style in (("along", "-"), ("across", "--")):
+            expected = dict(zip(np.degrees(of.drive_angle.values), of[f"sd_{side}"].values, strict=True))
+            thin, thick = lines_of(ax, colour, style)
+            assert thin.get_linewidth() < thick.get_linewidth()
+            seen = {}
+            for line in (thin, thick):
+                good = np.isfinite(line.get_ydata())
+                seen |= dict(zip(line.get_xdata()[good], line.get_ydata()[good], strict=True))
+            assert seen == expected
+            held = np.degrees(of.drive_angle.values[of.holds.values])
+            good = np.isfinite(thick.get_ydata())
+            assert set(held) <= set(thick.get_xdata()[good])
+    assert ax.get_xlabel().endswith("forward sweep" if sweep == 0 else "backward sweep")
+    assert ax.get_yscale() == "log"
+
+
+def test_no_line_goes_over_a_change_of_phase_where_errors_jump(found):
+    grown = found["amplification"].to_dataset()
+    of = grown.isel(sample=grown.sweep.values == 0).sortby("drive_angle")
+    (change,) = np.flatnonzero(of.contact_phase.values[1:] != of.contact_phase.values[:-1])
+    before, after = np.degrees(of.drive_angle.values[change : change + 2])
+    for line in plotting.amplification(found).lines:
+        angle, value = np.array(line.get_xdata()), np.array(line.get_ydata())
+        if not same_color(line.get_color(), METHOD_COLOURS["constrained"]):
+            continue
+        near = value[(angle >= before) & (angle <= after)]
+        assert near.size == 0 or np.isnan(near[1:-1]).any()
+
+
+def test_events_are_marked_and_strips_tell_where_first_order_does_not_hold(found):
+    ax = plotting.amplification(found)
+    grown = found["amplification"].to_dataset()
+    of = grown.isel(sample=grown.sweep.values == 0)
+    first = np.degrees(of.drive_angle.values - of.after_first_contact.values)
+    last = np.degrees(of.drive_angle.values + of.before_snap_off.values)
+    marked = sorted(line.get_xdata()[0] for line in ax.lines if line.get_linestyle() == ":")
+    np.testing.assert_allclose(marked, [first.mean(), last.mean()], rtol=1e-12)
+    assert texts(ax) == ["first contact", "snap-off"]
+    assert "strip: first order does not hold" in labels(ax)
+    for method, colour in METHOD_COLOURS.items():
+        strips = [patch for patch in ax.patches if same_color(patch.get_facecolor()[:3], colour)]
+        holds = of.holds.sel(reconstruction=method).values
+        assert len(strips) == np.count_nonzero(np.diff(np.concatenate([[0], ~holds, [0]]).astype(int)) == 1)
+        for angle, held in zip(np.degrees(of.drive_angle.values), holds, strict=True):
+            inside = any(s.get_x() <= angle <= s.get_x() + s.get_width() for s in strips)
+            assert inside is not held
+    ax.figure.canvas.draw()
+    assert are_apart(*ax.texts, ax.get_legend())
+
+
+# --- Information ----------------------------------------------------------------------------------------------------
+
+
+def test_leverage_is_drawn_by_channel_and_direction(found):
+    told = found["information"].to_dataset()
+    ax = plotting.information(found)
+    for sweep, style in ((0, "-"), (1, "--")):
+        of = told.isel(sample=told.sweep.values == sweep).sortby("drive_angle")
+        for name in told.channel.values:
+            (line,) = lines_of(ax, READING_COLOURS[str(name)], style)
+            np.testing.assert_array_equal(line.get_xdata(), np.degrees(of.drive_angle.values))
+            np.testing.assert_array_equal(line.get_ydata(), of.leverage.sel(channel=name).values)
+    moment = float(told.leverage.sel(channel="holding_moment").sum())
+    assert labels(ax)[0] == f"holding moment $m_0$: {moment:.3g}"
+    assert labels(ax)[3:] == ["forward", "backward"]
+    assert ax.get_legend().get_title().get_text().endswith(f"readings together: {told.attrs['told']:.3g}")
+
+
+# --- Shares ---------------------------------------------------------------------------------------------------------
+
+
+def test_bars_are_the_shares_and_what_is_missing_of_one(found):
+    ax = plotting.noise_shares(found, reconstruction="constrained", error="along", sweep=1)
+    shares = found["noise_shares"].to_dataset().sel(reconstruction="constrained", error="along")
+    shares = shares.isel(sample=shares.sweep.values == 1).sortby("drive_angle")
+    angle = np.degrees(shares.drive_angle.values)
+    stacked = np.maximum(shares.share.values, 0.0)
+    is_answered = np.isfinite(stacked).all(axis=1)
+    expected = np.column_stack([stacked, np.maximum(1.0 - stacked.sum(axis=1), 0.0)])[is_answered]
+    drawn = np.array([[bar.get_height() for bar in bars] for bars in ax.containers[:4]]).T[is_answered]
+    np.testing.assert_allclose(drawn, expected, atol=1e-12)
+    for bars in ax.containers[:4]:
+        np.testing.assert_allclose([bar.get_x() + 0.5 * bar.get_width() for bar in bars], angle)
+    top = [max(bar.get_y() + bar.get_height() for bar in bars) for bars in zip(*ax.containers[:4], strict=True)]
+    np.testing.assert_allclose(np.array(top)[is_answered], np.maximum(stacked.sum(axis=1), 1.0)[is_answered])
+    assert labels(ax)[3] == "together"
+    assert "constrained contact point along the contour" in ax.get_legend().get_title().get_text()
+
+
+def test_places_without_an_answer_are_hatched(found):
+    shares = found["noise_shares"].to_dataset().copy(deep=True)
+    shares.share[0, 3] = np.nan
+    ax = plotting.noise_shares(shares)
+    assert labels(ax)[-1] == "no answer for some of the noise"
+    centres = [bar.get_x() + 0.5 * bar.get_width() for bar in ax.containers[-1]]
+    assert np.degrees(shares.drive_angle.values[3]) == pytest.approx(centres[-1])
+
+
+def test_what_has_no_shares_is_refused(found):
+    with pytest.raises(ParameterError, match="error is 'up': there are along, across"):
+        plotting.noise_shares(found, error="up")
+    with pytest.raises(ParameterError, match="reconstruction is 'best': there are raw, constrained"):
+        plotting.noise_shares(found, reconstruction="best")
+
+
+# --- Noise that is required -----------------------------------------------------------------------------------------
+
+
+def test_widths_are_drawn_over_noise_and_the_present_cell_is_on_the_line(found):
+    needed = found["required_noise"].to_dataset()
+    ax = plotting.required_noise(found)
+    line, asked, present = ax.lines[:3]
+    np.testing.assert_array_equal(asked.get_xdata(), needed.force_noise.values)
+    np.testing.assert_array_equal(asked.get_ydata(), needed.band_width.values)
+    np.testing.assert_allclose(present.get_xdata(), [0.05], rtol=1e-12)
+    assert list(present.get_ydata()) == [float(needed.present_width)]
+    assert np.all(np.diff(line.get_xdata()) > 0.0)
+    assert np.all(np.diff(line.get_ydata()) > 0.0)
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert ax.get_ylabel() == "mean width of the 95 % band [$L$]"
+    assert labels(ax) == ["asked for", "the load cell as it is"]
+
+
+def test_the_upper_axis_has_the_noise_of_the_moment(found):
+    ax = plotting.required_noise(found)
+    ax.figure.canvas.draw()
+    (above,) = ax.child_axes
+    np.testing.assert_allclose(above.get_xlim(), np.array(ax.get_xlim()) * 0.02 / 0.05)
+    assert above.get_xlabel() == "noise of the moment [$EI$/$L$]"
+
+
+def test_si_has_prefixes(in_si):
+    ax = plotting.required_noise(in_si)
+    assert ax.get_xlabel() == "noise of the forces [µN]"
+    assert ax.get_ylabel() == "mean width of the 95 % band [mm]"
+    ax.figure.canvas.draw()
+    assert "0.1" in [tick.get_text() for tick in ax.get_yticklabels()]
+    assert "20" in [tick.get_text() for tick in ax.get_xticklabels()]
+    (present,) = (line for line in ax.lines if line.get_marker() == "D")
+    assert present.get_xdata()[0] == pytest.approx(2e-5)
+
+
+def test_bands_that_priors_give_are_left_out(found):
+    needed = found["required_noise"].to_dataset().copy(deep=True)
+    for name in ("noise_factor", "force_noise", "moment_noise"):
+        needed[name][-1] = np.inf
+    needed["prior_width"] = 0.009
+    ax = plotting.required_noise(needed)
+    assert len(ax.lines[1].get_xdata()) == needed.sizes["band_width"] - 1
+    (prior,) = (line for line in ax.lines if line.get_label() == "priors alone")
+    assert list(prior.get_ydata()) == [0.009, 0.009]
+    for name in ("noise_factor", "force_noise", "moment_noise"):
+        needed[name][:] = np.inf
+    ax = plotting.required_noise(needed)
+    assert texts(ax) == ["the priors alone give bands as narrow as these, without any record"]
+    assert not ax.axison
+
+
+# --- Error map ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["raw", "constrained"])
+def test_errors_are_solid_and_first_order_is_dashed(study, method):
+    ax = plotting.error_map(study, quantity="along", reconstruction=method)
+    of = study.sel(contour="II", reconstruction=method).sortby("noise_factor")
+    for style, name in (("-", "rms_along"), ("--", "first_order_along")):
+        drawn = [line for line in ax.lines if line.get_linestyle() == style and len(line.get_xdata()) > 1]
+        assert len(drawn) == 2
+        for line, distance in zip(drawn, (0.4, 0.8), strict=True):
+            assert list(line.get_xdata()) == [0.1, 1.0]
+            np.testing.assert_array_equal(line.get_ydata(), of[name].sel(distance=distance).values)
+    assert labels(ax) == ["II", "at 0.4 L", "at 0.8 L", "first order"]
+    assert texts(ax) == ["no answer: II at 1.5 L"]
+    assert ax.get_xlabel() == "noise factor (1 is 0.05 $EI$/$L^2$ and 0.02 $EI$/$L$)"
+    assert is_inside_its_figure(ax)
+
+
+def test_bands_are_dashed_and_posteriors_are_filled(study):
+    seen = study.copy(deep=True)
+    seen["posterior_touched_width"][0, 0, 1] = 0.003
+    ax = plotting.error_map(seen, quantity="touched")
+    assert ax.get_legend().get_title().get_text() == "bands where it is touched: filled markers are posteriors"
+    filled = [line for line in ax.lines if line.get_linestyle() == "None" and len(line.get_xdata()) > 1]
+    np.testing.assert_array_equal(filled[0].get_ydata(), [0.003, np.nan])
+    dashed = [line for line in ax.lines if line.get_linestyle() == "--" and len(line.get_xdata()) > 1]
+    expected = study.expected_touched_width.sel(contour="II", distance=0.4).sortby("noise_factor")
+    np.testing.assert_array_equal(dashed[0].get_ydata(), expected.values)
+    assert same_color(dashed[0].get_markerfacecolor(), "white")
+    assert not same_color(filled[0].get_markerfacecolor(), "white")
+    assert plotting.error_map(study, quantity="touched").get_legend().get_title().get_text().endswith("touched")
+
+
+def test_where_nothing_is_known_the_map_says_so(study):
+    nothing = study.sel(distance=[1.5])
+    assert texts(plotting.error_map(nothing)) == ["no cell of this map has an answer"]
+    assert texts(plotting.error_map(nothing, quantity="gap")) == ["there is no gap"]
+
+
+def test_refusals_of_the_map(study):
+    with pytest.raises(ParameterError, match="this is no error map: give what error_map returned"):
+        plotting.error_map(SOME)
+    with pytest.raises(ParameterError, match="quantity is 'size': choose 'across', 'along', 'touched' or 'gap'"):
+        plotting.error_map(study, quantity="size")
+    with pytest.raises(ParameterError, match="reconstruction is 'best': there are raw, constrained"):
+        plotting.error_map(study, reconstruction="best")
+
+
+# --- Rods -----------------------------------------------------------------------------------------------------------
+
+
+def test_rods_are_coloured_by_width_and_the_best_is_marked():
+    ax = plotting.required_rod(SOME)
+    (mesh,) = ax.collections
+    np.testing.assert_array_equal(np.ma.filled(mesh.get_array(), np.nan), SOME.width.values.T)
+    (star,) = (line for line in ax.lines if line.get_marker() == "*")
+    assert (star.get_xdata()[0], star.get_ydata()[0]) == (0.1, 4e-4)
+    assert labels(ax) == ["bent too far", "does not reach", "cannot be swept", "best: 200 µm"]
+    assert ax.get_xlabel() == "length of the rod [mm]"
+    assert ax.get_ylabel() == "diameter of the rod [µm]"
+    bar = ax.figure.axes[-1]
+    assert bar.get_ylabel() == "mean width of the 95 % band in the gap [µm]"
+    assert is_inside_its_figure(ax)
+
+
+def test_each_rod_that_is_refused_is_hatched():
+    ax = plotting.required_rod(SOME)
+    found = {}
+    for patch in ax.patches:
+        corners = patch.get_xy()[:4]
+        found[patch.get_hatch()] = tuple(
+            bool(low < value < high)
+            for low, high, value in zip(corners.min(axis=0), corners.max(axis=0), (0.1, 8e-4), strict=True)
+        )
+    assert len(ax.patches) == 3
+    assert [all(inside) for inside in found.values()] == [True, False, False]
+
+
+def test_where_no_rod_is_good_none_is_marked():
+    ax = plotting.required_rod(rods([["bent too far"] * 3] * 2, [[1e-4] * 3] * 2))
+    assert labels(ax) == ["bent too far"]
+    empty = plotting.required_rod(rods([["does not reach"] * 3] * 2, [[np.nan] * 3] * 2))
+    assert labels(empty) == ["does not reach"]
+    assert not empty.collections
+
+
+def test_one_rod_alone_is_a_cell_about_itself():
+    ax = plotting.required_rod(SOME.isel(length=[0], diameter=[1]))
+    assert ax.get_xlim()[0] < 0.1 < ax.get_xlim()[1]
+    assert ax.get_ylim()[0] < 4e-4 < ax.get_ylim()[1]
+
+
+def test_rods_of_another_kind_are_refused(found):
+    for wrong in (found["required_noise"].to_dataset(), None):
+        with pytest.raises(ParameterError, match="this is no choice of rods: give what required_rod returned"):
+            plotting.required_rod(wrong)
