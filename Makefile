@@ -10,7 +10,7 @@ PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench coverage calibration shapes recognition misspecification samplers images lint clean
+.PHONY: demo test test-slow bench coverage calibration shapes recognition misspecification designs samplers images lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -40,6 +40,9 @@ recognition: $(READY)
 
 misspecification: $(READY)
 	$(BIN)/python -m benchmarks.misspecification
+
+designs: $(READY)
+	$(BIN)/python -m benchmarks.design
 
 samplers: $(READY)
 	$(BIN)/python -m pip install --quiet --target $(PEERS) --upgrade --no-deps \

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -71,6 +73,17 @@ def test_with_one_truth_it_is_the_information_of_its_record():
     width = 2.0 * stats.norm.ppf(0.975) * np.sqrt(np.einsum("xi,ij,xj->x", slopes, covariance, slopes))
     assert found.width[0] == pytest.approx(width.mean(), rel=1e-3)
     assert found.reached == 1.0
+
+
+def test_a_noisier_load_cell_than_stated_leaves_a_wider_band():
+    """In proportion, where priors say little."""
+    told = known()
+    widths = []
+    for scale in (1.0, 2.0):
+        points = np.array([[0.5, 0.5, 0.0, scale]])
+        one = replace(told, points=points, precision=1e-9 * np.eye(4))
+        widths.append(expected_of((Question(one, np.linspace(-0.5, 0.5, 5), 0.9, 0, 1), Candidate((0.0, 0.0), STEP))))
+    assert widths[1].width[0] == pytest.approx(2.0 * widths[0].width[0], rel=1e-6)
 
 
 @pytest.mark.slow

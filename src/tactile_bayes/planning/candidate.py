@@ -20,7 +20,7 @@ from tactile_bayes.planning.knowledge import Base, Knowledge
 from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["Candidate", "Expected", "Question", "expected_of"]
+__all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
 
 Floats = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def _nested(
     By importance sampling from a t distribution about the mode of the record that Laplace's approximation foresees.
     """
     known = question.known
-    measured = _measured(model, point, rng)
+    measured = measured_of(model, point, rng)
     after = known.model(measured)
     steps = _ROUGH_STEP * parameter_scales(after, point)
 
@@ -151,8 +151,8 @@ def _nested(
     return width, own - evidence, float(1.0 / np.sum(weights**2))
 
 
-def _measured(model: ContourModel, point: Floats, rng: np.random.Generator) -> xr.Dataset:
-    """A record of one truth."""
+def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) -> xr.Dataset:
+    """The model's record, as it may be measured of one truth."""
     loads = model.loads(point[None])[0]
     rod = model.likelihood.rod
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -114,6 +115,7 @@ def record_information(
     """
     located = len(model.located)
     cell = model.likelihood.load_cell if load_cell is None else load_cell.dimensionless(model.likelihood.rod)
+    cell = _scaled(cell, model.noise_scale(point[None])[0])
     present = model.present if channels is None else model.present & channels
     loads, by_parameters, by_angle = reading_slopes(model, point) if slopes is None else slopes
     white = whitening(cell, loads, by_angle, present)(by_parameters)
@@ -129,6 +131,17 @@ def record_information(
         i = model.names.index(name)
         of_noise[i] = 2.0 * share * count / point[i] ** 2
     return RecordInformation(every, of_noise)
+
+
+def _scaled(cell: LoadCell, factors: Floats) -> LoadCell:
+    """The cell with the white noise of its channels as many times larger."""
+    moment, force = float(factors[0]), float(factors[1])
+    return replace(
+        cell,
+        moment_noise=moment * cell.moment_noise,
+        force_noise=force * cell.force_noise,
+        relative_noise=force * cell.relative_noise,
+    )
 
 
 def prior_precision(model: ContourModel) -> Floats:

@@ -1,0 +1,135 @@
+"""Prints how much narrower bands are from a second base that was chosen than from one that was not.
+
+Objects are drawn from the prior, and with them a rig; each is swept from the origin, and inferred. Then it is swept
+from another base: beside the first by half the gap (which is what one would do to close it), or where
+`tactile_bayes.design` says; and inferred from both records together.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+
+import tactile_bayes as tb
+from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.planning.candidate import measured_of
+from tactile_bayes.planning.knowledge import known_from_prior
+from tactile_bayes.tasks import run_tasks
+
+Floats = NDArray[np.float64]
+
+PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.35, 0.3), "x_c": stats.norm(0.0, 0.1)}
+STEP = float(np.radians(2.0))
+ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), (-0.1, 0.0, 0.1)
+SETTINGS = SamplerSettings(ensembles=2, walkers=24, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
+PLACES = 25
+
+
+class Outcome(NamedTuple):
+    """Mean widths of bands over what the first base's sweeps span; gap included."""
+
+    first: float
+    again: float
+    """From the same base once more."""
+    naive: float
+    chosen: float
+    foreseen: float
+    """By `design`, of the base that it chose."""
+    base: tuple[float, float]
+    naive_base: tuple[float, float]
+    message: str
+
+
+def main(objects: int = 100) -> None:
+    rows = []
+    for _, outcome in run_tasks(compared, list(range(objects))):
+        rows.append(outcome)
+        if sys.stderr.isatty():
+            print(f"\r{len(rows)} of {objects}", end="", file=sys.stderr)
+    report(rows)
+
+
+def report(rows: list[Outcome]) -> None:
+    done = [row for row in rows if not row.message]
+    print(f"{len(done)} objects; {len(rows) - len(done)} could not be inferred or reached from a base")
+    for name in ("again", "naive", "chosen"):
+        ratio = np.array([getattr(row, name) / row.first for row in done])
+        print(f"band, {name + ' over that of the first base alone':<42}{_spread(ratio)}")
+    ratio = np.array([row.naive / row.chosen for row in done])
+    print(f"band, {'naive over chosen':<42}{_spread(ratio)}; chosen is narrower in {np.mean(ratio > 1.0):.0%}")
+    print(
+        f"band, {'chosen over what was foreseen':<42}{_spread(np.array([row.chosen / row.foreseen for row in done]))}"
+    )
+
+
+def _spread(ratio: Floats) -> str:
+    logs = np.log(ratio)
+    error = np.exp(logs.std(ddof=1) / np.sqrt(logs.size)) - 1.0
+    low, high = np.quantile(ratio, [0.1, 0.9])
+    return f"{np.exp(logs.mean()):6.3f} ± {error:.1%} (geometric mean), 10 to 90 %: {low:.2f} to {high:.2f}"
+
+
+def compared(number: int) -> Outcome:
+    rng = np.random.default_rng([2031, number])
+    known = known_from_prior(
+        "parabola",
+        draws=1,
+        rng=rng,
+        load_cell=None,
+        rod=None,
+        friction=0.0,
+        nuisances=STANDARD,
+        priors=PRIORS,
+        base=(0.0, 0.0),
+    )
+    point = known.points[0]
+    nan = float("nan")
+    try:
+        first = measured_of(known.model(known.blank([(0.0, 0.0)], STEP)), point, rng)
+        posterior = _inferred(first, number)
+        gap = tb.gap(posterior)
+        x = np.linspace(*_span(posterior), PLACES)
+        candidates = [(float(across), float(above)) for above in ABOVE for across in ACROSS]
+        planned = tb.design(posterior, bases=candidates, drive_steps=[STEP], span=(x[0], x[-1]), seed=number, draws=8)
+        reached = planned.isel(candidate=np.flatnonzero(planned.reached.values == 1.0))
+        best = reached.isel(candidate=int(np.argmin(reached.width.values)))
+        bases = {
+            "again": (0.0, 0.0),
+            "naive": (0.5 * float(gap.width.sel(bound="median")), 0.0),
+            "chosen": (float(best.base_x), float(best.base_y)),
+        }
+        widths = {"first": _width(posterior, x)}
+        for name, base in bases.items():
+            second = measured_of(known.model(known.blank([base], STEP)), point, np.random.default_rng([2032, number]))
+            both = xr.concat([first, second.assign(sweep=second.sweep + 2)], "sample", combine_attrs="override")
+            widths[name] = _width(_inferred(both, number), x)
+    except TactileBayesError as error:
+        return Outcome(nan, nan, nan, nan, nan, (nan, nan), (nan, nan), f"{type(error).__name__}: {error}")
+    foreseen = float(best.width)
+    return Outcome(**widths, foreseen=foreseen, base=bases["chosen"], naive_base=bases["naive"], message="")
+
+
+def _inferred(record: xr.Dataset, seed: int) -> xr.DataTree:
+    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+    return tb.infer_contour(record, load_cell=cell, priors=PRIORS, settings=SETTINGS, seed=seed)
+
+
+def _span(posterior: xr.DataTree) -> tuple[float, float]:
+    ends = posterior["events"].to_dataset().first_contact_x.median(("chain", "draw")).values
+    return float(ends.min()), float(ends.max())
+
+
+def _width(posterior: xr.DataTree, x: Floats) -> float:
+    band = tb.contour_band(posterior, x, probability=0.95)
+    return float(np.mean(band.upper.values - band.lower.values))
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
