@@ -100,6 +100,15 @@ def test_a_volume_grows_as_the_whitening_says(rod):
     assert sign != 0.0
 
 
+def test_a_start_out_of_reach_leads_somewhere():
+    """Where the rod touches nothing there is no snap-off to be made linear."""
+    model = model_of([])
+    point = np.concatenate([contact_fit(model), [1.0]])
+    point[model.names.index("q")] = 1.5
+    centre = whitening_at(model, point, np.random.default_rng(1)).centre
+    assert np.all(np.isfinite(centre))
+
+
 def test_in_its_coordinates_the_posterior_is_nearly_standard_normal():
     """At one noise, amplitude and length scale: what is left of the log-probability varies by less than 1."""
     model = model_of()

@@ -218,8 +218,12 @@ def _linearised(
 
 
 def _condensed(residual: Floats, centre: Floats, units: Floats) -> tuple[Floats, Floats]:
-    """Combinations of residuals of unit noise that tell all, from those beside a centre, which come last."""
+    """Combinations of residuals of unit noise that tell all, from those beside a centre, which come last.
+
+    What is not there at one of the points, like a snap-off where the rod does not reach, says nothing.
+    """
     size = centre.size
+    residual = residual[:, np.isfinite(residual).all(axis=0)]
     slopes = (residual[:size] - residual[size:-1]).T / (2.0 * _STEP)
     axes, sizes, across = np.linalg.svd(slopes, full_matrices=False)
     telling = sizes > _TELLING
