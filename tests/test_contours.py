@@ -284,7 +284,9 @@ MAKERS = {
 @FEW
 @given(data=st.data())
 def test_arrays_of_parameters_are_many_contours(family, make, data):
-    """Each equals the single contour of its own parameters, to the last digit, whichever way it is picked."""
+    """Each equals the single contour of its own parameters, whichever way it is picked, but for rounding: some processors
+    raise arrays to powers otherwise than numbers.
+    """
     shape = data.draw(broadcastable_shapes((), max_dims=2, max_side=3), "shape")
     ranges = (0.3, 2.0), (0.3, 2.0), (1.1, 6.0), (0.1, 0.9), (-0.5, 0.5)
     a, b, n, q, x_c = (data.draw(arrays(float, shape, elements=st.floats(*ends), fill=st.nothing())) for ends in ranges)
@@ -310,10 +312,10 @@ def test_arrays_of_parameters_are_many_contours(family, make, data):
         ):
             single = ask(one)
             assert np.shape(single) == ()
-            np.testing.assert_array_equal(ask(many)[index], single)
-            np.testing.assert_array_equal(ask(full)[index], single)
+            np.testing.assert_allclose(ask(many)[index], single, rtol=1e-12, atol=1e-14)
+            np.testing.assert_allclose(ask(full)[index], single, rtol=1e-12, atol=1e-14)
             if shape:
-                np.testing.assert_array_equal(ask(flat)[number], single)
+                np.testing.assert_allclose(ask(flat)[number], single, rtol=1e-12, atol=1e-14)
     if shape:
         # Lanes along one axis and several slope angles along another.
         lanes = np.arange(flat.shape[0])[:, None]

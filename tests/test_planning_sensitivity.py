@@ -73,7 +73,7 @@ def test_words_say_the_numbers():
     told = in_si()["information"]
     (line,) = [line for line in words(in_si()) if "band of the contour" in line]
     touched, gap = (1e3 * float(told[f"{kind}_width"]) for kind in ("touched", "gap"))
-    assert f"{touched:.3g} mm where it is touched and {gap:.3g} mm in the gap" in line
+    assert f"{touched:.3g} mm wide where it is touched and {gap:.3g} mm wide in the gap" in line
     assert line.startswith("The 95% band")
     needed = in_si()["required_noise"]
     lines = [line for line in words(in_si()) if line.startswith("A mean band")]
