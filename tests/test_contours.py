@@ -284,8 +284,9 @@ MAKERS = {
 @FEW
 @given(data=st.data())
 def test_arrays_of_parameters_are_many_contours(family, make, data):
-    """Each equals the single contour of its own parameters, whichever way it is picked, but for rounding: some processors
-    raise arrays to powers otherwise than numbers.
+    """Each equals the single contour of its own parameters, whichever way it is picked, but for rounding.
+
+    Some processors raise arrays to powers otherwise than numbers.
     """
     shape = data.draw(broadcastable_shapes((), max_dims=2, max_side=3), "shape")
     ranges = (0.3, 2.0), (0.3, 2.0), (1.1, 6.0), (0.1, 0.9), (-0.5, 0.5)
