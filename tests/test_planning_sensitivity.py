@@ -37,6 +37,7 @@ def words(tree):
     return tree.attrs["words"].split("\n")
 
 
+@pytest.mark.slow
 def test_the_groups_are_those_of_single_analyses():
     tree, plan = plain(), Plan(PROFILE)
     assert set(tree.children) == set(PARTS)
