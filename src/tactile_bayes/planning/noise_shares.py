@@ -39,7 +39,8 @@ def noise_shares(
     Parameters
     ----------
     plan : Plan
-        Its load cell's noise counts, and not its bias and drift.
+        Its load cell's white noise counts, as if that of every channel were independent of the others and of the load;
+        bias and drift do not.
     seed : int
     samples : int
         For each index, a power of two; `samples · (noises + 2)` contacts are reconstructed at each place.

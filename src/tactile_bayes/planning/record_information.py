@@ -95,7 +95,9 @@ def record_information(
 
     For errors with a normal distribution it is JᵀΣ⁻¹J, J the derivatives of the readings; for Student's t with ν
     degrees of freedom smaller by (ν + 1)/(ν + 3), with Σ of the scale in place of the standard deviation. That contact
-    ends at the snap-off tells besides which contours are impossible: that has no slope, and does not count.
+    ends at the snap-off tells besides which contours are impossible: that has no slope, and does not count. Nor does
+    what noise in proportion to the loads tells of these by its size; and what is said of the noise's scale is that of
+    white noise, which is too much beside drift or an encoder's noise.
 
     Parameters
     ----------
