@@ -18,6 +18,7 @@ from tactile_bayes.cli.record_options import (
     nuisances_asked,
     rod_asked,
 )
+from tactile_bayes.cli.simulated_rig_options import Bases, Diameter, FlexuralRigidity, ForceNoise, Length, MomentNoise
 from tactile_bayes.cli.task_bar import task_bar
 from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
@@ -37,20 +38,12 @@ def calibrate(
     out: Out,
     family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
     replicates: Annotated[int, typer.Option(help="How many records.", min=1)] = 200,
-    force_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; by default 0.05 EI/L².")
-    ] = None,
-    moment_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; by default 0.02 EI/L.")
-    ] = None,
-    length: Annotated[
-        float | None, typer.Option(help="Rod length [m]; by default everything is dimensionless, in units of the rod.")
-    ] = None,
-    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None,
-    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0,
-    base: Annotated[
-        list[str] | None, typer.Option(help="A pivot, X,Y; give it again for another. By default one at 0,0.")
-    ] = None,
+    force_noise: ForceNoise = None,
+    moment_noise: MomentNoise = None,
+    length: Length = None,
+    flexural_rigidity: FlexuralRigidity = None,
+    diameter: Diameter = 0.0,
+    base: Bases = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 2.0,
     friction: Friction = 0.0,
     nuisance: Nuisances = None,

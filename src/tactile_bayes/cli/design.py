@@ -19,6 +19,7 @@ from tactile_bayes.cli.record_options import (
     nuisances_asked,
     rod_asked,
 )
+from tactile_bayes.cli.simulated_rig_options import Diameter, FlexuralRigidity
 from tactile_bayes.cli.task_bar import task_bar
 from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
@@ -62,8 +63,8 @@ def design(
         float | None, typer.Option(help="Likewise of the moment [N m, or EI/L]; by default 0.02 EI/L.")
     ] = None,
     length: Annotated[float | None, typer.Option(help="Likewise the rod's length [m].")] = None,
-    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None,
-    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0,
+    flexural_rigidity: FlexuralRigidity = None,
+    diameter: Diameter = 0.0,
     friction: Friction = 0.0,
     nuisance: Nuisances = None,
     as_stated: AsStated = False,

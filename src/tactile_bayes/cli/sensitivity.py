@@ -20,6 +20,7 @@ from tactile_bayes.cli.record_options import (
     nuisances_asked,
     rod_asked,
 )
+from tactile_bayes.cli.simulated_rig_options import Bases, Diameter, FlexuralRigidity, ForceNoise, Length, MomentNoise
 from tactile_bayes.cli.task_bar import counted, task_bar
 from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
@@ -44,23 +45,15 @@ def sensitivity(
         Profile, typer.Option(help="Profile of Merker et al. 2018; with --length scaled to the rod.")
     ] = "II",
     distance: Annotated[float, typer.Option(help="Of its vertex above the x axis [rod lengths].")] = 0.5,
-    force_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; by default 0.05 EI/L².")
-    ] = None,
-    moment_noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; by default 0.02 EI/L.")
-    ] = None,
+    force_noise: ForceNoise = None,
+    moment_noise: MomentNoise = None,
     drive_angle_noise: Annotated[
         float, typer.Option(help="Standard deviation of the drive angle [degrees].", min=0.0)
     ] = 0.0,
-    length: Annotated[
-        float | None, typer.Option(help="Rod length [m]; by default everything is dimensionless, in units of the rod.")
-    ] = None,
-    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None,
-    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0,
-    base: Annotated[
-        list[str] | None, typer.Option(help="A pivot, X,Y; give it again for another. By default one at 0,0.")
-    ] = None,
+    length: Length = None,
+    flexural_rigidity: FlexuralRigidity = None,
+    diameter: Diameter = 0.0,
+    base: Bases = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 1.0,
     friction: Friction = 0.0,
     nuisance: Nuisances = None,

@@ -16,7 +16,7 @@ from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.differences import central_slopes
 from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes
-from tactile_bayes.planning.knowledge import Base, Knowledge
+from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
 from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 
@@ -26,9 +26,6 @@ Floats = NDArray[np.float64]
 
 _ROUGH_STEP = 1e-3
 """Of the differences by which loads are made linear, over the scale of each parameter: they are interpolated."""
-
-_COARSE = float(np.radians(5.0))
-"""Step of a drive of which only the events are asked."""
 
 _DEGREES_OF_FREEDOM = 8
 _WIDENING = 1.2
@@ -176,7 +173,7 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
 def _gaps(question: Question, candidate: Candidate, usable: NDArray[np.bool_]) -> Floats:
     """Width of what neither the sweeps so far nor the candidate's touch, between the outermost first contacts."""
     known = question.known
-    model = known.model(known.blank([*known.bases, candidate.base], _COARSE))
+    model = known.model(known.blank([*known.bases, candidate.base], COARSE))
     points = known.points[usable]
     if not len(points):
         return np.array([np.nan])

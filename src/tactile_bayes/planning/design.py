@@ -21,7 +21,7 @@ from tactile_bayes.ledger import TaskProgress
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes
-from tactile_bayes.planning.knowledge import Base, Knowledge, known_from_posterior, known_from_prior
+from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge, known_from_posterior, known_from_prior
 from tactile_bayes.rod import Rod
 from tactile_bayes.tasks import run_tasks
 
@@ -35,7 +35,6 @@ CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
 _PLACES = 25
 _ACROSS = np.linspace(-0.5, 0.5, 11)
 _NESTED = 400
-_COARSE = float(np.radians(5.0))
 
 
 def design(
@@ -198,7 +197,7 @@ def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, flo
         if ends.shape != (2,) or not np.all(np.isfinite(ends)) or not ends[0] < ends[1]:
             raise ParameterError(f"span is {span!r}: give two values of x, the smaller first")
         return float(ends[0]), float(ends[1])
-    model = told.model(told.blank(told.bases or [(0.0, 0.0)], _COARSE))
+    model = told.model(told.blank(told.bases or [(0.0, 0.0)], COARSE))
     events = events_of(model.likelihood, model.contours(told.points), model.rig(told.points), exact=False)
     first = events["first_contact_x"]
     return float(np.nanmedian(np.nanmin(first, axis=1))), float(np.nanmedian(np.nanmax(first, axis=1)))
@@ -241,7 +240,7 @@ def _labelled(question: Question, rows: Sequence[tuple[Candidate, Expected]], cr
 def _present_width(question: Question) -> float:
     """Of the band without a further record."""
     known = question.known
-    model = known.model(known.blank(known.bases or [(0.0, 0.0)], _COARSE))
+    model = known.model(known.blank(known.bases or [(0.0, 0.0)], COARSE))
     wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * question.probability))
     slopes = [height_slopes(model, point, question.x) for point in known.points]
     return wide * float(np.mean([deviation_of_heights(of, known.precision).mean() for of in slopes]))

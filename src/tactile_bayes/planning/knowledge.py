@@ -26,13 +26,13 @@ from tactile_bayes.planning.plan import usual_load_cell
 from tactile_bayes.record import rod_of
 from tactile_bayes.rod import Rod
 
-__all__ = ["Base", "Knowledge", "known_from_posterior", "known_from_prior"]
+__all__ = ["COARSE", "Base", "Knowledge", "known_from_posterior", "known_from_prior"]
 
 Floats = NDArray[np.float64]
 
 Base = tuple[float, float]
 
-_COARSE = float(np.radians(5.0))
+COARSE = float(np.radians(5.0))
 """Step of a drive of which only the events are asked."""
 
 
@@ -104,7 +104,7 @@ def known_from_prior(
     cell = load_cell or usual_load_cell(rod or Rod())
     empty = np.zeros((0, 0))
     known = Knowledge(family, empty, empty, (), rod, cell, friction, tuple(nuisances), dict(priors or {}))
-    model = known.model(known.blank([base], _COARSE))
+    model = known.model(known.blank([base], COARSE))
     strangers = sorted(set(known.priors) - set(model.names))
     if strangers:
         raise ParameterError(
@@ -154,7 +154,7 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
         tuple(nuisances),
         {},
     )
-    model = known.model(known.blank(known.bases, _COARSE))
+    model = known.model(known.blank(known.bases, COARSE))
     every = np.stack([columns[name] for name in model.names], axis=1)
     if unknown:  # a scale that does not vary has no precision of its own
         every[:, -1] *= np.exp(0.05 * rng.standard_normal(len(every)))

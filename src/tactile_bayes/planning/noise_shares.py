@@ -78,7 +78,7 @@ def noise_shares(
     if isinstance(places, bool) or not isinstance(places, int | np.integer) or places < 2:
         raise ParameterError(f"places is {places!r}: give a whole number from 2 up")
     chosen = _places(plan, int(places))
-    quiet = _ideal(chosen, plan)
+    quiet = plan.certain(chosen)
     noises = {**plan.cell.standard_deviations, "drive_angle": plan.cell.drive_angle_deviation}
     sources = [name for name in SOURCES if noises[name] > 0.0]
     laws = [_law(plan, name, noises[name]) for name in sources]
@@ -163,12 +163,6 @@ def _places(plan: Plan, places: int) -> xr.Dataset:
     record = replace(plan, drive_angles=np.concatenate(angles)).scan.record
     near = np.array([np.isin(record.drive_angle.values[i], angles[s]) for i, s in enumerate(record.sweep.values)])
     return record.isel(sample=np.flatnonzero(near & (record.truth_contact_phase.values != "none")))
-
-
-def _ideal(chosen: xr.Dataset, plan: Plan) -> xr.Dataset:
-    """As the load cell would read them but for its noise."""
-    certain = {name: getattr(plan.cell, name) for name in ("bias", "gain", "drive_angle_offset", "frame")}
-    return type(plan.cell)(**certain).measure(chosen, seed=0)
 
 
 def _errors(quiet: xr.Dataset, plan: Plan, method: Method, noise: dict[str, Floats]) -> Floats:

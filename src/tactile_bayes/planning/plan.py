@@ -103,11 +103,15 @@ class Plan:
     @cached_property
     def record(self) -> xr.Dataset:
         """What the load cell would read without errors that are drawn."""
+        return self.certain(self.scan.record)
+
+    def certain(self, record: xr.Dataset) -> xr.Dataset:
+        """An ideal record as the load cell reads it without errors that are drawn."""
         certain = replace(
             LoadCell(),
             **{name: getattr(self.cell, name) for name in ("bias", "gain", "drive_angle_offset", "frame")},
         )
-        return certain.measure(self.scan.record, seed=0)
+        return certain.measure(record, seed=0)
 
     @cached_property
     def family(self) -> str:
