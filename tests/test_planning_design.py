@@ -10,7 +10,7 @@ import xarray as xr
 from scipy import stats
 
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError, ParameterError, StudyError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
@@ -61,7 +61,7 @@ def test_with_one_truth_it_is_the_information_of_its_record():
     point = np.array([0.5, 0.5, 0.0, 1.0])
     one = Knowledge(told.family, point[None], 1e-9 * np.eye(4), (), None, told.load_cell, 0.0, (), dict(PRIORS))
     x = np.linspace(-0.5, 0.5, 11)
-    found = expected_of((Question(one, x, 0.95, 0, 1), Candidate((0.0, 0.0), STEP)))
+    found = expected_of((Question(one, (Candidate((0.0, 0.0), STEP),), x, 0.95, 0, 1), 0))
     angles = np.arange(np.radians(-30.0), np.radians(210.0), STEP)
     plan = Plan(Parabola(0.5, q=0.5), load_cell=told.load_cell, drive_angles=angles, nuisances=[])
     bounds = information(plan)
@@ -82,7 +82,8 @@ def test_a_noisier_load_cell_than_stated_leaves_a_wider_band():
     for scale in (1.0, 2.0):
         points = np.array([[0.5, 0.5, 0.0, scale]])
         one = replace(told, points=points, precision=1e-9 * np.eye(4))
-        widths.append(expected_of((Question(one, np.linspace(-0.5, 0.5, 5), 0.9, 0, 1), Candidate((0.0, 0.0), STEP))))
+        question = Question(one, (Candidate((0.0, 0.0), STEP),), np.linspace(-0.5, 0.5, 5), 0.9, 0, 1)
+        widths.append(expected_of((question, 0)))
     assert widths[1].width[0] == pytest.approx(2.0 * widths[0].width[0], rel=1e-6)
 
 
@@ -143,6 +144,26 @@ def test_what_cannot_be_reached_tells_nothing(posterior):
 @pytest.mark.slow
 def test_the_same_numbers_whatever_the_workers():
     assert designed(workers=1).identical(designed(workers=2))
+
+
+def test_it_goes_on_where_it_was_stopped(tmp_path):
+    class StoppedError(Exception):
+        pass
+
+    def stop(progress):
+        raise StoppedError
+
+    asked = {"bases": [(0.0, 0.0), (0.2, 0.0), (0.0, -2.0)], "draws": 2}
+    with pytest.raises(StoppedError):
+        designed(out=tmp_path, progress=stop, **asked)
+    steps = []
+    found = designed(out=tmp_path, progress=steps.append, **asked)
+    assert [(step.done, step.made) for step in steps] == [(2, 1), (3, 2)]
+    assert found.identical(designed(**asked))
+    by_gap = designed(out=tmp_path, criterion="gap", **asked)  # of the same numbers
+    assert by_gap.width.identical(found.width)
+    with pytest.raises(StudyError, match=r"candidates of another experiment: what is known .*seed is 1 there and 2"):
+        designed(out=tmp_path, **asked, seed=2)
 
 
 def test_the_seed_decides():

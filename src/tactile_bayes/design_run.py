@@ -33,7 +33,7 @@ class DesignRun:
     files: Mapping[str, Path]
 
 
-def design_into(out: str | os.PathLike[str], *args: Any, **options: Any) -> DesignRun:
+def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> DesignRun:
     """Choose the next record, and write what comes out to a folder.
 
     Parameters
@@ -43,6 +43,9 @@ def design_into(out: str | os.PathLike[str], *args: Any, **options: Any) -> Desi
         it are replaced.
     args, options
         As `design` takes them.
+    nested : bool
+        Likewise; what was found of each candidate is then kept in a folder "nested" within, and a run that was stopped
+        goes on.
 
     Returns
     -------
@@ -50,11 +53,11 @@ def design_into(out: str | os.PathLike[str], *args: Any, **options: Any) -> Desi
 
     Raises
     ------
-    ParameterError, InferenceError, ReachError, TaskError
+    ParameterError, InferenceError, ReachError, StudyError, TaskError
         As `design`.
     """
     folder = Path(out)
-    found = design(*args, **options)
+    found = design(*args, nested=nested, out=folder / "nested" if nested else None, **options)
     folder.mkdir(parents=True, exist_ok=True)
     files = {
         "design": folder / "design.nc",

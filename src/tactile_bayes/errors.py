@@ -52,7 +52,7 @@ class CalibrationError(TactileBayesError, ValueError):
 
 
 class StudyError(TactileBayesError, ValueError):
-    """A folder holds the cells of another study."""
+    """A folder holds the cells of another study, or the candidates of another design."""
 
 
 class TaskError(TactileBayesError, RuntimeError):

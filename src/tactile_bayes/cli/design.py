@@ -20,7 +20,7 @@ from tactile_bayes.cli.record_options import (
     rod_asked,
 )
 from tactile_bayes.cli.simulated_rig_options import Diameter, FlexuralRigidity
-from tactile_bayes.cli.task_bar import task_bar
+from tactile_bayes.cli.task_bar import counted, task_bar
 from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
 if TYPE_CHECKING:
@@ -53,7 +53,12 @@ def design(
         Criterion, typer.Option(help="The narrowest band, the smallest gap, or the most information.")
     ] = "band",
     nested: Annotated[
-        bool, typer.Option("--nested", help="Sample each candidate's posteriors as well, which takes longer.")
+        bool,
+        typer.Option(
+            "--nested",
+            help="Sample each candidate's posteriors as well, which takes longer; the same command goes on where it was "
+            "stopped.",
+        ),
     ] = False,
     draws: Annotated[int, typer.Option(help="Objects drawn from what is known.", min=2)] = 24,
     force_noise: Annotated[
@@ -95,10 +100,17 @@ def design(
         }
     steps = drive_step or [2.0]
     count = (len(pivots) if pivots else 11) * len(steps)
-    with going_on(lambda: "nothing was written") as raise_lost, task_bar(count, "candidate", quiet or json) as show:
+    done = 0
+
+    def have() -> str:
+        return f"{done:,} of {counted(count, 'candidate')} are in {out / 'nested'}" if nested else "nothing was written"
+
+    with going_on(have) as raise_lost, task_bar(count, "candidate", quiet or json) as show:
 
         def note(progress: TaskProgress) -> None:
-            show(progress.done)
+            nonlocal done
+            done = progress.done
+            show(done)
             raise_lost()
 
         made = design_into(

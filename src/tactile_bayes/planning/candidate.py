@@ -45,6 +45,7 @@ class Question:
     """What is asked of every candidate."""
 
     known: Knowledge
+    candidates: tuple[Candidate, ...]
     x: Floats
     """Places at which the band matters [length]."""
     probability: float
@@ -69,9 +70,10 @@ class Expected(NamedTuple):
     """Effective draws of the nested posteriors, the median."""
 
 
-def expected_of(task: tuple[Question, Candidate]) -> Expected:
-    """Of one candidate."""
-    question, candidate = task
+def expected_of(task: tuple[Question, int]) -> Expected:
+    """Of one candidate, by its number."""
+    question, number = task
+    candidate = question.candidates[number]
     known = question.known
     model = known.model(known.blank([candidate.base], candidate.drive_step))
     wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * question.probability))

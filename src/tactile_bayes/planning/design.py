@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
+import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from itertools import product
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -17,13 +17,13 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.ledger import TaskProgress
+from tactile_bayes.ledger import TaskProgress, keep_outcomes, open_ledger
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
+from tactile_bayes.planning.design_ledger import CANDIDATES, question_in_words
 from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge, known_from_posterior, known_from_prior
 from tactile_bayes.rod import Rod
-from tactile_bayes.tasks import run_tasks
 
 __all__ = ["CRITERIA", "design"]
 
@@ -53,6 +53,7 @@ def design(
     friction: float = 0.0,
     nuisances: Sequence[str] = STANDARD,
     priors: Mapping[str, Prior] | None = None,
+    out: str | os.PathLike[str] | None = None,
     workers: int | None = 1,
     scheduler: str | None = None,
     progress: Callable[[TaskProgress], object] | None = None,
@@ -87,6 +88,9 @@ def design(
         Of the pointwise band.
     load_cell, rod, friction, nuisances, priors
         As in `infer_contour`, where a family is given; a posterior has its own.
+    out : path-like, optional
+        Folder in which what was found of each candidate is kept, in candidates.json: the same call goes on where it was
+        stopped, or is made again at once.
     workers, scheduler
         As in `calibrate`; by default in this process.
     progress : callable, optional
@@ -118,6 +122,8 @@ def design(
         If the tree is no posterior of a contour.
     ReachError
         If the rod hardly ever reaches a contour of the prior.
+    StudyError
+        If the folder holds candidates of another design.
 
     Notes
     -----
@@ -165,18 +171,14 @@ def design(
     steps = np.atleast_1d(np.asarray(drive_steps, dtype=float))
     if steps.ndim != 1 or not steps.size or not np.all((steps > 0.0) & (steps <= 0.5)):
         raise ParameterError(f"drive_steps are {drive_steps!r}: give positive angles in radians, at most 0.5")
-    candidates = [Candidate(base, float(step)) for base, step in product(_bases(bases, told), steps)]
+    candidates = tuple(Candidate(base, float(step)) for base, step in product(_bases(bases, told), steps))
     x = np.linspace(*_span(span, told), _PLACES)
-    question = Question(told, x, float(probability), _NESTED if nested else 0, int(seed))
-    found: dict[Candidate, Expected] = {}
-    tasks = [(question, candidate) for candidate in candidates]
-    began = time.monotonic()
-    with closing(run_tasks(expected_of, tasks, workers=workers, scheduler=scheduler)) as results:
-        for made, ((_, candidate), expected) in enumerate(results, start=1):
-            found[candidate] = expected
-            if progress is not None:
-                progress(TaskProgress(made, len(tasks), made, time.monotonic() - began))
-    return _labelled(question, [(candidate, found[candidate]) for candidate in candidates], criterion)
+    question = Question(told, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
+    with open_ledger(question_in_words(question), None if out is None else Path(out).resolve(), CANDIDATES) as ledger:
+        found = keep_outcomes(
+            ledger, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
+        )
+    return _labelled(question, [found[number] for number in range(len(candidates))], criterion)
 
 
 def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:
@@ -203,18 +205,17 @@ def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, flo
     return float(np.nanmedian(np.nanmin(first, axis=1))), float(np.nanmedian(np.nanmax(first, axis=1)))
 
 
-def _labelled(question: Question, rows: Sequence[tuple[Candidate, Expected]], criterion: Criterion) -> xr.Dataset:
-    known = question.known
+def _labelled(question: Question, expected: Sequence[Expected], criterion: Criterion) -> xr.Dataset:
+    known, candidates = question.known, question.candidates
     metres = {"units": "1" if known.rod is None or known.rod.is_dimensionless else "m"}
-    expected = [row for _, row in rows]
 
     def column(name: str, part: int, attrs: Mapping[str, Any]) -> tuple[str, Floats, Mapping[str, Any]]:
         return "candidate", np.array([getattr(row, name)[part] for row in expected]), attrs
 
     variables: dict[str, Any] = {
-        "base_x": ("candidate", np.array([candidate.base[0] for candidate, _ in rows]), metres),
-        "base_y": ("candidate", np.array([candidate.base[1] for candidate, _ in rows]), metres),
-        "drive_step": ("candidate", np.array([candidate.drive_step for candidate, _ in rows]), {"units": "rad"}),
+        "base_x": ("candidate", np.array([candidate.base[0] for candidate in candidates]), metres),
+        "base_y": ("candidate", np.array([candidate.base[1] for candidate in candidates]), metres),
+        "drive_step": ("candidate", np.array([candidate.drive_step for candidate in candidates]), {"units": "rad"}),
         "reached": ("candidate", np.array([row.reached for row in expected])),
         "nested_draws": ("candidate", np.array([row.nested_draws for row in expected])),
     }
