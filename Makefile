@@ -10,7 +10,7 @@ PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench coverage calibration shapes recognition misspecification designs samplers images lint clean
+.PHONY: demo test test-slow bench coverage calibration shapes recognition misspecification designs efficiency samplers images lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -43,6 +43,9 @@ misspecification: $(READY)
 
 designs: $(READY)
 	$(BIN)/python -m benchmarks.design
+
+efficiency: $(READY)
+	$(BIN)/python -m benchmarks.efficiency
 
 samplers: $(READY)
 	$(BIN)/python -m pip install --quiet --target $(PEERS) --upgrade --no-deps \

@@ -56,8 +56,8 @@ def design(
         bool,
         typer.Option(
             "--nested",
-            help="Sample each candidate's posteriors as well, which takes longer; the same command goes on where it was "
-            "stopped.",
+            help="Sample each candidate's posteriors as well, which takes longer; the same command goes on where it "
+            "was stopped.",
         ),
     ] = False,
     draws: Annotated[int, typer.Option(help="Objects drawn from what is known.", min=2)] = 24,
