@@ -15,7 +15,7 @@ from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.differences import central_slopes
-from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes
+from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
 from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
@@ -76,7 +76,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     candidate = question.candidates[number]
     known = question.known
     model = known.model(known.blank([candidate.base], candidate.drive_step))
-    wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * question.probability))
+    wide = band_factor(question.probability)
     usable = model.likelihood.usable(model.contours(known.points), model.rig(known.points))
     rows: dict[str, list[float]] = {
         name: [] for name in ("width", "information", "nested_width", "nested_information", "draws")

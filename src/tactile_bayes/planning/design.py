@@ -11,7 +11,6 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_events import events_of
@@ -21,7 +20,7 @@ from tactile_bayes.ledger import TaskProgress, keep_outcomes, open_ledger
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.design_ledger import CANDIDATES, question_in_words
-from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes
+from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge, known_from_posterior, known_from_prior
 from tactile_bayes.rod import Rod
 
@@ -242,6 +241,6 @@ def _present_width(question: Question) -> float:
     """Of the band without a further record."""
     known = question.known
     model = known.model(known.blank(known.bases or [(0.0, 0.0)], COARSE))
-    wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * question.probability))
+    wide = band_factor(question.probability)
     slopes = [height_slopes(model, point, question.x) for point in known.points]
     return wide * float(np.mean([deviation_of_heights(of, known.precision).mean() for of in slopes]))

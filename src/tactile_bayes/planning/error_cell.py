@@ -11,14 +11,13 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
 
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ContourError, InferenceError, ReachError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.planning.amplification import METHODS, amplification
-from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes, stretches
+from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
 from tactile_bayes.reconstruction import reconstruct
@@ -98,7 +97,7 @@ def _expected(plan: Plan, probability: float) -> dict[str, float]:
     """Mean widths of the expected bands."""
     model, point = plan.model, plan.point
     precision = record_information(model, point).matrix + np.diag(prior_precision(model))
-    wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
+    wide = band_factor(probability)
     widths: dict[str, list[Floats]] = {"touched": [], "gap": []}
     for stretch in stretches(plan.scan):
         widths[stretch.name].append(deviation_of_heights(height_slopes(model, point, stretch.x), precision))

@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 from scipy.linalg import solve_triangular
 
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.differences import central_slopes
 from tactile_bayes.scanning import Scan
 
-__all__ = ["Stretch", "deviation_of_heights", "height_slopes", "stretches"]
+__all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "stretches"]
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +49,11 @@ def stretches(scan: Scan) -> list[Stretch]:
             onward = merged[k + 1][0]
             found.append(Stretch("gap", end, onward, np.linspace(end, onward, _PLACES + 2)[1:-1]))
     return found
+
+
+def band_factor(probability: float) -> float:
+    """Width of a pointwise band of a normal distribution, over its standard deviation."""
+    return 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
 
 
 def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:

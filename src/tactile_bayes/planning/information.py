@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
 
 from tactile_bayes.inference.contour_groups import unit_of
-from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes, stretches
+from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
 from tactile_bayes.record import CHANNELS
@@ -75,7 +74,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     x = np.concatenate([stretch.x for stretch in places])
     names = np.repeat([stretch.name for stretch in places], [stretch.x.size for stretch in places])
     spread = deviation_of_heights(height_slopes(model, point, x), matrix + prior)
-    wide = 2.0 * stats.norm.ppf(0.5 + 0.5 * probability)
+    wide = band_factor(probability)
     widths = {
         f"{kind}_width": float(wide * spread[names == kind].mean()) if np.any(names == kind) else np.nan
         for kind in ("touched", "gap")

@@ -11,11 +11,10 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
 from scipy.optimize import brentq
 
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
-from tactile_bayes.planning.expected_band import deviation_of_heights, height_slopes, stretches
+from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
 from tactile_bayes.rod import Rod
@@ -41,7 +40,7 @@ class _Band:
         self._slopes = height_slopes(model, point, x)
         self._by = reading_slopes(model, point)
         self._prior = np.diag(prior_precision(model))
-        self._wide = 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
+        self._wide = band_factor(probability)
 
     def width(self, factor: float) -> float:
         """Mean over places."""
