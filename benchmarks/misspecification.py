@@ -34,6 +34,9 @@ AS_STATED = {
 TWO_BASES = [(0.0, 0.0), (0.3, 0.0)]
 SETTINGS = tb.SamplerSettings(ensembles=2, walkers=26, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=400)
 """Posteriors that agree with no model may have many modes; those that take longer say that they have not converged."""
+COSTLY = {"shape-free": 4, "friction": 2}
+"""Of these cures so many times fewer replicates are made."""
+
 CHANCE, SCORE = 1e-3, 4.0
 """Probability of the misfit, and size of the axial score, that are an alarm."""
 
@@ -92,7 +95,7 @@ def main(replicates: int = 100, *names: str) -> None:
         case = CASES[name]
         print(row(name, calibrated(name, case.world, case.asked, replicates)), flush=True)
         if case.cure is not None:
-            few = max(1, replicates // 4) if case.cured_by == "shape-free" else replicates
+            few = max(1, replicates // COSTLY.get(case.cured_by, 1))
             told = "told of them" if case.cured_by == "told" else f"{case.cured_by} inferred"
             found = calibrated(f"{name}, cured", case.world, case.cure, few)
             print(row(f"  {told}" + (f" ({few})" if few < replicates else ""), found, cured=True), flush=True)
