@@ -22,6 +22,7 @@ from benchmarks.shooting import (
     sweep_by_collocation,
     sweep_by_shooting,
 )
+from benchmarks.starting import starting
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.seen import SeenContour
@@ -69,7 +70,18 @@ def main() -> None:
         likeliest, error_of_likeliest = constrained()
         of_records, rate = data_set()
         of_contour, draws = contour_posterior()
-        print_ratios([*one, *sweeps(by_hand=one[0].otherwise), *two, likeliest, posteriors(), of_contour, of_records])
+        print_ratios(
+            [
+                *one,
+                *sweeps(by_hand=one[0].otherwise),
+                *two,
+                likeliest,
+                posteriors(),
+                of_contour,
+                of_records,
+                *starting(),
+            ]
+        )
         print(f"\n{error_of_one}\n{error_of_two}\n{error_of_likeliest}\n{rate}\n{draws}")
         print("\nTime a piece, for ever more of them:")
         print_growth("state, equilibria", (1_000, 10_000, 100_000, 1_000_000), equilibria)
