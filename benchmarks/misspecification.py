@@ -22,12 +22,15 @@ import tactile_bayes as tb
 OUT = Path("results/misspecification")
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+CHANNELS = ("moment", "force_x", "force_y")
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias")
 AS_STATED = {
     "noise_scale": stats.lognorm(s=1e-3),
     "rigidity_scale": stats.lognorm(s=1e-4),
     "drive_angle_offset": stats.norm(0.0, 1e-5),
-    **{f"{channel}_bias": stats.norm(0.0, 1e-4) for channel in ("moment", "force_x", "force_y")},
+    "friction": stats.halfnorm(scale=1e-4),
+    **{f"{channel}_{what}": stats.norm(0.0, 1e-4) for channel in CHANNELS for what in ("bias", "drift")},
+    **{name: stats.norm(0.0, 1e-5) for name in ("base_2_x", "base_2_y")},
 }
 """Rig and noise are what is stated but for what a world names, though inference does not rely on that."""
 
@@ -104,8 +107,9 @@ def main(replicates: int = 100, *names: str) -> None:
 def calibrated(name: str, world: dict[str, Any], asked: dict[str, Any], replicates: int) -> xr.Dataset:
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in name)
     options = {"nuisances": STANDARD, "load_cell": CELL, "priors": PRIORS, **asked}
-    known = {name for name in AS_STATED if name.endswith("_bias")} if "bias" in options["nuisances"] else set()
-    known |= {"noise_scale", *options["nuisances"]}
+    groups = {what: {f"{channel}_{what}" for channel in CHANNELS} for what in ("bias", "drift")}
+    groups["base"] = {"base_2_x", "base_2_y"}
+    known = {"noise_scale"}.union(*(groups.get(name, {name}) for name in options["nuisances"]))
     in_world = tb.World(**world, priors={name: law for name, law in AS_STATED.items() if name in known})
     if options.get("family") == "shape-free":  # which takes parabolas for any smooth contour, and knows where they lie
         in_world = replace(in_world, family="parabola", priors={**in_world.priors, **PRIORS})

@@ -279,3 +279,14 @@ def test_a_world_out_of_reach_is_told(monkeypatch):
     monkeypatch.setattr(simulation, "_TRIALS", 3)
     with pytest.raises(ReachError, match=r"of 3 contours from the prior the rod reaches none .*: make it differ less"):
         simulated(world=World(base_shift=(0.0, -5.0)))
+
+
+def test_friction_beyond_what_a_rod_slides_with_is_drawn_again():
+    """Half of what is drawn beside that of the world would be too much."""
+    options = {
+        "nuisances": ["friction"],
+        "priors": PRIORS | {"friction": stats.uniform(0.1, 0.3)},
+        "world": World(friction=0.6),
+    }
+    drawn = [simulated(seed, **options).truth["friction"] for seed in range(6)]
+    assert all(0.1 <= friction <= np.tan(0.7) - 0.6 for friction in drawn)

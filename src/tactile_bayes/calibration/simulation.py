@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.contours import Contour
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.likelihood import Rig
@@ -59,12 +60,15 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
         contour = world.contour(model.contours(point))
         rig = world.rig(model.rig(point), experiment.pivots)
         rig = rig._replace(drive_angle_offset=rig.drive_angle_offset + misread)
+        if np.any(np.arctan(rig.friction) > MAX_FRICTION_ANGLE):  # what was drawn, and what the world adds
+            continue
         loads, reached = likelihood.predict(contour, rig)
         if reached[0]:
             break
     else:
         raise ReachError(
-            f"of {_TRIALS} contours from the prior the rod reaches none in the world as it is: make it differ less"
+            f"of {_TRIALS} contours from the prior the rod reaches none in the world as it is, or friction is too "
+            "large: make it differ less"
         )
     values = model.values(point)
     sensed = model.nuisances.sensed(loads, values, likelihood.load_cell)[0]
