@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +19,7 @@ from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
 from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
@@ -30,7 +33,7 @@ from tactile_bayes.uncertainty.predictive import predictive_interval
 from tactile_bayes.uncertainty.suspicions import suspicions
 from tactile_bayes.uncertainty.verdicts import verdicts
 
-__all__ = ["Run", "analyse", "summary"]
+__all__ = ["Run", "analyse", "contact_points", "reach", "summary"]
 
 _DIRECTIONS: tuple[Literal["forward"], Literal["backward"]] = ("forward", "backward")
 
@@ -73,6 +76,8 @@ def analyse(
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     truth: Contour | None = None,
+    record_file: str | os.PathLike[str] | None = None,
+    command: Sequence[str] = (),
     progress: Callable[[Progress], object] | None = None,
 ) -> Run:
     """Contact points, contour posterior, band and figures of a record, written to a folder.
@@ -90,6 +95,10 @@ def analyse(
         Of the band and of the intervals in the summary.
     truth : Contour, optional
         Drawn into the figures.
+    record_file : path-like, optional
+        The file that the record was read from, whose name and SHA-256 the posterior then states.
+    command : sequence of str
+        The words of the command that asked for this run, likewise.
 
     Returns
     -------
@@ -103,6 +112,7 @@ def analyse(
     if not 0.0 < probability < 1.0:
         raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
     measured = with_rod(validate(measured), rod)
+    origin = _origin(measured, probability, record_file, command)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     try:
@@ -119,17 +129,15 @@ def analyse(
         )
     except InferenceError as error:
         raise type(error)(" ".join((str(error), *suspicions(measured, load_cell)))) from error
+    result.attrs |= origin
     files = {"posterior": folder / "posterior.nc"}
     write_result(result, files["posterior"])
 
-    contacts = None
-    if set(present_channels(measured)) == set(CHANNELS):
-        cell = _known_cell(measured, load_cell, result)
-        heavy = cell.degrees_of_freedom <= 2.0  # no standard deviations to weigh the channels by
-        contacts = reconstruct(measured, method="raw" if heavy else "constrained", load_cell=cell, friction=friction)
+    contacts = contact_points(measured, load_cell, result)
+    if contacts is not None:
         files["contacts"] = folder / "contacts.csv"
         _write_table(contacts.to_dataframe(), files["contacts"])
-    band = contour_band(result, _reach(result), probability)
+    band = contour_band(result, reach(result), probability)
     files["band"] = folder / "band.csv"
     _write_table(band.to_dataframe(), files["band"])
     found = verdicts(result, contacts)
@@ -144,13 +152,46 @@ def analyse(
     return Run(result, contacts, band, found, files)
 
 
-def _known_cell(measured: xr.Dataset, load_cell: LoadCell | None, result: xr.DataTree) -> LoadCell:
-    """The load cell, with the median of the noise that was inferred where none was known."""
-    draws = posterior_draws(result)
-    inferred: dict[str, Any] = {
-        name: float(draws[name].median()) for name in ("moment_noise", "force_noise") if name in draws
+def _origin(
+    measured: xr.Dataset, probability: float, record_file: str | os.PathLike[str] | None, command: Sequence[str]
+) -> dict[str, Any]:
+    """Attributes that say what a run was made from, and how it was asked for."""
+    said = {
+        str(name): value.item() if isinstance(value, np.generic) else value
+        for name, value in measured.attrs.items()
+        if not str(name).startswith(("rod_", "load_cell_")) and name != "units"
     }
-    return replace(load_cell or LoadCell.from_record(measured) or LoadCell(), **inferred)
+    origin: dict[str, Any] = {"probability": probability, "record_attributes": json.dumps(said, default=str)}
+    if command:
+        origin["command"] = json.dumps(list(command))
+    if record_file is not None:
+        path = Path(record_file)
+        origin |= {"record_file": path.name, "record_file_sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    return origin
+
+
+def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> xr.Dataset | None:
+    """The contact points of a run: Step 2, with the rig that was found: noise, biases, stiffness, offset, friction.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        The record.
+    load_cell : LoadCell or None
+        As `infer_contour` was given it.
+    posterior : xr.DataTree
+        What that made of the record.
+
+    Returns
+    -------
+    xr.Dataset or None
+        From `reconstruct`; None where a load channel is missing.
+    """
+    if set(present_channels(measured)) != set(CHANNELS):
+        return None
+    record, cell, slid = found_rig(measured, load_cell, posterior)
+    heavy = cell.degrees_of_freedom <= 2.0  # no standard deviations to weigh the channels by
+    return reconstruct(record, method="raw" if heavy else "constrained", load_cell=cell, friction=slid)
 
 
 def summary(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
@@ -188,8 +229,8 @@ def summary(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
     )
 
 
-def _reach(result: xr.DataTree) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Values of x from one end of what the rod touched to the other."""
+def reach(result: xr.DataTree) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Values of x from one end of what the rod touched to the other, where a run has its band; shape (201,)."""
     events = result["events"].to_dataset()
     x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
     lo, hi = np.quantile(x, [0.05, 0.95])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 from dataclasses import asdict
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -27,6 +29,9 @@ __all__ = [
     "to_arviz",
     "write_result",
 ]
+
+_SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")
+"""What a posterior is computed and stored with, beside Python."""
 
 
 def sample_stats(draws: Draws) -> xr.Dataset:
@@ -60,6 +65,7 @@ def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha2
         "inference_library": "tactile-bayes",
         "inference_library_version": version("tactile-bayes"),
         "sampler": f"emcee {version('emcee')}",
+        "versions": _versions(),
         "seed": seed_words(seed),
         "settings": json.dumps(asdict(settings)),
         "data_sha256": data_sha256,
@@ -67,6 +73,11 @@ def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha2
         "message": draws.message,
         **more,
     }
+
+
+@cache
+def _versions() -> str:
+    return json.dumps({"Python": platform.python_version(), **{name: version(name) for name in _SOFTWARE}})
 
 
 def seed_words(seed: Seed) -> str:

@@ -1,0 +1,77 @@
+"""The rig that a posterior has found beside a contour: a load cell that is off, a drive that is, pivots that are."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.inference.likelihood import bases_of
+from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["FoundRig", "found_rig"]
+
+_SHORT = ("moment", "force_x", "force_y")
+
+
+class FoundRig(NamedTuple):
+    """What Step 2 needs to take a record as the posterior does."""
+
+    record: xr.Dataset
+    """With pivots, drive angles and readings freed from what the load cell cannot state: shifts, compliance, drift."""
+    load_cell: LoadCell
+    """Noise, bias, gain (a rod that is stiffer than stated makes it larger) and encoder offset as they were found."""
+    friction: float
+
+
+def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> FoundRig:
+    """Medians of everything that was inferred beside a contour, put where `reconstruct` takes it.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        The record.
+    load_cell : LoadCell or None
+        As `infer_contour` was given it.
+    posterior : xr.DataTree
+        What that made of the record.
+    """
+    draws = posterior_draws(posterior)
+    found = {str(name): float(values.median()) for name, values in draws.data_vars.items()}
+    stated = load_cell or LoadCell.from_record(measured) or LoadCell()
+    names = json.loads(posterior.attrs.get("nuisances", "[]"))
+    rig = {name: value for name, value in found.items() if name in names}
+
+    def of_channels(what: str, otherwise: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+        return np.array([rig.get(f"{channel}_{what}", otherwise) for channel in _SHORT])
+
+    gain: Any = np.array(stated.gain) * of_channels("gain", 1.0) * rig.get("rigidity_scale", 1.0)
+    bias = np.array(stated.bias) + of_channels("bias", 0.0)
+    noise: dict[str, Any] = {name: found[name] for name in ("moment_noise", "force_noise") if name in found}
+    cell = replace(
+        stated,
+        gain=gain,
+        bias=tuple(bias.tolist()),
+        drive_angle_offset=stated.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
+        **noise,
+    )
+    way = np.linspace(-0.5, 0.5, measured.sizes["sample"])
+    columns = {
+        name: measured[name] - drift * way for name, drift in zip(CHANNELS, of_channels("drift", 0.0), strict=True)
+    }
+    columns["drive_angle"] = measured.drive_angle - rig.get("suspension_compliance", 0.0) * (
+        (columns["holding_moment"] - bias[0]) / gain[0, 0]
+    )
+    pivots = np.stack([measured.base_x.values, measured.base_y.values], axis=1)
+    for number, pivot in enumerate(bases_of(measured), start=1):
+        here = np.all(pivots == np.asarray(pivot), axis=1)
+        for name in ("base_x", "base_y"):
+            shift = rig.get(f"base_{number}_{name[-1]}", 0.0)
+            columns[name] = columns.get(name, measured[name]) + shift * here
+    record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
+    return FoundRig(record, cell, rig.get("friction", float(posterior.attrs["friction"])))

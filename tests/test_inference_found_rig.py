@@ -1,0 +1,134 @@
+"""A rig that was found: Step 2 of a record with known faults, told by a posterior, gives the true contacts."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import tactile_bayes as tb
+from tactile_bayes.inference.found_rig import found_rig
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.run import contact_points
+
+CONTOUR = tb.contours.Parabola(0.5, q=0.5)
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+
+FAULTS = {
+    "rigidity_scale": 1.07,
+    "drive_angle_offset": 0.03,
+    "moment_bias": 0.1,
+    "force_x_bias": -0.2,
+    "force_y_bias": 0.3,
+    "moment_drift": 0.2,
+    "force_x_drift": 0.1,
+    "force_y_drift": -0.4,
+    "force_x_gain": 1.03,
+    "suspension_compliance": 0.04,
+    "friction": 0.2,
+    "base_2_x": 0.02,
+    "base_2_y": -0.01,
+}
+
+
+def posterior_of(**values):
+    """Draws whose medians are these."""
+    draws = {name: (("chain", "draw"), value + np.array([[-1e-3, 0.0, 1e-3]])) for name, value in values.items()}
+    tree = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
+    tree.attrs |= {"nuisances": json.dumps(list(values)), "friction": 0.0, "family": "parabola"}
+    return tree
+
+
+def read_with(faults, *, stated=None, bases=((0.0, 0.0), (0.25, 0.0)), friction=0.0):
+    """What the rig reads, without noise, and where the rod really touches."""
+    truth = tb.scan(CONTOUR, base=bases, drive_step=np.radians(4.0), friction=faults.get("friction", friction)).record
+    loads = np.stack([truth[name].values for name in CHANNELS], axis=1) * faults.get("rigidity_scale", 1.0)
+    slope = truth.drive_angle.values + faults.get("suspension_compliance", 0.0) * loads[:, 0]
+    short = ("moment", "force_x", "force_y")
+    loads = loads * [faults.get(f"{name}_gain", 1.0) for name in short]
+    if stated is not None:
+        loads = loads @ np.array(stated.gain).T + np.array(stated.bias)
+    loads += [faults.get(f"{name}_bias", 0.0) for name in short]
+    way = np.linspace(-0.5, 0.5, len(loads))
+    loads += way[:, None] * [faults.get(f"{name}_drift", 0.0) for name in short]
+    columns = dict(zip(CHANNELS, loads.T, strict=True))
+    columns["drive_angle"] = (
+        slope + faults.get("drive_angle_offset", 0.0) + (stated.drive_angle_offset if stated else 0.0)
+    )
+    second = truth.sweep.values >= 2
+    for name in ("base_x", "base_y"):
+        columns[name] = truth[name].values - second * faults.get(f"base_2_{name[-1]}", 0.0)
+    read = truth.drop_vars([name for name in truth.data_vars if str(name).startswith("truth_")])
+    return read.assign({name: ("sample", values, read[name].attrs) for name, values in columns.items()}), truth
+
+
+def off(read, truth, cell, posterior):
+    """How far contacts of the loaded samples are off, and how much is left over."""
+    record, found, friction = found_rig(read, cell, posterior)
+    contacts = tb.reconstruct(record, method="constrained", load_cell=found, friction=friction)
+    loaded = np.hypot(truth.force_x, truth.force_y).values > 0.6
+    x, y = (contacts[f"contact_{axis}"] - truth[f"truth_contact_{axis}"] for axis in "xy")
+    return np.hypot(x, y).values[loaded].max(), np.nanmax(contacts.misfit.values[loaded])
+
+
+GROUPS = [[name] for name in FAULTS] + [
+    ["rigidity_scale", "drive_angle_offset", "moment_bias", "force_x_bias", "force_y_bias"],
+    [name for name in FAULTS if name != "suspension_compliance"],
+]
+
+
+@pytest.mark.parametrize(
+    "names", GROUPS, ids=lambda names: "+".join(names) if len(names) < 3 else f"{len(names)} faults"
+)
+def test_contacts_are_true_if_the_faults_are_found(names):
+    """Without them they are not: each fault shows, in the contacts or in what is left over."""
+    faults = {name: FAULTS[name] for name in names}
+    read, truth = read_with(faults)
+    distance, misfit = off(read, truth, CELL, posterior_of(**faults))
+    assert distance < 1e-6
+    assert misfit < 1e-6
+    distance, misfit = off(read, truth, CELL, posterior_of())
+    assert distance > 1e-3 or misfit > 0.1
+
+
+def test_they_come_on_top_of_what_the_load_cell_states():
+    stated = tb.LoadCell(
+        force_noise=0.05,
+        moment_noise=0.02,
+        bias=(0.05, 0.1, -0.1),
+        gain=((1.0, 0.0, 0.02), (0.01, 1.1, 0.0), (0.0, 0.03, 0.95)),
+        drive_angle_offset=-0.02,
+    )
+    faults = {name: FAULTS[name] for name in ("rigidity_scale", "drive_angle_offset", "force_x_gain", "force_y_bias")}
+    read, truth = read_with(faults, stated=stated)
+    distance, misfit = off(read, truth, stated, posterior_of(**faults))
+    assert distance < 1e-6
+    assert misfit < 1e-6
+
+
+def test_what_was_not_inferred_stays_as_stated():
+    read, _ = read_with({})
+    record, cell, friction = found_rig(read, CELL, posterior_of(noise_scale=1.3))
+    assert record.identical(read)
+    assert cell == CELL
+    assert friction == 0.0
+
+
+def test_noise_that_was_inferred_is_the_load_cells():
+    read, _ = read_with({})
+    cell = found_rig(read, None, posterior_of(moment_noise=0.03, force_noise=0.06)).load_cell
+    assert (cell.moment_noise, cell.force_noise) == (0.03, 0.06)
+
+
+def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
+    """Its single samples agree with one another once its stiffness is known."""
+    read, _ = read_with({"rigidity_scale": 1.05})
+    measured = CELL.measure(read, seed=1)
+    settings = tb.SamplerSettings(ensembles=2, walkers=24, max_r_hat=1.05, min_ess=200.0, max_steps=400)
+    posterior = tb.infer_contour(measured, load_cell=CELL, seed=1, settings=settings)
+    assert tb.reconstruct(measured, method="constrained", load_cell=CELL).attrs["misfit_probability"] < 1e-6
+    contacts = contact_points(measured, CELL, posterior)
+    assert contacts.attrs["misfit_probability"] > 1e-3
+    assert tb.verdicts(posterior, contacts)[0].startswith("All is well")
