@@ -126,3 +126,20 @@ def test_samples_without_a_contact_are_refused(contacts, posterior):
         contact_ellipses(contacts, samples=[0, 1], ax=own_axes())
     with pytest.raises(ParameterError, match="no sample here has a contact: choose others"):
         contact_regions(posterior, samples=[0], ax=own_axes())
+
+
+def test_a_region_is_whole_and_a_low_map_is_in_a_low_figure(contacts, posterior):
+    ax = contact_regions(posterior)
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    for part in outlines(ax):
+        for corners in (c for path in part.get_paths() for c in path.to_polygons(closed_only=False)):
+            x, y = np.transpose(corners)
+            assert left < x.min() < x.max() < right
+            assert bottom < y.min() < y.max() < top
+    for drawn in (ax, contact_ellipses(contacts)):
+        wide, high = drawn.figure.get_size_inches()
+        assert wide == 7.0
+        assert high < 4.0
+    _, given = plt.subplots(figsize=(5.0, 5.0))
+    contact_ellipses(contacts, ax=given)
+    np.testing.assert_array_equal(given.figure.get_size_inches(), 5.0)

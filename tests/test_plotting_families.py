@@ -175,3 +175,52 @@ def test_what_has_no_prior_is_refused(posterior):
         plotting.prior_contours(posterior["posterior"].to_dataset())
     with pytest.raises(ParameterError, match="contours is 0: give a whole number from 1 up, like 40"):
         plotting.prior_contours(posterior, contours=0)
+
+
+# --- Contours from the posterior ------------------------------------------------------------------------------------
+
+
+def coloured(ax, colour, alpha):
+    return [drawn for drawn in ax.lines if drawn.get_color() == colour and drawn.get_alpha() == alpha]
+
+
+def test_contours_of_the_posterior_are_drawn_over_those_of_the_prior(posterior):
+    ax = plotting.posterior_contours(posterior, contours=3, truth=CONTOUR)
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert labels == [
+        "rod's reach",
+        "parabola, from the prior",
+        "parabola, from the posterior",
+        "true contour",
+        "pivot",
+    ]
+    group, prior = posterior["posterior"].to_dataset(), posterior["prior"].to_dataset()
+    colours = {"prior": "#E69F00", "posterior": plotting.PALETTE["median"]}
+    for name, draws in (("prior", prior), ("posterior", group)):
+        values = np.stack([draws[of].values.ravel() for of in ("a", "q", "x_c")], axis=1)
+        chosen = values[np.linspace(0, len(values) - 1, 3).astype(int)]
+        drawn = coloured(ax, colours[name], 0.2)
+        for line_drawn, parameters in zip(drawn, chosen, strict=True):
+            expected = Parabola(*parameters).height(line_drawn.get_xdata())
+            np.testing.assert_allclose(line_drawn.get_ydata(), expected, rtol=1e-12)
+    below, above = (coloured(ax, colours[name], 0.7) for name in colours)
+    assert max(drawn.get_zorder() for drawn in below) < min(drawn.get_zorder() for drawn in above)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
+
+
+def test_a_posterior_is_drawn_without_its_prior_and_into_axes_given(posterior):
+    _, ax = plt.subplots()
+    assert plotting.posterior_contours(posterior.filter(lambda node: node.name != "prior"), ax=ax) is ax
+    assert not any("prior" in text.get_text() for text in ax.get_legend().get_texts())
+
+
+@pytest.mark.parametrize("count", [0, True, 2.5])
+def test_a_count_that_is_none_is_refused(posterior, count):
+    with pytest.raises(ParameterError, match="give a whole number from 1 up, like 40"):
+        plotting.posterior_contours(posterior, contours=count)
+
+
+def test_what_is_no_posterior_is_refused(posterior):
+    for wrong in (posterior["posterior"].to_dataset(), posterior["prior"]):
+        with pytest.raises(ParameterError, match="this is no posterior of a contour"):
+            plotting.posterior_contours(wrong)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("contours", "datasets", "elastica", "errors", "plotting")
+_MODULES = ("contours", "datasets", "elastica", "errors", "paper_figures", "plotting")
 
 _HOMES = {
     "LoadCell": "load_cell",
@@ -42,6 +42,7 @@ _HOMES = {
     "infer_contacts": "inference.contact_posterior",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
+    "inspect_record": "inspection",
     "make_record": "record",
     "normal_band": "uncertainty.normal_band",
     "predictive_interval": "uncertainty.predictive",
@@ -57,6 +58,7 @@ _HOMES = {
     "to_arviz": "inference.result",
     "verdicts": "uncertainty.verdicts",
     "write_record": "record",
+    "write_report": "report",
     "write_result": "inference.result",
     "zero_load": "load_cell",
 }
@@ -68,6 +70,7 @@ if TYPE_CHECKING:
     from tactile_bayes import datasets as datasets
     from tactile_bayes import elastica as elastica
     from tactile_bayes import errors as errors
+    from tactile_bayes import paper_figures as paper_figures
     from tactile_bayes import plotting as plotting
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
     from tactile_bayes.calibration.world import World as World
@@ -78,6 +81,7 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.result import read_result as read_result
     from tactile_bayes.inference.result import to_arviz as to_arviz
     from tactile_bayes.inference.result import write_result as write_result
+    from tactile_bayes.inspection import inspect_record as inspect_record
     from tactile_bayes.load_cell import LoadCell as LoadCell
     from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
     from tactile_bayes.load_cell import RandomWalk as RandomWalk
@@ -93,6 +97,7 @@ if TYPE_CHECKING:
     from tactile_bayes.record import make_record as make_record
     from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record
+    from tactile_bayes.report import write_report as write_report
     from tactile_bayes.rod import Rod as Rod
     from tactile_bayes.scanning import equilibria as equilibria
     from tactile_bayes.scanning import scan as scan

@@ -13,6 +13,7 @@ __all__ = [
     "RecordError",
     "SpecificationError",
     "StrainWarning",
+    "StudyError",
     "TactileBayesError",
     "TactileBayesWarning",
     "TaskError",

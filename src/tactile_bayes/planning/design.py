@@ -32,7 +32,8 @@ Criterion = Literal["band", "gap", "information"]
 CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
 
 _PLACES = 25
-_ACROSS = np.linspace(-0.5, 0.5, 11)
+ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), np.array([-0.1, 0.0, 0.1])
+"""Places of pivots, over the rod's length."""
 _NESTED = 400
 
 
@@ -69,8 +70,8 @@ def design(
         name of a family, of which nothing but its prior is known.
     seed : int
     bases : sequence of (float, float), optional
-        Pivots to choose from [length]; by default eleven from half a rod's length to the left to half to the right, at
-        the height of the pivot so far.
+        Pivots to choose from [length]; by default eleven from half a rod's length to the left of the pivot so far to
+        half to the right, at its height and a tenth of the rod's length below and above.
     drive_steps : sequence of float
         Steps of the drive to choose from [rad].
     criterion : {"band", "gap", "information"}
@@ -111,7 +112,8 @@ def design(
         nested_width, nested_width_error, nested_information, nested_information_error, nested_draws
             The same by nested Monte Carlo, of the draws that are reached; NaN without. Effective draws are the median.
 
-        Numbers: present_width, of the band without a further record [length]; best, the index of the best candidate.
+        Over "pivot", those of the records so far, present_base_x and present_base_y [length]. Numbers: present_width,
+        of the band without a further record [length]; best, the index of the best candidate.
 
     Raises
     ------
@@ -183,7 +185,7 @@ def design(
 def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:
     if bases is None:
         x, y = told.bases[0] if told.bases else (0.0, 0.0)
-        return [(float(x + told.length * across), float(y)) for across in _ACROSS]
+        return [(float(x + told.length * dx), float(y + told.length * dy)) for dy in ABOVE for dx in ACROSS]
     pivots = np.asarray(bases, dtype=float)
     if pivots.ndim != 2 or pivots.shape[1] != 2 or not pivots.size or not np.all(np.isfinite(pivots)):
         raise ParameterError(f"bases are {bases!r}: give a list of pivots, [(x, y), (x, y)]")
@@ -230,6 +232,8 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
     values = variables[wanted][1]
     order = -values if criterion == "information" else values
     best = int(np.nanargmin(np.where(np.isfinite(order), order, np.inf)))
+    for k, name in enumerate(("present_base_x", "present_base_y")):
+        variables[name] = ("pivot", np.array([base[k] for base in known.bases], dtype=float), metres)
     return xr.Dataset(
         {**variables, "present_width": ((), _present_width(question), metres), "best": ((), best)},
         coords={"x": ("x", question.x, metres)},

@@ -2,7 +2,8 @@
 
 Without Axes a function makes a figure itself, about 7 inches wide. Axes hold data in the units of the record, angles in
 degrees; in SI their tick labels carry the prefix that the axis label names. Matplotlib is loaded when a figure is
-made; its settings are left alone, and nothing is shown.
+made; its settings are left alone, and nothing is shown. `style` is a block in which figures have one look, for print or
+for the screen.
 """
 
 from tactile_bayes.plotting.axes import PALETTE
@@ -15,14 +16,17 @@ from tactile_bayes.plotting.error_growth import amplification
 from tactile_bayes.plotting.error_lines import error_map
 from tactile_bayes.plotting.family_bars import families
 from tactile_bayes.plotting.gap_map import gap
+from tactile_bayes.plotting.inspection_panels import inspection
 from tactile_bayes.plotting.leverage_map import information
 from tactile_bayes.plotting.noise_requirement import required_noise
+from tactile_bayes.plotting.posterior_contours import posterior_contours
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.prior_contours import prior_contours
 from tactile_bayes.plotting.records import observables, predictive
 from tactile_bayes.plotting.rod_map import rods
 from tactile_bayes.plotting.rod_requirement import required_rod
 from tactile_bayes.plotting.share_bars import noise_shares
+from tactile_bayes.plotting.style import style
 from tactile_bayes.plotting.tightening import tightening
 from tactile_bayes.plotting.touch_map import touched
 
@@ -40,14 +44,17 @@ __all__ = [
     "families",
     "gap",
     "information",
+    "inspection",
     "noise_shares",
     "observables",
     "pairs",
+    "posterior_contours",
     "predictive",
     "prior_contours",
     "required_noise",
     "required_rod",
     "rods",
+    "style",
     "tightening",
     "touched",
     "trace",

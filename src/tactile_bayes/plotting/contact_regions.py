@@ -11,7 +11,7 @@ from scipy.special import chdtri
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, legend_entry, single_axes
-from tactile_bayes.plotting.maps import finish_map, outline
+from tactile_bayes.plotting.maps import finish_map, fit_height, outline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,6 +74,7 @@ def contact_ellipses(
             "no contact here has a standard deviation: reconstruct with a load cell that states its noise, and choose "
             "samples that are in contact"
         )
+    own = ax is None
     ax = single_axes() if ax is None else ax
     radius = radius_of(probability)
     x, y = contacts["contact_x"].values, contacts["contact_y"].values
@@ -82,6 +83,8 @@ def contact_ellipses(
         ax.add_patch(ellipse_of(contacts, i, radius, fill=False, edgecolor=colour, linewidth=1.0))
         ax.plot(x[i], y[i], marker="+", color=colour, markersize=5.0, zorder=3)
     _finish(ax, contacts, chosen, x, y, truth, contacts["contact_phase"].values, f"{100 * probability:.6g} % ellipse")
+    if own:
+        fit_height(ax)
     return ax
 
 
@@ -137,6 +140,7 @@ def contact_regions(
     chosen = chosen[has[chosen]]
     if not chosen.size:
         raise ParameterError("no sample here has a contact: choose others")
+    own = ax is None
     ax = single_axes() if ax is None else ax
     phase = np.where(tangential > 0.5, "tangential", "tip")
     corners: list[Any] = []
@@ -144,10 +148,13 @@ def contact_regions(
         region = contact_region(draws, int(labels[i]), probability)
         grid_x, grid_y, density = region.grid()
         lines = ax.contour(grid_x, grid_y, density, levels=[region.level], colors=[PALETTE[phase[i]]], linewidths=1.0)
+        lines.sticky_edges.x[:], lines.sticky_edges.y[:] = [], []  # those of the grid, which would cut regions off
         corners.extend(line for path in lines.get_paths() for line in path.to_polygons(closed_only=False))
         ax.plot(x[i], y[i], marker="+", color=PALETTE[phase[i]], markersize=5.0, zorder=3)
     ax.dataLim.update_from_data_xy(np.concatenate(corners), ignore=True)  # of the outlines, not of their grids
     _finish(ax, draws, chosen, x, y, truth, phase, f"{100 * probability:.6g} % region")
+    if own:
+        fit_height(ax)
     return ax
 
 
@@ -198,7 +205,7 @@ def _finish(
     for name, words in PHASES.items():
         if np.any(phase[chosen] == name):
             legend_entry(ax, f"{label}, {words}", color=PALETTE[name], linewidth=1.0)
-    ax.autoscale_view()
+    ax.autoscale_view(tight=False)  # contour lines ask for tight limits
     if truth is not None:
         low, high = ax.get_xlim()
         bottom, top = ax.get_ylim()

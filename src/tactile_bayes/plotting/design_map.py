@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import BASES, PALETTE, single_axes
+from tactile_bayes.plotting.axes import Floats, legend_entry, number, set_unit, shown_unit, single_axes
+from tactile_bayes.plotting.design_lines import draw_design_lines, kind_of
+from tactile_bayes.plotting.maps import draw_pivot
+from tactile_bayes.plotting.tiles import tile_edges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["design"]
 
-_KINDS = {
-    "band": ("width", "width of the band to be expected", True),
-    "gap": ("gap", "width that no sweep touches", True),
-    "information": ("information", "information to be expected [nat]", False),
-}
-_MARKS = "osD^vP"
+_HEIGHTS_OF_A_MAP = 3
+"""From which on a grid of places is drawn as a map, and not as lines."""
 
 
 def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """The criterion over the place of the pivot, a line for each height and drive step, and the best of all.
+    """The criterion over the place of the pivot, the best place of all, and the pivots so far.
 
-    Bars are two standard errors over the objects drawn. Where posteriors were sampled as well, crosses show what these
-    gave.
+    Places that form a grid of at least three heights and as many columns are a map, in tiles; with several drive steps
+    it is that of the step of the best. Else there is a line for each height and drive step, with bars of two standard
+    errors over the objects drawn; where posteriors were sampled as well, crosses show what these gave.
 
     Parameters
     ----------
@@ -39,6 +39,7 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
+        Beside a map, in its figure, stands the scale of colours.
 
     Raises
     ------
@@ -55,54 +56,90 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> design(found, ax=Figure().subplots()).get_xlabel()
     'place of the pivot $x$ [$L$]'
     """
-    if not (isinstance(found, xr.Dataset) and {"base_x", "drive_step", "best"} <= set(found)):
+    if not (isinstance(found, xr.Dataset) and {"base_x", "drive_step", "best", "present_base_x"} <= set(found)):
         raise ParameterError("this is no design: give what tactile_bayes.design has returned")
+    pivots = np.stack([found["present_base_x"].values, found["present_base_y"].values], axis=-1)
     ax = single_axes() if ax is None else ax
-    name, words_of_it, is_length = _KINDS[str(found.attrs["criterion"])]
-    si = found.base_x.attrs.get("units") == "m"
-    scale = 1e3 if si and is_length else 1.0
-    x = found.base_x.values * (1e3 if si else 1.0)
-    y, step = found.base_y.values, found.drive_step.values
-    values, errors = scale * found[name].values, scale * found[f"{name}_error"].values
-    lines = sorted(set(zip(y.tolist(), step.tolist(), strict=True)))
-    several = len(set(y.tolist())) > 1, len(set(step.tolist())) > 1
-    for k, (height, of_step) in enumerate(lines):
-        here = np.flatnonzero((y == height) & (step == of_step))
-        here = here[np.argsort(x[here])]
-        words = []
-        if several[0]:
-            words.append(f"$y$ = {1e3 * height:.4g} mm" if si else f"$y$ = {height:.3g} $L$")
-        if several[1]:
-            words.append(f"steps of {np.degrees(of_step):.3g}°")
-        colour = BASES[k % len(BASES)]
-        ax.errorbar(
-            x[here],
-            values[here],
-            2.0 * np.nan_to_num(errors[here]),
-            color=colour,
-            marker=_MARKS[k % len(_MARKS)],
-            markersize=4.0,
-            linewidth=1.2,
-            elinewidth=0.8,
-            capsize=2.0,
-            label=", ".join(words) or "Laplace's approximation",
-        )
-        if f"nested_{name}" in found:
-            nested = scale * found[f"nested_{name}"].values[here]
-            if np.isfinite(nested).any():
-                ax.plot(
-                    x[here], nested, "x", color=colour, markersize=7.0, label="sampled posteriors" if not k else None
-                )
-    best = int(found.best)
-    ax.plot(x[best], values[best], "o", markersize=12.0, markerfacecolor="none", color=PALETTE["change"], label="best")
-    if name == "width":
-        present = scale * float(found.present_width)
-        if present < 3.0 * np.nanmax(values):
-            ax.axhline(present, color=PALETTE["none"], linestyle="--", linewidth=1.0, label="without a further record")
-    ax.set_xlabel(f"place of the pivot $x$ [{'mm' if si else '$L$'}]")
-    ax.set_ylabel(f"{words_of_it} [{'mm' if si else '$L$'}]" if is_length else words_of_it)
-    ax.set_ylim(bottom=0.0 if is_length else None)
-    ax.spines[["top", "right"]].set_visible(False)
-    if len(ax.get_legend_handles_labels()[1]) > 1:
-        ax.legend(fontsize="small", frameon=False)
+    grid = _grid_of(found)
+    if grid is None:
+        draw_design_lines(ax, found, pivots)
+    else:
+        _draw_map(ax, found, grid, pivots)
     return ax
+
+
+class _Grid(NamedTuple):
+    """Places in rows and columns, and what is expected from each."""
+
+    x: Floats
+    y: Floats
+    values: Floats
+    """Shape (rows, columns); NaN where there is no candidate, or nothing is to be expected."""
+    drive_step: float
+    has_other_steps: bool
+
+
+def _grid_of(found: xr.Dataset) -> _Grid | None:
+    """The candidates of the best one's drive step, if they fill a grid that is worth a map."""
+    steps = found["drive_step"].values
+    step = float(steps[int(found["best"])])
+    chosen = found.isel(candidate=np.flatnonzero(steps == step))
+    x, column = np.unique(chosen["base_x"].values, return_inverse=True)
+    y, row = np.unique(chosen["base_y"].values, return_inverse=True)
+    if min(x.size, y.size) < _HEIGHTS_OF_A_MAP or chosen.sizes["candidate"] != x.size * y.size:
+        return None
+    values = np.full((y.size, x.size), np.nan)
+    values[row, column] = chosen[kind_of(found)[0]].values
+    return _Grid(x, y, values, step, bool(np.any(steps != step)))
+
+
+def _draw_map(ax: Axes, found: xr.Dataset, grid: _Grid, pivots: Floats) -> None:
+    name, words, is_length = kind_of(found)
+    edges = tile_edges(grid.x), tile_edges(grid.y)
+    shown = np.ma.masked_invalid(grid.values)
+    mesh = ax.pcolormesh(*edges, shown, cmap="cividis_r" if is_length else "cividis", zorder=0.5)
+    ax.set_facecolor("0.9")
+    if np.ma.is_masked(shown):
+        legend_entry(ax, "out of reach", color="0.9", marker="s", markersize=8.0, linestyle="none")
+    ax.set_aspect("equal", adjustable="box")
+    ax.set_xlim(edges[0][0], edges[0][-1])
+    ax.set_ylim(edges[1][0], edges[1][-1])
+    for k, (x, y) in enumerate(pivots.tolist()):
+        draw_pivot(ax, (x, y), label="" if k else "pivot so far")
+    best = found.isel(candidate=int(found["best"]))
+    power, unit = shown_unit("contact_x", found[name].attrs, grid.values) if is_length else (0, "nat")
+    ax.plot(
+        [float(best["base_x"])],
+        [float(best["base_y"])],
+        "*",
+        color="#D55E00",
+        markersize=14.0,
+        markeredgecolor="white",
+        zorder=5.5,
+        label=f"best: {number(float(best[name]), power, digits=3)} {unit}",
+    )
+    attrs, limits = found["base_x"].attrs, np.concatenate(edges)
+    set_unit(ax.xaxis, "place of the pivot $x$ ", "contact_x", attrs, limits)
+    set_unit(ax.yaxis, "place of the pivot $y$ ", "contact_y", attrs, limits)
+    _draw_scale(ax, mesh, f"{words} [{unit}]" if is_length else words, power)
+    title = f"steps of {np.degrees(grid.drive_step):.3g}°" if grid.has_other_steps else None
+    ax.legend(
+        title=title,
+        title_fontsize="small",
+        fontsize="small",
+        frameon=False,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=3,
+    )
+
+
+def _draw_scale(ax: Axes, mesh: Any, label: str, power: int) -> None:
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    is_low = abs(np.ptp(ax.get_ylim())) < 0.45 * abs(np.ptp(ax.get_xlim()))
+    bar = ax.figure.colorbar(mesh, ax=ax, orientation="horizontal" if is_low else "vertical")
+    bar.locator = MaxNLocator(5)
+    bar.formatter = FuncFormatter(lambda value, _: number(value, power))
+    bar.update_ticks()
+    bar.set_label(label)

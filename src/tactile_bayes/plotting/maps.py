@@ -21,6 +21,7 @@ __all__ = [
     "draw_object",
     "draw_pivot",
     "finish_map",
+    "fit_height",
     "limits_of",
     "outline",
     "write_on_top",
@@ -52,6 +53,14 @@ def finish_map(ax: Axes, attrs: Mapping[Any, Any]) -> None:
         else {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": min(4, len(labels))}
     )
     ax.legend(handles, labels, fontsize="small", frameon=False, **place)
+
+
+def fit_height(ax: Axes) -> None:
+    """Make a figure that holds nothing but a low map as low as that, with room for labels and legend."""
+    left, right, bottom, top = limits_of(ax)
+    figure: Any = ax.figure
+    wide, high = figure.get_size_inches()
+    figure.set_size_inches(wide, min(high, max(1.8, 0.88 * wide * (top - bottom) / (right - left) + 1.0)))
 
 
 def outline(contour: Contour, low: float, high: float) -> tuple[Floats, Floats]:

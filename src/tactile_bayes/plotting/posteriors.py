@@ -104,7 +104,8 @@ def pairs(
     Returns
     -------
     ndarray of Axes, shape (parameters, parameters)
-        Those above the diagonal are switched off.
+        Those above the diagonal are switched off. A figure of more than six parameters (seven in print) is wider than 7
+        inches, so that letters have room: for a page, choose `names`.
 
     Raises
     ------
@@ -118,6 +119,8 @@ def pairs(
     >>> pairs(xr.Dataset(draws), truth={"a": 0.5}).shape
     (2, 2)
     """
+    from matplotlib import rcParams
+
     parameters = _parameters(posterior, names)
     truth = truth or {}
     unknown = set(truth) - {parameter.name for parameter in parameters}
@@ -126,7 +129,7 @@ def pairs(
             f"truth names {', '.join(sorted(unknown))}, and the parameters are {', '.join(p.name for p in parameters)}"
         )
     size = len(parameters)
-    side = max(2.6, min(7.0, 1.75 * size), 1.15 * size)
+    side = max(2.6, min(7.0, 1.75 * size), 0.115 * rcParams["font.size"] * size)
     grid = parameter_grid(axes, (size, size), (side, side))
     limits = [_view(p, truth.get(p.name)) for p in parameters]
     for row, column in np.ndindex(size, size):

@@ -21,12 +21,13 @@ from tactile_bayes.plotting.axes import (
     legend_entry,
     set_unit,
 )
-from tactile_bayes.record import CHANNELS, Frame, frame_of, turned, validate
+from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, events_by_label, load_of, phase_runs, with_events
+from tactile_bayes.record import CHANNELS, Frame, frame_of, validate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.sweep_events import Event, SweepEvents
+    from tactile_bayes.sweep_events import SweepEvents
 
 __all__ = ["observables", "predictive"]
 
@@ -251,19 +252,9 @@ def _draw_line(
         legend_entry(ax, "truth", color=PALETTE["change"], linewidth=linewidth)
         return
     if events is not None:
-        marked = [events.first_contact, *events.transitions, events.snap_off]
-        following = [event.kind.split(" → ")[-1] for event in marked[:-1]]
-        angle = np.append(angle, [event.drive_angle for event in marked])
-        value = np.append(value, [_load(event, channel, frame) for event in marked])
-        phase = np.append(phase, [*following, following[-1]])
-        order = np.argsort(angle if direction == "forward" else -angle, kind="stable")
-        angle, value, phase = angle[order], value[order], phase[order]
-    starts = np.flatnonzero(np.append(True, phase[1:] != phase[:-1]))
-    for start, stop in zip(starts, np.append(starts[1:], phase.size), strict=True):
-        # A run goes on to the first state of the next one, unless the rod has let go in between.
-        joined = stop < phase.size and (phase[stop] != "none")
-        run = slice(start, stop + 1 if joined else stop)
-        name = str(phase[start])
+        angle, value, phase = with_events(angle, value, phase, events, channel, frame)
+    for run in phase_runs(phase):
+        name = str(phase[run.start])
         ax.plot(_degrees(angle[run]), value[run], color=PALETTE[name], **style)
         if name in PHASES:
             prefix = "true " if column != channel else ""
@@ -271,24 +262,11 @@ def _draw_line(
 
 
 def _draw_events(ax: Axes, events: SweepEvents, channel: str, frame: Frame) -> None:
-    styles: list[tuple[tuple[Event, ...], str, dict[str, Any]]] = [
-        ((events.first_contact,), "first contact", {"marker": "o", "markerfacecolor": "white", "markersize": 4.5}),
-        (events.transitions, "phase change", {"marker": "D", "markersize": 4.0}),
-        ((events.snap_off,), "snap-off", {"marker": "X", "markersize": 7.0, "markeredgecolor": "white"}),
-    ]
-    for marked, label, style in styles:
-        if marked:
-            angles = _degrees([event.drive_angle for event in marked])
-            values = [_load(event, channel, frame) for event in marked]
-            ax.plot(angles, values, color=PALETTE["change"], linestyle="none", zorder=4, label=label, **style)
-
-
-def _load(event: Event, channel: str, frame: Frame) -> float:
-    """A load of an event in the frame of a record; events are in the fixed one."""
-    loads = {name: getattr(event, name) for name in CHANNELS}
-    if frame == "turning":
-        loads["force_x"], loads["force_y"] = turned(event.force_x, event.force_y, event.drive_angle)
-    return float(loads[channel])
+    for label, marked in events_by_label(events).items():
+        angles = _degrees([event.drive_angle for event in marked])
+        values = [load_of(event, channel, frame) for event in marked]
+        style = {"color": PALETTE["change"], "linestyle": "none", "zorder": 4, **EVENT_MARKERS[label]}
+        ax.plot(angles, values, label=label, **style)
 
 
 def _not_measured(ax: Axes, label: str) -> None:

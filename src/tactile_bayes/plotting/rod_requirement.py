@@ -10,6 +10,7 @@ import xarray as xr
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import Floats, number, set_unit, shown_unit, single_axes
 from tactile_bayes.plotting.noise_requirement import WHERE
+from tactile_bayes.plotting.tiles import tile_edges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,7 +77,7 @@ def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     lengths, diameters = found["length"].values, found["diameter"].values
     width = found["width"].transpose("diameter", "length").values
     status = found["status"].transpose("diameter", "length").values
-    x, y = _edges(lengths), _edges(diameters)
+    x, y = tile_edges(lengths), tile_edges(diameters)
     known = width[np.isfinite(width)]
     if known.size:
         low, high = float(known.min()), float(known.max())
@@ -134,11 +135,3 @@ def _label_bar(bar: Any, found: xr.Dataset, known: Floats) -> None:
     where = WHERE.get(str(found.attrs.get("where", "everywhere")), "")
     probability = f"{100.0 * found.attrs['probability']:.6g} %"
     bar.set_label(f"mean width of the {probability} band{where} [{unit}]")
-
-
-def _edges(values: Floats) -> Floats:
-    """Of cells around values in order: midway between two."""
-    if values.size == 1:
-        return np.array([0.95, 1.05]) * values
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2.0 * values[0] - middle[0]], middle, [2.0 * values[-1] - middle[-1]]])

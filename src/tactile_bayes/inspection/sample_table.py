@@ -1,0 +1,72 @@
+"""The samples of a record in a table: which of them look wrong, and in what."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.inspection.samples import outliers, repeat_chance, repeated, stuck, uneven_steps
+from tactile_bayes.inspection.stretches import Rows
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, present_channels
+
+__all__ = ["sample_table"]
+
+
+def sample_table(
+    record: xr.Dataset,
+    found: xr.Dataset,
+    sweeps: list[Rows],
+    stretches: list[Rows],
+    cell: LoadCell | None,
+    *,
+    false_alarm: float,
+) -> xr.Dataset:
+    """See `Inspection`; `found` is what `zero_load` returns."""
+    count, present = record.sizes["sample"], present_channels(record)
+    level = false_alarm / len(present)
+    flags = {name: np.zeros((count, len(CHANNELS)), dtype=bool) for name in ("outlier", "stuck", "cut_off")}
+    unloaded = found["unloaded"].values
+    chances, readings = [], []
+    for index, name in enumerate(CHANNELS):
+        if name not in present:
+            continue
+        reading = record[name].values
+        step, noise = float(found["resolution"][index]), float(found["noise"][index])
+        rounding = 4.0 * np.finfo(float).eps * float(np.abs(reading).max())
+        if not noise > rounding:  # an ideal record, whose zeros are equal, or too few unloaded samples to tell
+            continue
+        chance = repeat_chance(reading, stretches, step, noise)
+        chances.append(chance)
+        readings.append(reading)
+        flags["outlier"][:, index] = outliers(reading, sweeps, stretches, step, false_alarm=level)
+        equal = stuck(reading, sweeps, chance, false_alarm=level)
+        at_end = equal & ~unloaded & ((reading == reading.max()) | (reading == reading.min()))
+        flags["cut_off"][:, index] = at_end
+        flags["stuck"][:, index] = equal & ~at_end
+    if cell is not None:
+        ends = cell.cuts_off(np.stack([record[name].values for name in CHANNELS], axis=-1))
+        flags["cut_off"] |= ends
+        flags["stuck"] &= ~ends
+    twice = np.zeros(count, dtype=bool)
+    if len(readings) == len(present):
+        twice = repeated(np.stack(readings, axis=-1), sweeps, np.array(chances), false_alarm=false_alarm)
+        twice &= ~(flags["stuck"] | flags["cut_off"]).all(axis=1)
+    uneven = np.zeros(count, dtype=bool)
+    for rows in sweeps:
+        sense = -1 if record["direction"].values[rows[0]] == "backward" else 1
+        uneven[rows] = uneven_steps(record["drive_angle"].values, rows, sense)
+    words = {
+        "outlier": "whether the reading stands out from its neighbours",
+        "stuck": "whether the reading stays the same for long",
+        "cut_off": "whether the reading is at the end of a range",
+    }
+    return xr.Dataset(
+        {
+            "unloaded": ("sample", unloaded, {"long_name": "whether the sample is unloaded"}),
+            **{name: (("sample", "channel"), flags[name], {"long_name": words[name]}) for name in words},
+            "repeated": ("sample", twice, {"long_name": "whether all readings are those of the sample before"}),
+            "uneven_step": ("sample", uneven, {"long_name": "whether the step of the drive up to it is another"}),
+        },
+        coords={"channel": list(CHANNELS)},
+    )

@@ -1,0 +1,175 @@
+"""Which figures there are: their numbers, captions and usual distances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.paper_figures.choice import Choice, Direction, Profile, choice_of
+from tactile_bayes.paper_figures.contact_kinds import draw_contact_kinds
+from tactile_bayes.paper_figures.deformed_rods import draw_deformed_rods
+from tactile_bayes.paper_figures.observable_curves import draw_observable_curves
+from tactile_bayes.paper_figures.reconstructed_points import draw_reconstructed_points
+from tactile_bayes.plotting.style import PAGE_WIDTH
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["NUMBERS", "caption", "figure"]
+
+_PROFILES: tuple[Profile, ...] = ("I", "II", "III", "IV")
+_SWEEPS: Mapping[Profile, Direction] = {"I": "forward", "II": "both", "III": "both", "IV": "both"}
+_OBSERVED = (0.3, 0.4, 0.5, 0.6)
+_SEEN = (0.4, 0.6)
+_TOUCHED = (0.3, 0.6)
+_EXPLAINED = (0.5,)
+
+
+class _Entry(NamedTuple):
+    draw: Callable[[Choice], Figure]
+    words: str
+    """A caption, without distances."""
+    distances: tuple[float, ...]
+    """By default."""
+
+
+def _observables(profile: Profile) -> _Entry:
+    direction = _SWEEPS[profile]
+    words = f"Holding moment and support reaction over the drive angle, profile {profile}, {_in_words(direction)}"
+    return _Entry(partial(draw_observable_curves, profile, direction), words, _OBSERVED)
+
+
+def _rods(profile: Profile) -> _Entry:
+    direction = _SWEEPS[profile]
+    words = f"Deformed rods, profile {profile}, {_in_words(direction)}"
+    return _Entry(partial(draw_deformed_rods, profile, direction), words, _SEEN)
+
+
+def _in_words(direction: Direction) -> str:
+    return "forward and backward sweep" if direction == "both" else f"{direction} sweep"
+
+
+_ENTRIES: Mapping[int, _Entry] = {
+    2: _Entry(partial(draw_contact_kinds, "II"), "Tip and tangential contact, profile II, forward sweep", _EXPLAINED),
+    **{number: _observables(profile) for number, profile in zip(range(3, 7), _PROFILES, strict=True)},
+    **{number: _rods(profile) for number, profile in zip(range(7, 11), _PROFILES, strict=True)},
+    11: _Entry(
+        partial(draw_reconstructed_points, _PROFILES),
+        "Reconstructed contact points, profiles I to IV, forward and backward sweep",
+        _TOUCHED,
+    ),
+}
+
+NUMBERS = tuple(_ENTRIES)
+"""Of the figures, in order."""
+
+
+def figure(
+    number: int,
+    *,
+    distances: Sequence[float] | None = None,
+    drive_step: float = float(np.radians(1.0)),
+    rods: int = 15,
+    load_cell: LoadCell | None = None,
+    seed: int = 1,
+    width: float = PAGE_WIDTH,
+) -> Figure:
+    """A figure of Merker et al. 2018 (doi 10.1155/2018/1613945), computed anew.
+
+    Figure 2 explains tip and tangential contact. Figures 3 to 6 are moment and forces over the drive angle for profiles
+    I to IV, 7 to 10 the deformed rods, and 11 the contact points that Step 2 reconstructs from these records. The sweep
+    of profile I is shown forward; that of the others forward and backward.
+
+    Parameters
+    ----------
+    number : int
+        From 2 to 11.
+    distances : sequence of float, optional
+        Of the profile's vertex above the pivot, q [L]. By default 0.5 in Figure 2 (of several the first at which a
+        phase occurs); 0.3, 0.4, 0.5 and 0.6 in Figures 3 to 6; 0.4 and 0.6 in Figures 7 to 10; 0.3 and 0.6 in
+        Figure 11.
+    drive_step : float
+        Step of the drive [rad], at most 0.5.
+    rods : int
+        How many are drawn of a sweep in Figures 7 to 10, first contact, phase changes and snap-off not counted.
+    load_cell : LoadCell, optional
+        Measures the records of Figure 11, which else are without noise.
+    seed : int
+        Of the load cell's noise.
+    width : float
+        Of the figure [inches]: 7 for a page, 3.5 for a column, where panels stand below one another.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot. It has the look of the settings that hold while it is made and saved: see `plotting.style`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such figure, or an argument is none that is offered.
+    ContourError
+        If a distance is beyond the rod's reach.
+
+    Examples
+    --------
+    >>> from tactile_bayes.plotting import style
+    >>> with style("print"):
+    ...     made = figure(3, distances=[0.3, 0.5])
+    >>> len(made.axes)
+    3
+    """
+    entry, choice = _chosen(
+        number,
+        distances=distances,
+        drive_step=drive_step,
+        rods=rods,
+        load_cell=load_cell,
+        seed=seed,
+        width=width,
+    )
+    return entry.draw(choice)
+
+
+def caption(number: int, **options: Any) -> str:
+    """What a figure shows, in a sentence; options are those of `figure`.
+
+    Raises
+    ------
+    ParameterError
+        As `figure`.
+
+    Examples
+    --------
+    >>> caption(7, distances=[0.5])
+    'Deformed rods, profile I, forward sweep, q = 0.5 L.'
+    """
+    entry, choice = _chosen(number, **options)
+    distances = ", ".join(f"{q:g}" for q in choice.distances)
+    noise = ""
+    if number == 11:
+        noise = ", without noise" if choice.load_cell is None else f", measured with noise (seed {choice.seed})"
+    return f"{entry.words}{noise}, q = {distances} L."
+
+
+def _chosen(
+    number: int,
+    *,
+    distances: Sequence[float] | None = None,
+    drive_step: float = float(np.radians(1.0)),
+    rods: int = 15,
+    load_cell: LoadCell | None = None,
+    seed: int = 1,
+    width: float = PAGE_WIDTH,
+) -> tuple[_Entry, Choice]:
+    if isinstance(number, bool) or number not in _ENTRIES:
+        raise ParameterError(f"there is no figure {number!r}: choose from {NUMBERS[0]} to {NUMBERS[-1]}")
+    entry = _ENTRIES[number]
+    options: dict[str, Any] = {"load_cell": load_cell, "seed": seed, "width": width}
+    chosen = entry.distances if distances is None else distances
+    return entry, choice_of(chosen, drive_step=drive_step, rods=rods, **options)

@@ -1,0 +1,143 @@
+"""Figure 2: the rod in tip and in tangential contact, with the words for what is seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.paper_figures.choice import Choice, Profile
+from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, Floats, set_unit
+from tactile_bayes.plotting.maps import draw_object, draw_pivot
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.scanning import Scan
+from tactile_bayes.shape import rod_shape
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_contact_kinds"]
+
+_WAY = {"tip": 0.6, "tangential": 0.45}
+"""Which state of a phase is shown, between its first and its last."""
+
+_LIMITS = (-0.36, 1.02), (-0.24, 0.98)
+"""In x and y of both panels [L]."""
+
+_BESIDE = {"tip": 0.2, "tangential": 0.36}
+"""Radius at which the slope angle is drawn: beyond the rod's end [L]."""
+
+_ARROW = 0.2
+"""Length of the contact force; components of the reaction are in proportion to it [L]."""
+
+_CLEAR: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+_THIN: dict[str, Any] = {"color": "0.35", "linewidth": 0.7}
+
+
+def draw_contact_kinds(profile: Profile, choice: Choice) -> Figure:
+    """A panel for each kind of contact: angles, contact point, and the forces on the rod and its support."""
+    from matplotlib.figure import Figure
+
+    columns = 1 if choice.is_column else 2
+    rows = 2 // columns
+    wide = choice.width / columns
+    size = choice.width, rows * (0.92 * wide * np.ptp(_LIMITS[1]) / np.ptp(_LIMITS[0]) + 0.35)
+    figure = Figure(figsize=size, layout="compressed")
+    options: dict[str, Any] = {"xlim": _LIMITS[0], "ylim": _LIMITS[1], "aspect": "equal"}
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, subplot_kw=options).ravel()
+    for letter, ax, phase in zip("ab", panels, PHASES, strict=True):
+        distance, made, state = _state(profile, phase, choice)
+        _draw_state(ax, made, state, phase)
+        ax.set_title(f"({letter}) {PHASES[phase]}, $q$ = {distance:g} $L$")
+        ax.label_outer()
+    return figure
+
+
+def _state(profile: Profile, phase: str, choice: Choice) -> tuple[float, Scan, dict[str, float]]:
+    """At the first distance at which there is one of this phase."""
+    for distance in choice.distances:
+        made = choice.scan(profile, distance, "forward")
+        of_phase = np.flatnonzero(made.record["truth_contact_phase"].values == phase)
+        if of_phase.size:
+            sample: xr.Dataset = made.record.isel(sample=int(of_phase[int(_WAY[phase] * (of_phase.size - 1))]))
+            names = ("drive_angle", *CHANNELS)
+            truth = ("slope_angle", "contact_x", "contact_y", "contact_arclength")
+            values = {name: float(sample[name]) for name in names}
+            return distance, made, values | {name: float(sample[f"truth_{name}"]) for name in truth}
+    distances = ", ".join(f"{q:g}" for q in choice.distances)
+    raise ParameterError(
+        f"figure 2 shows {PHASES[phase]}, and profile {profile} has none at q = {distances}: give a distance like 0.5 "
+        "besides, or leave this figure out"
+    )
+
+
+def _draw_state(ax: Axes, made: Scan, state: dict[str, float], phase: str) -> None:
+    angle, slope = state["drive_angle"], state["slope_angle"]
+    contact = np.array([state["contact_x"], state["contact_y"]])
+    x, y = rod_shape(*(state[name] for name in ("drive_angle", *CHANNELS)), points=301)
+    draw_object(ax, made.contour, x, y, room=0.0)
+    ax.plot(x, y, color=PALETTE[phase], linewidth=2.0, zorder=3, solid_capstyle="round")
+    draw_pivot(ax, (0.0, 0.0))
+    _write(ax, "pivot $(x_0, y_0)$", (0.0, 0.0), (0.14, -0.08), ha="left", va="center")
+
+    # Drive angle, from the horizontal to the rod at the pivot.
+    ax.plot([0.0, 0.3], [0.0, 0.0], linestyle="--", **_THIN)
+    ax.plot([0.0, 0.3 * np.cos(angle)], [0.0, 0.3 * np.sin(angle)], linestyle=":", **_THIN)
+    _draw_angle(ax, (0.0, 0.0), 0.13, 0.0, angle, r"$\varphi_0$")
+
+    # Slope angle, from the horizontal to the contour's tangent.
+    along, normal = np.array([np.cos(slope), np.sin(slope)]), np.array([-np.sin(slope), np.cos(slope)])
+    radius = _BESIDE[phase]
+    tangent = contact - 0.2 * along, contact + (radius + 0.04) * along
+    ax.plot(*zip(*tangent, strict=True), linestyle=":", zorder=2, **_THIN)
+    ax.plot([contact[0], contact[0] + radius + 0.04], [contact[1]] * 2, linestyle="--", zorder=2, **_THIN)
+    _draw_angle(ax, contact, radius, 0.0, slope, r"$\alpha$")
+    ax.plot(*contact, "o", color=PALETTE["change"], markersize=4.5, zorder=4)
+    ends = "$s_1 = L$" if phase == "tip" else "$s_1 < L$"
+    _write(ax, f"contact $(\\xi, \\eta)$\n{ends}", contact, 0.09 * normal - 0.03 * along, ha="right", va="bottom")
+
+    # The contact's force on the rod, and what the support answers with.
+    force = np.array([state["force_x"], state["force_y"]])
+    scale = _ARROW / float(np.hypot(*force))
+    _draw_arrow(ax, contact, contact - scale * force)
+    _write(ax, "$f$", contact - scale * force, -0.04 * normal, ha="center", va="center")
+    for component, label, away in ((0, r"$f_{\mathrm{A}x}$", (-0.06, 0.0)), (1, r"$f_{\mathrm{A}y}$", (0.05, 0.035))):
+        tip = np.zeros(2)
+        tip[component] = scale * force[component]
+        _draw_arrow(ax, (0.0, 0.0), tip)
+        _write(ax, label, tip, away, ha="center", va="center")
+    _draw_moment(ax, state["holding_moment"])
+    if phase == "tangential":
+        _write(ax, "tip", (float(x[-1]), float(y[-1])), 0.02 * along, ha="left", va="center", bbox=_CLEAR)
+    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", {}, np.zeros(1))
+    set_unit(ax.yaxis, LABELS["contact_y"] + " ", "contact_y", {}, np.zeros(1))
+
+
+def _write(ax: Axes, words: str, at: Any, away: Any, **style: Any) -> None:
+    ax.text(at[0] + away[0], at[1] + away[1], words, zorder=6, **style)
+
+
+def _draw_angle(ax: Axes, at: Any, radius: float, begin: float, end: float, label: str) -> None:
+    turn = np.linspace(begin, end, 61)
+    ax.plot(at[0] + radius * np.cos(turn), at[1] + radius * np.sin(turn), color="black", linewidth=0.8, zorder=3.5)
+    middle, beyond = begin + 0.4 * (end - begin), radius + 0.05
+    _write(ax, label, at, (beyond * np.cos(middle), beyond * np.sin(middle)), ha="center", va="center")
+
+
+def _draw_arrow(ax: Axes, begin: Any, end: Floats) -> None:
+    style = {"arrowstyle": "-|>", "color": PALETTE["change"], "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
+    ax.annotate("", tuple(end), tuple(begin), arrowprops=style | {"mutation_scale": 9.0}, zorder=4.5)
+
+
+def _draw_moment(ax: Axes, moment: float) -> None:
+    """An arrow about the pivot, in the sense of the moment."""
+    turn = np.radians(np.linspace(-150.0, -30.0, 41))
+    turn = turn if moment > 0.0 else turn[::-1]
+    x, y = 0.11 * np.cos(turn), 0.11 * np.sin(turn)
+    ax.plot(x, y, color=PALETTE["change"], linewidth=1.2, zorder=4.5)
+    style = {"arrowstyle": "-|>", "color": PALETTE["change"], "linewidth": 1.2, "mutation_scale": 9.0}
+    ax.annotate("", (float(x[-1]), float(y[-1])), (float(x[-4]), float(y[-4])), arrowprops=style, zorder=4.5)
+    _write(ax, "$m_0$", (0.0, -0.11), (0.0, -0.055), ha="center", va="center")

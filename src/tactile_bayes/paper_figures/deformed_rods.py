@@ -1,0 +1,93 @@
+"""Figures 7 to 10: the rod along a sweep, deformed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tactile_bayes.paper_figures.choice import Choice, Direction, Profile
+from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
+from tactile_bayes.plotting.axes import PHASES
+from tactile_bayes.plotting.rod_map import rods
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.shape import rod_shape
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tactile_bayes.scanning import Scan
+
+__all__ = ["draw_deformed_rods"]
+
+_LEGEND = ([*PHASES.values(), "contour", "pivot"], ["first contact", "phase change", "snap-off"])
+
+_ROOM = 0.05
+"""Around the rods [L]."""
+
+_ABOVE = 0.7
+"""Height of what is above the panels: the legend [inches]."""
+
+_AROUND = (0.45, 0.38)
+"""Width and height of labels and title around a panel [inches]."""
+
+
+def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -> Figure:
+    """Deformed rods in a panel for each distance and sweep, all at one scale."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    scans = [choice.scan(profile, distance, direction) for distance in choice.distances]
+    sweeps = [(made, number) for made in scans for number in range(len(made.sweeps))]
+    columns = 1 if choice.is_column else min(2, len(sweeps))
+    rows = -(-len(sweeps) // columns)
+    limits = _limits(sweeps)
+    (left, right), (bottom, top) = limits
+    wide = min(choice.width / columns - _AROUND[0], 3.6)
+    high = wide * (top - bottom) / (right - left) + _AROUND[1]
+    figure = Figure(figsize=(choice.width, rows * high + _ABOVE), layout="compressed")
+    options: dict[str, Any] = {"xlim": limits[0], "ylim": limits[1]}
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
+    found: dict[str, Any] = {}
+    grid[0, 0].xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))  # sparse: panels are neighbours
+    for ax, (made, number) in zip(grid.ravel(), sweeps, strict=False):
+        rods(made, sweep=number, count=choice.rods, ax=ax)
+        found |= entries_of([ax])
+        ax.get_legend().remove()
+        ax.set_title(f"{made.sweeps[number].direction}, $q$ = {_distance(made):g} $L$")
+    for place, ax in enumerate(grid.ravel()):
+        if place >= len(sweeps):
+            ax.remove()
+            continue
+        is_lowest, is_first = place + columns >= len(sweeps), place % columns == 0
+        ax.tick_params(labelbottom=is_lowest, labelleft=is_first)
+        if not is_lowest:
+            ax.set_xlabel("")
+        if not is_first:
+            ax.set_ylabel("")
+    legend_in_rows(figure, found, _LEGEND, 2 if choice.is_column else 4)
+    return figure
+
+
+def _limits(sweeps: list[tuple[Scan, int]]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """In x and in y, in which all the rods of all sweeps have room."""
+    corners = []
+    for made, number in sweeps:
+        record, events = made.record, made.sweeps[number]
+        chosen = (record["sweep"].values == number) & (record["truth_contact_phase"].values != "none")
+        wrench = [np.asarray(record[name].values[chosen]) for name in ("drive_angle", *CHANNELS)]
+        ends = [events.first_contact, *events.transitions, events.snap_off]
+        at_ends = [[getattr(event, name) for event in ends] for name in ("drive_angle", *CHANNELS)]
+        states = [np.append(a, b) for a, b in zip(wrench, at_ends, strict=True)]
+        x, y = rod_shape(*states, side=1 if events.direction == "forward" else -1)
+        corners.append([x.min(), x.max(), y.min(), y.max()])
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    return (
+        (float(low[0]) - _ROOM, float(high[1]) + _ROOM),
+        (float(low[2]) - _ROOM, float(high[3]) + _ROOM),
+    )
+
+
+def _distance(made: Scan) -> float:
+    """Height of the contour above the pivot's place."""
+    return float(np.asarray(made.contour.height(0.0)))

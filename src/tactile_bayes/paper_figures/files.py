@@ -1,0 +1,100 @@
+"""The figures as files, each written whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.files import write_atomically
+from tactile_bayes.paper_figures.catalogue import NUMBERS, caption, figure
+from tactile_bayes.plotting.style import Style
+from tactile_bayes.plotting.style import style as styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["FORMATS", "draw_all"]
+
+FORMATS = ("pdf", "svg", "png")
+
+
+def draw_all(
+    out: str | os.PathLike[str],
+    *,
+    only: Sequence[int] | None = None,
+    formats: Sequence[str] = ("pdf", "png"),
+    style: Style = "print",
+    progress: Callable[[int], object] | None = None,
+    **options: Any,
+) -> dict[int, dict[str, Path]]:
+    """Write figures of the paper to a folder, and tell where each is.
+
+    Files are named figure_02.pdf and so on, and carry their caption. They are written whole: after an interrupt each
+    one is the old or the new one, and the same call makes the rest. The same options give the same bytes.
+
+    Parameters
+    ----------
+    out : path-like
+        Folder, made if it is not there.
+    only : sequence of int, optional
+        Numbers of the figures, from 2 to 11; by default all.
+    formats : sequence of {"pdf", "svg", "png"}
+        In which each is written.
+    style : {"print", "screen"}
+        As in `plotting.style`.
+    progress : callable, optional
+        Is given how many figures are done, after each.
+    **options
+        As in `figure`.
+
+    Returns
+    -------
+    dict of int to dict of str to Path
+        The file by number and format.
+
+    Raises
+    ------
+    ParameterError, ContourError
+        As in `figure`, or if there is no such format. Figures are made one by one: those before it are there.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     files = draw_all(folder, only=[3], formats=["svg"], distances=[0.5])
+    ...     files[3]["svg"].name
+    'figure_03.svg'
+    """
+    numbers = list(dict.fromkeys(NUMBERS if only is None else only))
+    wanted = list(dict.fromkeys(formats))
+    absent = [name for name in wanted if name not in FORMATS]
+    if absent or not wanted:
+        raise ParameterError(f"formats are {list(formats)!r}: choose from {', '.join(FORMATS)}")
+    captions = {number: caption(number, **options) for number in numbers}  # refuses before anything is written
+    folder = Path(out)
+    files: dict[int, dict[str, Path]] = {}
+    with styled(style):
+        for done, (number, words) in enumerate(captions.items(), start=1):
+            made = figure(number, **options)
+            folder.mkdir(parents=True, exist_ok=True)
+            files[number] = {name: folder / f"figure_{number:02d}.{name}" for name in wanted}
+            for name, path in files[number].items():
+                with write_atomically(path) as temporary:
+                    _save(made, temporary, name, number, words)
+            if progress is not None:
+                progress(done)
+    return files
+
+
+def _save(made: Figure, path: Path, name: str, number: int, words: str) -> None:
+    """With a caption, and without a date."""
+    title = f"Figure {number}"
+    metadata: dict[str, dict[str, Any]] = {
+        "pdf": {"Title": title, "Subject": words, "CreationDate": None},
+        "svg": {"Title": title, "Description": words, "Date": None},
+        "png": {"Title": title, "Description": words},
+    }
+    made.savefig(path, format=name, metadata=metadata[name])

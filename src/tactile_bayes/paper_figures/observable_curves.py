@@ -1,0 +1,101 @@
+"""Figures 3 to 6: what the base feels along a sweep, for several distances of the object."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.paper_figures.choice import Choice, Direction, Profile
+from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
+from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, legend_entry, set_unit
+from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, events_by_label, load_of, phase_runs, with_events
+from tactile_bayes.record import CHANNELS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tactile_bayes.scanning import Scan
+
+__all__ = ["draw_observable_curves"]
+
+_LINES = {"forward": "-", "backward": (0, (3.0, 1.2))}
+_WIDTHS = {"tip": 0.8, "tangential": 1.7}
+_SHRUNK = 0.75
+"""Of the markers of events, of which there are many."""
+
+
+def draw_observable_curves(profile: Profile, direction: Direction, choice: Choice) -> Figure:
+    """Moment and forces over the drive angle: a colour for each distance, thin in tip contact, thick in tangential.
+
+    Lines run from first contact to snap-off, and both are on them.
+    """
+    from matplotlib import colormaps
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
+
+    figure = Figure(figsize=(choice.width, 5.6), layout="constrained")
+    panels = figure.subplots(3, 1, sharex=True)
+    shades = colormaps["viridis"](np.linspace(0.0, 0.85, len(choice.distances)))
+    directions: set[str] = set()
+    for distance, colour in zip(choice.distances, shades, strict=True):
+        made = choice.scan(profile, distance, direction)
+        for ax, channel in zip(panels, CHANNELS, strict=True):
+            _draw_scan(ax, made, channel, tuple(colour))
+        legend_entry(panels[0], _distance_in_words(distance), color=colour, linewidth=1.7)
+        directions |= {sweep.direction for sweep in made.sweeps}
+    for way in sorted(directions, reverse=True) if len(directions) > 1 else ():
+        legend_entry(panels[0], way, color="0.35", linestyle=_LINES[way], linewidth=1.2)
+    for phase, words in PHASES.items():
+        legend_entry(panels[0], words, color="0.35", linewidth=_WIDTHS[phase])
+    for ax, channel in zip(panels, CHANNELS, strict=True):
+        ax.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
+        ax.yaxis.set_major_locator(MaxNLocator(5))
+        set_unit(ax.yaxis, f"{LABELS[channel]}\n", channel, {}, np.zeros(1))
+    panels[-1].xaxis.set_major_locator(MultipleLocator(30.0))
+    panels[-1].set_xlabel(f"{LABELS['drive_angle']} [°]")
+    figure.align_ylabels(list(panels))
+    groups = [
+        [_distance_in_words(distance) for distance in choice.distances],
+        [*_LINES, *PHASES.values()],
+        list(EVENT_MARKERS),
+    ]
+    legend_in_rows(figure, entries_of(panels), groups, 2 if choice.is_column else 4)
+    return figure
+
+
+def _distance_in_words(distance: float) -> str:
+    return f"$q$ = {distance:g} $L$"
+
+
+def _draw_scan(ax: Axes, made: Scan, channel: str, colour: Any) -> None:
+    for number, events in enumerate(made.sweeps):
+        sweep: xr.Dataset = made.record.isel(sample=np.flatnonzero(made.record["sweep"].values == number))
+        phase = sweep["truth_contact_phase"].values.astype(object)
+        touching = phase != "none"
+        angle, value, phase = with_events(
+            sweep["drive_angle"].values[touching],
+            sweep[channel].values[touching],
+            phase[touching],
+            events,
+            channel,
+            "fixed",
+        )
+        line: dict[str, Any] = {"color": colour, "linestyle": _LINES[events.direction], "zorder": 2.5}
+        for run in phase_runs(phase):
+            ax.plot(np.degrees(angle[run]), value[run], linewidth=_WIDTHS[str(phase[run.start])], **line)
+        for label, marked in events_by_label(events).items():
+            style = dict(EVENT_MARKERS[label])
+            style["markersize"] *= _SHRUNK
+            ax.plot(
+                np.degrees([event.drive_angle for event in marked]),
+                [load_of(event, channel, "fixed") for event in marked],
+                color=PALETTE["change"],
+                linestyle="none",
+                markeredgewidth=0.7,
+                zorder=4,
+                label=label,
+                **style,
+            )

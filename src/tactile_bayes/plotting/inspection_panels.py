@@ -1,0 +1,185 @@
+"""The inspection of a record: its observables, where contact begins and ends, and what looks wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.axes import LABELS, PALETTE, AxesArray, handles_once, legend_entry, set_unit
+from tactile_bayes.record import CHANNELS, present_channels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tactile_bayes.inspection import Inspection
+
+__all__ = ["inspection"]
+
+_COLOURS = {"forward": "#0072B2", "backward": "#D55E00"}
+_MARKERS = {"forward": "o", "backward": "^"}
+_WRONG: dict[str, tuple[str, dict[str, Any]]] = {
+    "outlier": ("stands out", {"marker": "o", "markersize": 9.0, "color": "#CC79A7"}),
+    "stuck": ("stuck", {"marker": "s", "markersize": 8.0, "color": "#E69F00"}),
+    "cut_off": ("cut off", {"marker": "D", "markersize": 8.0, "color": "#009E73"}),
+    "repeated": ("twice", {"marker": "h", "markersize": 9.0, "color": "#000000"}),
+    "uneven_step": ("uneven step", {"marker": "|", "markersize": 14.0, "color": "#000000"}),
+}
+
+
+def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
+    """Observables of a record over the drive angle, with what looks wrong, and its unloaded samples enlarged.
+
+    Parameters
+    ----------
+    inspected : Inspection
+        From `tactile_bayes.inspect_record`.
+    axes : array of Axes, shape (3, 2), optional
+        A row for each of holding_moment, force_x and force_y. To the left are readings over the drive angle: vertical
+        lines are between the samples beside first contact (dotted) and snap-off (dashed), in the colour of the sweep's
+        direction; rings and other marks are what looks wrong. To the right are readings of the unloaded samples in the
+        order in which they were measured, with their mean and two standard deviations to either side.
+
+    Returns
+    -------
+    ndarray of Axes, shape (3, 2)
+        Drive angles are in degrees.
+
+    Raises
+    ------
+    ParameterError
+        If there are not three rows of two axes.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, inspect_record, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    >>> inspection(inspect_record(measured))[0, 1].get_title()
+    'unloaded'
+    """
+    panels = _panels(axes)
+    record = inspected.record
+    for index, channel in enumerate(CHANNELS):
+        readings, zero = panels[index]
+        label = LABELS[channel]
+        if channel not in present_channels(record):
+            for panel, words in ((readings, "not measured"), (zero, "")):
+                panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center", va="center", color=PALETTE["none"])
+                panel.set_yticks([])
+            readings.set_ylabel(label)
+            continue
+        _draw_readings(readings, inspected, index)
+        set_unit(readings.yaxis, f"{label}\n", channel, record[channel].attrs, record[channel].values)
+        _draw_unloaded(zero, inspected, index)
+        unloaded = record[channel].values[inspected.samples.unloaded.values]
+        set_unit(zero.yaxis, "", channel, record[channel].attrs, unloaded)
+    panels[-1, 0].set_xlabel(f"{LABELS['drive_angle']} [°]")
+    panels[-1, 1].set_xlabel("sample")
+    panels[0, 1].set_title("unloaded", fontsize="small")
+    _finish(panels)
+    return panels
+
+
+def _panels(axes: Any) -> AxesArray:
+    if axes is None:
+        from matplotlib import pyplot as plt
+
+        ratios = {"width_ratios": (2.2, 1.0)}
+        return plt.subplots(3, 2, figsize=(7.0, 5.6), sharex="col", layout="constrained", gridspec_kw=ratios)[1]
+    panels = np.asarray(axes, dtype=object)
+    if panels.shape != (3, 2):
+        raise ParameterError(f"axes have shape {panels.shape}: give (3, 2), a row for each of {', '.join(CHANNELS)}")
+    return panels
+
+
+def _draw_readings(ax: Axes, inspected: Inspection, index: int) -> None:
+    record, sweeps = inspected.record, inspected.sweeps
+    angle, reading = np.degrees(record.drive_angle.values), record[CHANNELS[index]].values
+    ax.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
+    for place, number in enumerate(sweeps.sweep.values):
+        direction = str(sweeps.direction.values[place])
+        rows = record.sweep.values == number
+        style: dict[str, Any] = {
+            "color": _COLOURS[direction],
+            "marker": _MARKERS[direction],
+            "markersize": 2.6,
+            "linestyle": "none",
+        }
+        style |= {"markerfacecolor": "none", "markeredgewidth": 0.6}
+        ax.plot(angle[rows], reading[rows], **style)
+        legend_entry(ax, direction, **style)
+        for event, label, line in (("onset", "first contact", ":"), ("snap_off", "snap-off", "--")):
+            between = float(np.degrees(sweeps[f"{event}_drive_angle"].values[place].mean()))
+            if np.isfinite(between):
+                ax.axvline(between, color=_COLOURS[direction], linestyle=line, linewidth=1.0, zorder=0.5)
+                legend_entry(ax, label, color="0.35", linestyle=line, linewidth=1.0)
+    for name, flags in _wrong(inspected, index):
+        label, special = _WRONG[name]
+        marks: dict[str, Any] = {
+            "linestyle": "none",
+            "markerfacecolor": "none",
+            "markeredgewidth": 1.2,
+            "zorder": 4,
+            **special,
+        }
+        ax.plot(angle[flags], reading[flags], label=label, **marks)
+
+
+def _draw_unloaded(ax: Axes, inspected: Inspection, index: int) -> None:
+    reading = inspected.record[CHANNELS[index]].values
+    unloaded = inspected.samples.unloaded.values
+    sample = np.arange(reading.size)
+    numbers = inspected.record.sweep.values
+    for start in np.flatnonzero(np.diff(numbers) != 0) + 0.5:
+        ax.axvline(start, color="0.6", linewidth=0.8, zorder=0)
+    row = inspected.channels.isel(channel=index)
+    bias, noise = float(row.bias), float(row.noise)
+    if np.isfinite(bias):
+        ax.axhspan(bias - 2.0 * noise, bias + 2.0 * noise, color=PALETTE["band"], alpha=0.5, linewidth=0.0, zorder=0.2)
+        ax.axhline(bias, color=PALETTE["median"], linewidth=0.8, zorder=0.3)
+    ax.plot(sample[unloaded], reading[unloaded], color=PALETTE["none"], marker=".", markersize=3.0, linestyle="none")
+    for name, flags in _wrong(inspected, index):
+        shown = flags & unloaded
+        if shown.any():
+            marks: dict[str, Any] = {
+                "linestyle": "none",
+                "markerfacecolor": "none",
+                "markeredgewidth": 1.2,
+                "zorder": 4,
+            }
+            ax.plot(sample[shown], reading[shown], **(marks | _WRONG[name][1]))
+    ax.set_xlim(-0.02 * reading.size, 1.02 * reading.size)
+
+
+def _wrong(inspected: Inspection, index: int) -> list[tuple[str, Any]]:
+    """Kinds of wrong samples that are there, with the samples."""
+    samples = inspected.samples
+    flags = {name: samples[name].values for name in _WRONG}
+    flags = {name: values[:, index] if values.ndim == 2 else values for name, values in flags.items()}
+    return [(name, values) for name, values in flags.items() if values.any()]
+
+
+def _finish(panels: AxesArray) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    for panel in panels.ravel().tolist():
+        if len(panel.get_yticks()):
+            panel.yaxis.set_major_locator(MaxNLocator(4))
+    panels[0, 0].figure.align_ylabels(list(panels[:, 0]))
+    found = {label: handle for panel in panels[:, 0] for handle, label in zip(*handles_once(panel), strict=True)}
+    order = ["forward", "backward", "first contact", "snap-off", *(words for words, _ in _WRONG.values())]
+    shown = [label for label in order if label in found]
+    panels[0, 0].legend(
+        [found[label] for label in shown],
+        shown,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=min(3, len(shown)),
+        handlelength=1.5,
+        columnspacing=1.2,
+        fontsize="small",
+        frameon=False,
+    )

@@ -1,0 +1,190 @@
+"""A reconstruction of contact points, in one folder."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.files import write_atomically
+from tactile_bayes.inspection import CellSource, known_cell
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, validate
+
+__all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_in_words"]
+
+_CONTRADICTION = 1e-4
+"""Probability of the misfit below which it is told first."""
+
+_OFF = 6.0
+"""Standard errors beyond which the force along the rod is told not to agree with the moment."""
+
+
+@dataclass(frozen=True)
+class ReconstructionRun:
+    """What `reconstruct_into` made.
+
+    Attributes
+    ----------
+    contacts : xr.Dataset
+        From `reconstruct`.
+    load_cell : LoadCell or None
+    source : {"given", "data sheet", "unloaded samples", "nothing"}
+        What the load cell is known from.
+    files : mapping of str to Path
+        By what they hold.
+    """
+
+    contacts: xr.Dataset
+    load_cell: LoadCell | None
+    source: CellSource
+    files: Mapping[str, Path]
+
+
+def reconstruct_into(
+    measured: xr.Dataset,
+    out: str | os.PathLike[str],
+    *,
+    method: Literal["raw", "constrained"] | None = None,
+    load_cell: LoadCell | None = None,
+    friction: float = 0.0,
+) -> ReconstructionRun:
+    """Contact points of a record, and a map of them, written to a folder.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A record with all three load channels.
+    out : path-like
+        Folder for contacts.csv, and contacts.png where there are at least two contact points; made if it is not there.
+        Files of these names in it are replaced.
+    method : {"raw", "constrained"}, optional
+        As `reconstruct` takes it; by default "constrained", or "raw" where the noise of a channel is not known.
+    load_cell : LoadCell, optional
+        By default the data sheet of the record, or what `LoadCell.from_zero_load` finds.
+    friction : float
+        Coulomb's coefficient μ.
+
+    Returns
+    -------
+    ReconstructionRun
+
+    Raises
+    ------
+    RecordError, ParameterError
+        As `reconstruct`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run = reconstruct_into(scan(paper_profile("II", q=0.5), drive_step=0.05).record, folder)
+    >>> run.contacts.attrs["method"], sorted(run.files)
+    ('raw', ['contacts', 'map'])
+    """
+    measured = validate(measured)
+    cell, source = known_cell(measured, load_cell)
+    if method is None:
+        method = "constrained" if cell is not None and _has_variances(cell) else "raw"
+    contacts = reconstruct(measured, method=method, load_cell=cell, friction=friction)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {"contacts": folder / "contacts.csv"}
+    with write_atomically(files["contacts"]) as temporary:
+        contacts.to_dataframe().to_csv(temporary)
+    shown = contacts.contact_x.values[contacts.status.values == "ok"]
+    if shown.size > 1 and np.ptp(shown) > 0.0:
+        files["map"] = folder / "contacts.png"
+        _draw(measured, contacts, shown, files["map"])
+    return ReconstructionRun(contacts, cell, source, files)
+
+
+def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
+    """What became of the samples, and whether their loads agree, in sentences; what is wrong comes first.
+
+    Parameters
+    ----------
+    contacts : xr.Dataset
+        From `reconstruct`.
+
+    Returns
+    -------
+    tuple of str
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> reconstruction_in_words(reconstruct(scan(paper_profile("II", q=0.5)).record))
+    ('266 contact points by the raw method; samples: 266 ok, 64 no contact.',)
+    """
+    counts = Counter(contacts.status.values.tolist())
+    fates = ", ".join(f"{count} {fate}" for fate, count in counts.most_common())
+    found = int(np.count_nonzero(np.isfinite(contacts.contact_x.values)))
+    told = [
+        f"{found} contact point{'s' * (found != 1)} by the {contacts.attrs['method']} method; samples: {fates}.",
+    ]
+    against = []
+    samples = int(contacts.attrs.get("misfit_samples", 0))
+    if samples:
+        total, chance = (float(contacts.attrs[name]) for name in ("misfit_sum", "misfit_probability"))
+        words = f"Misfit {total:.0f} in {samples} samples"
+        if math.isnan(chance):
+            told.append(f"{words}; they share an unknown bias, so that no probability is told.")
+        elif chance < _CONTRADICTION:
+            against.append(
+                f"The loads of single samples contradict one another, {words[0].lower()}{words[1:]} (noise explains it "
+                f"with probability {chance:.1g}): check the rod, unit, sign and axes of each load, the zero of the "
+                "drive angle, and the friction."
+            )
+        else:
+            told.append(f"{words}, which noise explains with probability {chance:.2g}.")
+        score = float(contacts.attrs["axial_score"])
+        if score < -_OFF:
+            against.append(
+                f"In tangential contact the force along the rod is too small by {-score:.0f} standard errors, as "
+                "friction makes it: give --friction, or have infer find it (--nuisance friction)."
+            )
+        elif score > _OFF:
+            against.append(
+                f"In tangential contact the force along the rod is too large by {score:.0f} standard errors: check the "
+                "zero of the drive angle, the axes of the forces, and the rod."
+            )
+        elif math.isfinite(score):
+            told.append(
+                f"In tangential contact the force along the rod agrees with the moment ({score:+.1f} standard errors)."
+            )
+    return (*against, *told)
+
+
+def _has_variances(cell: LoadCell) -> bool:
+    return all(0.0 < cell.standard_deviations[name] < math.inf for name in CHANNELS)
+
+
+def _draw(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64], path: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from tactile_bayes import plotting
+
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    pivots = np.unique(np.stack([measured.base_x.values, measured.base_y.values], axis=1), axis=0)
+    base = (float(pivots[0, 0]), float(pivots[0, 1])) if len(pivots) == 1 else None
+    low, high = (float(end) for end in np.quantile(shown, [0.01, 0.99]))
+    plotting.contour(
+        [low, high] if high > low else [shown.min(), shown.max()], contacts=contacts, base=base, ax=figure.subplots()
+    )
+    with write_atomically(path) as temporary:
+        figure.savefig(temporary, dpi=200, format="png")

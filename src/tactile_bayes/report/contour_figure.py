@@ -1,0 +1,142 @@
+"""The contour as it was found: a map, and below it the band enlarged, with every place of it for the page's script."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from tactile_bayes.inference.likelihood import bases_of
+from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
+from tactile_bayes.report.findings import Findings
+from tactile_bayes.report.wording import Shown, percent, shown_as, spread
+
+__all__ = ["ContourFigure", "contour_figure", "gap_ends"]
+
+Floats = NDArray[np.float64]
+
+_DETAIL_HEIGHT = 230.0
+
+_TABLED = 21
+
+
+class ContourFigure(NamedTuple):
+    """What a page needs of it."""
+
+    map: Markup
+    detail: Markup
+    legend: Markup
+    band: Mapping[str, Any]
+    """Places in both drawings, and what is said of them."""
+    rows: list[list[str]]
+    """x, lower, median, upper at some places, as numbers in the unit shown."""
+    unit: Shown
+
+
+def gap_ends(findings: Findings) -> tuple[float, float] | None:
+    """Between which x the gap lies, if there is one."""
+    if findings.edges is None:
+        return None
+    left, right = (float(findings.edges[side].sel(bound="median")) for side in ("left", "right"))
+    return (left, right) if left < right else None
+
+
+def contour_figure(findings: Findings) -> ContourFigure:
+    """Draw what was found of the contour."""
+    band, attrs = findings.band, findings.band["lower"].attrs
+    x, lower, median, upper = (band[name].values for name in ("x", "lower", "median", "upper"))
+    bases = np.array(bases_of(findings.record))
+    unit = shown_as("contact_x", attrs, np.concatenate([x, bases.ravel()]))
+    ends = gap_ends(findings)
+
+    about = np.concatenate([x, bases[:, 0]]), np.concatenate([median, bases[:, 1]])
+    labels = f"x{unit.bracketed}", f"y{unit.bracketed}"
+    overview, height = Plot.map_of(*about, labels, (unit.power, unit.power))
+    entries = [("key-band", f"{percent(findings.probability)} band"), ("key-median", "median")]
+    if ends:
+        overview.stretch(*ends, "gap")
+        entries.append(("key-gap", "gap, touched by neither sweep"))
+    overview.area(x, lower, upper, "band")
+    overview.path(x, median, "median")
+    entries += _put_contacts(overview, findings, x)
+    for place in bases:
+        overview.put(element("circle", cx=overview.x.at(place[0]), cy=overview.y.at(place[1]), r=5, class_="pivot"))
+    entries.append(("key-pivot", "pivot" if len(bases) == 1 else "pivots"))
+    overview.put(element("circle", id="band-mark", r=5, class_="mark js-only", cx=-20, cy=-20))
+
+    off = np.stack([lower - median, upper - median])
+    fine = shown_as("contact_x", attrs, off)
+    labels = labels[0], f"y − median{fine.bracketed}"
+    detail = Plot.around(x, off, labels, _DETAIL_HEIGHT, (unit.power, fine.power))
+    if ends:
+        detail.stretch(*ends, "gap")
+    detail.area(x, off[0], off[1], "band")
+    detail.path(x, np.zeros_like(x), "median")
+    rule = {"y1": detail.y.end, "y2": detail.y.start, "x1": -20, "x2": -20}
+    detail.put(element("line", id="band-rule", class_="rule js-only", **rule))
+
+    rows = _rows(x, lower, median, upper, unit)
+    words = _said(rows, percent(findings.probability), unit)
+    width = np.nan_to_num(upper - lower)
+    places = {
+        "x": [detail.x.at(value) for value in x],
+        "mapX": [overview.x.at(value) for value in x],
+        "mapY": [overview.y.at(value) if np.isfinite(value) else -20 for value in median],
+        "said": words,
+        "first": int(np.argmin(np.abs(x - (np.mean(ends) if ends else np.mean(x))))),
+    }
+    between = f"from {unit.text(float(x[0]))} to {unit.full(float(x[-1]))}"
+    title = "Contour, with band, contact points, gap and pivot"
+    description = (
+        f"Map of the contour {between}. The band is widest at {words[int(np.argmax(width))]}. "
+        f"{'A gap lies between ' + unit.text(ends[0]) + ' and ' + unit.full(ends[1]) + '.' if ends else ''}"
+    )
+    enlarged = f"The band measured from its median, {between}; the same numbers are in the table below."
+    chosen = np.linspace(0, x.size - 1, _TABLED).round().astype(int)
+    return ContourFigure(
+        figure("contour-map", title, description, height, *overview.drawn("contour-clip")),
+        figure("band-detail", "The band, enlarged", enlarged, _DETAIL_HEIGHT, *detail.drawn("detail-clip")),
+        legend(entries),
+        places,
+        [rows[i] for i in chosen],
+        unit,
+    )
+
+
+def _put_contacts(overview: Plot, findings: Findings, x: Floats) -> list[tuple[str, str]]:
+    contacts = findings.contacts
+    if contacts is None:
+        return []
+    at_x, at_y = contacts["contact_x"].values, contacts["contact_y"].values
+    good = (contacts["status"].values == "ok") & (at_x >= x[0]) & (at_x <= x[-1])
+    entries = []
+    for phase, name in (("tip", "tip contact"), ("tangential", "tangential contact")):
+        chosen = good & (contacts["contact_phase"].values == phase)
+        if chosen.any():
+            places = overview.x(at_x[chosen]), overview.y(at_y[chosen])
+            overview.put(dots(*places, 2.2, f"contact {phase}", square=phase == "tangential"))
+            entries.append((f"key-{phase}", f"{name} ({np.count_nonzero(chosen)})"))
+    return entries
+
+
+def _rows(x: Floats, lower: Floats, median: Floats, upper: Floats, unit: Shown) -> list[list[str]]:
+    """Place, lower, median and upper of the band, with as many decimals as their spread is worth."""
+    scale = 10.0**unit.power
+    places = spread(x / scale, float(np.ptp(x)) / x.size / scale)
+    return [
+        [place, *spread(numbers / scale, float(numbers[2] - numbers[0]) / scale)]
+        for place, numbers in zip(places, np.stack([lower, median, upper], axis=-1), strict=True)
+    ]
+
+
+def _said(rows: list[list[str]], share: str, unit: Shown) -> list[str]:
+    name = f"\u00a0{unit.name}" if unit.name else ""
+    return [
+        f"x = {at}{name}: no band, some contours end before"
+        if low == "–"
+        else f"x = {at}{name}: y from {low} to {high}{name} with {share}, median {middle}{name}"
+        for at, low, middle, high in rows
+    ]

@@ -1,0 +1,218 @@
+"""Drawings as inline SVG: elements, scales with ticks, paths, and a plot with axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from markupsafe import Markup, escape
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.plotting.axes import number
+
+__all__ = ["WIDTH", "Plot", "Scale", "dots", "element", "figure", "legend", "outline_path"]
+
+Floats = NDArray[np.float64]
+
+WIDTH = 640
+"""Of every drawing, in its own units, of which a letter has 13 in height."""
+
+_LEFT, _RIGHT, _TOP, _BOTTOM = 84, 24, 12, 46
+"""Room beside a plot's frame."""
+
+_TALLEST, _LOWEST = 460.0, 140.0
+"""Height of a map's frame."""
+
+
+def element(name: str, *content: str, **attributes: object) -> Markup:
+    """An element of SVG; `class_` is its class, `_` in other names stands for a hyphen. Text is escaped.
+
+    Examples
+    --------
+    >>> element("text", "a < b", class_="tick", text_anchor="end")
+    Markup('<text class="tick" text-anchor="end">a &lt; b</text>')
+    """
+    said = Markup("").join(
+        Markup(' {}="{}"').format(key.rstrip("_").replace("_", "-"), value)
+        for key, value in attributes.items()
+        if value is not None
+    )
+    return Markup("<{}{}>{}</{}>").format(name, said, Markup("").join(escape(part) for part in content), name)
+
+
+def figure(identity: str, title: str, description: str, height: float, *content: Markup) -> Markup:
+    """A whole drawing, with a title and a description for those who cannot see it."""
+    return element(
+        "svg",
+        element("title", title, id=f"{identity}-title"),
+        element("desc", description, id=f"{identity}-desc"),
+        *content,
+        id=identity,
+        viewBox=f"0 0 {WIDTH} {height:g}",
+        role="img",
+        aria_labelledby=f"{identity}-title",
+        aria_describedby=f"{identity}-desc",
+    )
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A straight map from values to places in a drawing."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def __call__(self, values: ArrayLike) -> Floats:
+        share = (np.asarray(values, dtype=float) - self.low) / (self.high - self.low)
+        return np.asarray(self.start + share * (self.end - self.start))
+
+    def at(self, value: float) -> float:
+        return round(float(self(value)), 1)
+
+    def ticks(self, power: int = 0, most: int = 6) -> list[float]:
+        """Round values within the scale, in multiples of 1, 2, 2.5 or 5 of a power of ten."""
+        rough = (self.high - self.low) / 10.0**power / (most + 1)
+        unit = 10.0 ** math.floor(math.log10(rough))
+        step = next(unit * m for m in (1, 2, 2.5, 5, 10) if unit * m >= rough * (1 - 1e-9)) * 10.0**power
+        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
+        return [k * step for k in range(first, last + 1)]
+
+
+def scale_of(values: ArrayLike, start: float, end: float, room: float = 0.04) -> Scale:
+    """A scale that holds all values that are numbers, with some room."""
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    margin = room * (high - low) or 0.5 * abs(high) or 0.5
+    return Scale(low - margin, high + margin, start, end)
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A frame with two scales, into which things are put; `drawn` gives them with their axes.
+
+    Parameters
+    ----------
+    x, y : Scale
+    x_label, y_label : str
+    x_power, y_power : int
+        Powers of ten that values are divided by where they are written.
+    """
+
+    x: Scale
+    y: Scale
+    x_label: str
+    y_label: str
+    x_power: int = 0
+    y_power: int = 0
+    content: list[Markup] = field(default_factory=list)
+
+    @classmethod
+    def around(
+        cls, x: ArrayLike, y: ArrayLike, labels: tuple[str, str], height: float, powers: tuple[int, int] = (0, 0)
+    ) -> Plot:
+        """A plot of the full width, and of some height, that holds all of some points."""
+        across = scale_of(x, _LEFT, WIDTH - _RIGHT, room=0.02)
+        up = scale_of(y, height - _BOTTOM, _TOP, room=0.06)
+        return cls(across, up, *labels, *powers)
+
+    @classmethod
+    def map_of(
+        cls, x: ArrayLike, y: ArrayLike, labels: tuple[str, str], powers: tuple[int, int] = (0, 0)
+    ) -> tuple[Plot, float]:
+        """A plot with equal scales that holds all of some points, and its height."""
+        across = scale_of(x, _LEFT, WIDTH - _RIGHT, room=0.03)
+        per_unit = (across.end - across.start) / (across.high - across.low)
+        up = scale_of(y, 0.0, 1.0, room=0.05)
+        wanted = (up.high - up.low) * per_unit
+        if wanted > _TALLEST:  # then the height decides
+            per_unit *= _TALLEST / wanted
+            middle, half = 0.5 * (across.low + across.high), 0.5 * (across.end - across.start) / per_unit
+            across = Scale(middle - half, middle + half, across.start, across.end)
+        room = max(_LOWEST / per_unit - (up.high - up.low), 0.0) / 2.0
+        low, high = up.low - room, up.high + room
+        height = _TOP + (high - low) * per_unit + _BOTTOM
+        return cls(across, Scale(low, high, height - _BOTTOM, _TOP), *labels, *powers), height
+
+    def put(self, *content: Markup) -> None:
+        self.content.extend(content)
+
+    def path(self, x: ArrayLike, y: ArrayLike, class_: str) -> None:
+        self.put(element("path", d=outline_path(self.x(x), self.y(y)), class_=class_))
+
+    def area(self, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, class_: str) -> None:
+        across = self.x(np.concatenate([np.asarray(x), np.asarray(x)[::-1]]))
+        edge = self.y(np.concatenate([np.asarray(lower), np.asarray(upper)[::-1]]))
+        self.put(element("path", d=outline_path(across, edge) + "Z", class_=class_))
+
+    def stretch(self, low: float, high: float, class_: str) -> None:
+        """A stretch in x, from bottom to top."""
+        ends = np.clip(self.x([low, high]), self.x.start, self.x.end)
+        top, bottom = self.y.end, self.y.start
+        width = f"{abs(ends[1] - ends[0]):.1f}"
+        self.put(element("rect", x=f"{ends.min():.1f}", y=top, width=width, height=bottom - top, class_=class_))
+
+    def drawn(self, clip: str) -> tuple[Markup, ...]:
+        """Axes, and within them what was put there; `clip` is an id of its own for the frame."""
+        left, right, top, bottom = self.x.start, self.x.end, self.y.end, self.y.start
+        frame = {"x": left, "y": top, "width": right - left, "height": round(bottom - top, 1)}
+        axes = []
+        for value in self.x.ticks(self.x_power):
+            at = self.x.at(value)
+            axes.append(element("line", x1=at, x2=at, y1=top, y2=bottom, class_="grid"))
+            axes.append(element("text", number(value, self.x_power), x=at, y=bottom + 18, class_="tick middle"))
+        for value in self.y.ticks(self.y_power, most=min(8, max(2, int((bottom - top) / 32)))):
+            at = self.y.at(value)
+            axes.append(element("line", x1=left, x2=right, y1=at, y2=at, class_="grid"))
+            axes.append(element("text", number(value, self.y_power), x=left - 6, y=at + 4, class_="tick end"))
+        middle = 0.5 * (top + bottom)
+        turned = f"translate(20 {middle:.1f}) rotate(-90)"
+        axes += [
+            element("text", self.x_label, x=0.5 * (left + right), y=bottom + 39, class_="label middle"),
+            element("text", self.y_label, x=0, y=0, transform=turned, class_="label middle"),
+        ]
+        inside = element("g", *self.content, clip_path=f"url(#{clip})")
+        return (
+            element("clipPath", element("rect", **frame), id=clip),
+            *axes,
+            inside,
+            element("rect", **frame, class_="frame"),
+        )
+
+
+def outline_path(x: Floats, y: Floats) -> str:
+    """Points in a drawing as the data of a path, which is interrupted where they are no numbers."""
+    out, pen = [], "M"
+    for across, down in zip(np.round(x, 1), np.round(y, 1), strict=True):
+        if not (math.isfinite(across) and math.isfinite(down)):
+            pen = "M"
+            continue
+        out.append(f"{pen}{across:g} {down:g}")
+        pen = "L"
+    return "".join(out)
+
+
+def dots(x: Sequence[float] | Floats, y: Sequence[float] | Floats, half: float, class_: str, *, square: bool) -> Markup:
+    """Many marks of one kind as one path: squares, or discs."""
+    data = []
+    for across, down in zip(x, y, strict=True):
+        if not (math.isfinite(across) and math.isfinite(down)):
+            continue
+        if square:
+            data.append(f"M{across - half:.1f} {down - half:.1f}h{2 * half:g}v{2 * half:g}h{-2 * half:g}z")
+        else:
+            arc = f"a{half:g} {half:g} 0 1 0"
+            data.append(f"M{across - half:.1f} {down:.1f}{arc} {2 * half:g} 0{arc} {-2 * half:g} 0")
+    return element("path", d="".join(data), class_=class_)
+
+
+def legend(entries: Iterable[tuple[str, str]]) -> Markup:
+    """What marks and lines mean, as a list of HTML that wraps: pairs of a class and a text."""
+    items = [
+        element("li", element("span", class_=f"key {class_}", aria_hidden="true"), text) for class_, text in entries
+    ]
+    return element("ul", *items, class_="legend")

@@ -1,0 +1,186 @@
+"""What a folder of a run holds, and what follows from it: everything that a report states."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.inference.result import read_result, record_of
+from tactile_bayes.load_cell import zero_load
+from tactile_bayes.record import record_hash
+from tactile_bayes.run import contact_points, reach, summary
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.gap import gap
+from tactile_bayes.uncertainty.predictive import predictive_interval
+from tactile_bayes.uncertainty.record_check import check_record
+from tactile_bayes.uncertainty.verdicts import verdicts
+
+__all__ = ["Findings", "findings_of"]
+
+_GROUPS = ("posterior", "sample_stats", "posterior_predictive", "events", "observed_data", "constant_data", "prior")
+_SAID = ("family", "units", "friction", "nuisances", "priors", "settings", "seed", "message", "data_sha256")
+
+_COMPARISON = ("probability", "log_evidence", "p_value", "fits", "sampled")
+
+_USUAL = 0.95
+"""Probability of intervals where a posterior does not state what was asked for."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a report states.
+
+    Attributes
+    ----------
+    posterior : xr.DataTree
+        As it was stored.
+    record : xr.Dataset
+        The record in it.
+    contacts : xr.Dataset or None
+        Contact points; None where a load channel is missing.
+    band, interval : xr.Dataset
+        Of the contour, and of the readings that the posterior predicts.
+    edges : xr.Dataset or None
+        The gap; None where there are sweeps in one direction only.
+    numbers : xr.Dataset
+        Of the parameters, from `tactile_bayes.run.summary`.
+    verdicts : tuple of str
+    check : xr.Dataset or None
+        Of the record; None where there are too few draws for one.
+    zero : xr.Dataset
+        The unloaded stretches.
+    comparison : xr.Dataset or None
+        Of families.
+    posterior_sha256, record_sha256 : str
+        Of the file, and of the record in it (`record_hash`).
+    probability : float
+        Of bands and intervals.
+    """
+
+    posterior: xr.DataTree
+    record: xr.Dataset
+    contacts: xr.Dataset | None
+    band: xr.Dataset
+    interval: xr.Dataset
+    edges: xr.Dataset | None
+    numbers: xr.Dataset
+    verdicts: tuple[str, ...]
+    check: xr.Dataset | None
+    zero: xr.Dataset
+    comparison: xr.Dataset | None
+    posterior_sha256: str
+    record_sha256: str
+    probability: float
+
+
+def findings_of(run: Path, compare: Path | None = None) -> Findings:
+    """Read a run, and work out what a report states of it.
+
+    All of it follows from posterior.nc, in which the record lies, too; the tables that `infer` writes beside it are
+    the same numbers.
+
+    Parameters
+    ----------
+    run : Path
+        Folder that `tactile_bayes.run.analyse` has written.
+    compare : Path, optional
+        Folder of a comparison of families; by default `run`, if there is one in it.
+
+    Raises
+    ------
+    InferenceError
+        If one of them is something else.
+    """
+    path = _posterior_in(run)
+    content = path.read_bytes()
+    posterior = _contour_posterior(path)
+    record = record_of(posterior)
+    comparison = _comparison_in(run, compare, record.sizes["sample"])
+    probability = float(posterior.attrs.get("probability", _USUAL))
+    contacts = contact_points(record, None, posterior)
+    try:
+        check = check_record(posterior)
+    except InferenceError:  # too few draws, which is among the verdicts
+        check = None
+    both = set(posterior["events"].stroke.values) == {"forward", "backward"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DriftWarning)  # as the verdicts do
+        zero = zero_load(record)
+    return Findings(
+        posterior=posterior,
+        record=record,
+        contacts=contacts,
+        band=contour_band(posterior, reach(posterior), probability),
+        interval=predictive_interval(posterior, probability),
+        edges=gap(posterior, probability) if both else None,
+        numbers=summary(posterior, probability),
+        verdicts=verdicts(posterior, contacts),
+        check=check,
+        zero=zero,
+        comparison=comparison,
+        posterior_sha256=hashlib.sha256(content).hexdigest(),
+        record_sha256=record_hash(record),
+        probability=probability,
+    )
+
+
+def _posterior_in(run: Path) -> Path:
+    remedy = "give the folder that `tactile-bayes infer RECORD --out FOLDER` has written"
+    if not run.exists():
+        raise InferenceError(f"there is no folder {run}: {remedy}")
+    if not run.is_dir():
+        raise InferenceError(f"{run} is a file: {remedy}")
+    path = run / "posterior.nc"
+    if not path.is_file():
+        kinds = {
+            "comparison.nc": "a comparison of shapes",
+            "design.nc": "a design",
+            "manifest.json": "a data set",
+        }
+        found = next((f", but {kind}" for name, kind in kinds.items() if (run / name).exists()), "")
+        raise InferenceError(f"{run} holds no posterior.nc{found}: {remedy}")
+    return path
+
+
+def _contour_posterior(path: Path) -> xr.DataTree:
+    """A result of `infer_contour`, and nothing else."""
+    try:
+        posterior = read_result(path)
+    except InferenceError:
+        raise
+    except Exception as error:  # what HDF5 finds in a damaged file is raised as anything
+        raise InferenceError(f"{path} cannot be read, it is damaged or cut short: infer again ({error})") from error
+    lacks = [name for name in _GROUPS if name not in posterior.children]
+    lacks += [name for name in _SAID if name not in posterior.attrs]
+    if lacks:
+        raise InferenceError(
+            f"{path} is a posterior, but not of a contour (it has no {', '.join(lacks)}): give a folder of "
+            "`tactile-bayes infer`"
+        )
+    return posterior
+
+
+def _comparison_in(run: Path, compare: Path | None, samples: int) -> xr.Dataset | None:
+    path = (compare or run) / "comparison.nc"
+    remedy = "give --compare the folder that `tactile-bayes compare RECORD --out FOLDER` has written"
+    if not path.is_file():
+        if compare is None:
+            return None
+        raise InferenceError(f"{compare} holds no comparison.nc: {remedy}")
+    try:
+        found = xr.load_dataset(path, engine="h5netcdf")
+    except Exception as error:  # likewise
+        raise InferenceError(f"{path} cannot be read, it is damaged or cut short: compare again ({error})") from error
+    if "family" not in found.dims or not {*_COMPARISON} <= set(found.data_vars) or "verdict" not in found.attrs:
+        raise InferenceError(f"{path} is no comparison of shapes: {remedy}")
+    if found.sizes.get("sample", samples) != samples:
+        raise InferenceError(
+            f"{path} is of a record with {found.sizes['sample']} samples, and the run's has {samples}: give the "
+            "comparison of the same record"
+        )
+    return found

@@ -1,0 +1,132 @@
+"""The moving rod: what the likeliest contour makes of the rod at every sample of a record."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.contours import Contour
+from tactile_bayes.elastica import PHASE_NAMES
+from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import rod_of
+from tactile_bayes.shape import rod_shape
+from tactile_bayes.sweeps import ManyUnits
+from tactile_bayes.world import in_world
+
+__all__ = ["Motion", "motion_of"]
+
+Floats = NDArray[np.float64]
+
+_MOST = 900
+"""Samples that are shown: of a longer record every second, or third, and so on."""
+
+_POINTS = 33
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rods along the likeliest contour, at samples of a record, sweep after sweep; units are the record's.
+
+    Attributes
+    ----------
+    contour : Contour
+        The likeliest of the posterior's draws.
+    samples : ndarray of int, shape (n,)
+        Which samples of the record.
+    sweep : ndarray of int, shape (n,)
+    rod_x, rod_y : ndarray, shape (n, points)
+        The rod, from pivot to tip.
+    contact_x, contact_y : ndarray, shape (n,)
+        On the object; NaN out of contact.
+    phase : ndarray of str, shape (n,)
+        "tip", "tangential", "none".
+    drive_angle : ndarray, shape (n,)
+        Slope of the rod at the pivot [rad].
+    loads : ndarray, shape (n, 3)
+        Holding moment and support reaction, along the axes of the world, free of noise and of the cell's errors.
+    every : int
+        One of how many samples is shown.
+    """
+
+    contour: Contour
+    samples: NDArray[np.intp]
+    sweep: NDArray[np.intp]
+    rod_x: Floats
+    rod_y: Floats
+    contact_x: Floats
+    contact_y: Floats
+    phase: NDArray[np.str_]
+    drive_angle: Floats
+    loads: Floats
+    every: int
+
+
+def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
+    """Rods of the likeliest draw, with the rig as that draw has it: rigidity, encoder, friction, suspension, pivots.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    most : int
+        Samples at most, evenly picked from every sweep.
+
+    Returns
+    -------
+    Motion
+    """
+    record = record_of(posterior)
+    best = posterior["sample_stats"]["lp"].argmax(("chain", "draw"))
+    draw = posterior_draws(posterior).isel(best)
+    contour = contours_of(draw, posterior.attrs["family"])
+    cell = LoadCell.from_record(record) or LoadCell()
+    friction = float(posterior.attrs["friction"])
+    nuisances = nuisances_of(record, json.loads(posterior.attrs["nuisances"]), {}, cell, friction)
+    rig = nuisances.rig({name: np.atleast_1d(draw[name].values) for name in nuisances.names})
+    likelihood = RecordLikelihood(record, cell, friction, order=FINE_ORDER)
+    paths = likelihood.paths(contour, rig, exact_events=True)
+
+    numbers = record.sweep.values
+    every = max(1, -(-numbers.size // most))
+    order = np.argsort(numbers, kind="stable")
+    by_sweep = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
+    samples = np.concatenate([rows[::every] for rows in by_sweep])
+    lanes = np.empty(numbers.size, dtype=np.intp)
+    for lane, stroke in enumerate(likelihood.strokes):
+        lanes[stroke.samples] = lane
+    lane = lanes[samples]
+    mirrored = paths.seen.mirrored[lane]
+    offset = cell.drive_angle_offset + float(np.ravel(rig.drive_angle_offset)[0])
+    angle = record.drive_angle.values[samples] - offset
+    seen_angle = np.where(mirrored, np.pi - angle, angle)
+    states = paths.states(lane, seen_angle)
+    rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])
+    units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
+    world = in_world(paths.seen, lane, states, units)
+    loaded = world["contact_phase"] != PHASE_NAMES[0]
+    slope = np.where(loaded, states.wrench.drive_angle, seen_angle)
+    wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
+    x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0)
+    sign = np.where(mirrored, -1.0, 1.0)
+    loads = np.stack([world[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
+    return Motion(
+        contour=contour.take(np.array(0)),
+        samples=samples,
+        sweep=numbers[samples],
+        rod_x=paths.seen.base_x[lane][:, None] + sign[:, None] * x * rod.length_unit,
+        rod_y=paths.seen.base_y[lane][:, None] + y * rod.length_unit,
+        contact_x=np.where(loaded, world["contact_x"], np.nan),
+        contact_y=np.where(loaded, world["contact_y"], np.nan),
+        phase=world["contact_phase"],
+        drive_angle=np.where(mirrored, np.pi - slope, slope),
+        loads=np.where(loaded[:, None], loads, 0.0),
+        every=every,
+    )

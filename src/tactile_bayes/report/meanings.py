@@ -1,0 +1,66 @@
+"""What parameters mean, in words."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["FORMULAS", "is_direction", "meaning_of"]
+
+FORMULAS = {
+    "parabola": "y = a (x − x_c)² + q",
+    "circle": "a circle of radius r, lowest at (x_c, q)",
+    "ellipse": "an ellipse of semi-axes a (sideways) and b, lowest at (x_c, q)",
+    "power-law": "(y − q)/w = (|x − x_c|/w)ⁿ",
+    "shape-free": "any smooth contour: log radius of curvature is a random function of the slope angle",
+}
+
+_MEANINGS = {
+    "q": "height of the lowest point",
+    "x_c": "x of the lowest point",
+    "r": "radius",
+    "b": "semi-axis in y",
+    "w": "where it is as high as it is wide",
+    "n": "exponent",
+    "amplitude": "by how much the logarithm of the radius goes up and down",
+    "length_scale": "slope angle in which it does so",
+    "noise_scale": "noise over that stated",
+    "moment_noise": "noise of the holding moment",
+    "force_noise": "noise of the forces",
+    "rigidity_scale": "flexural rigidity over that stated",
+    "drive_angle_offset": "what the encoder reads too much",
+    "friction": "Coulomb's coefficient",
+    "suspension_compliance": "turn of the pivot per holding moment",
+    "gap width": "of the arc that no sweep touches",
+}
+_A = {"parabola": "half the curvature of the lowest point", "ellipse": "semi-axis in x"}
+_R = {"shape-free": "mean radius of curvature (geometric)"}
+_CALIBRATION = re.compile(r"(?P<channel>moment|force_x|force_y)_(?P<what>bias|drift|gain)")
+_BASE = re.compile(r"base_(?P<pivot>\d+)_(?P<axis>[xy])")
+_WHATS = {"bias": "zero", "drift": "drift of the zero", "gain": "gain"}
+_CHANNELS = {"moment": "the holding moment", "force_x": "force x", "force_y": "force y"}
+
+
+def meaning_of(name: str, family: str) -> str:
+    """What a parameter of a contour, of its rig, or of the noise is.
+
+    Examples
+    --------
+    >>> meaning_of("q", "parabola"), meaning_of("force_x_bias", "circle"), meaning_of("left_a", "parabola/power-law")
+    ('height of the lowest point', 'zero of force x', 'left flank: half the curvature of the lowest point')
+    """
+    if match := _CALIBRATION.fullmatch(name):
+        return f"{_WHATS[match['what']]} of {_CHANNELS[match['channel']]}"
+    if match := _BASE.fullmatch(name):
+        return f"by how much pivot {match['pivot']} is off in {match['axis']}"
+    if is_direction(name):
+        return "a direction of the random function"
+    flanks = family.partition("/")
+    for side, flank in (("left", flanks[0]), ("right", flanks[2])):
+        if name.startswith(f"{side}_"):
+            return f"{side} flank: {meaning_of(name.removeprefix(f'{side}_'), flank)}"
+    return {"a": _A.get(family), "r": _R.get(family)}.get(name) or _MEANINGS.get(name, "")
+
+
+def is_direction(name: str) -> bool:
+    """Whether a parameter is one of many of a random function, and says nothing by itself."""
+    return name.startswith("z_")

@@ -1,0 +1,177 @@
+"""What a report says, section by section, as the template takes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.record import present_channels
+from tactile_bayes.report.background import (
+    columns_table,
+    hashes_table,
+    priors_table,
+    rig_table,
+    settings_table,
+    statements_table,
+    sweeps_table,
+    versions_table,
+)
+from tactile_bayes.report.contour_figure import contour_figure, gap_ends
+from tactile_bayes.report.findings import Findings
+from tactile_bayes.report.frames import motion_of
+from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
+from tactile_bayes.report.readings_figure import readings_figure
+from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
+from tactile_bayes.report.table import Table
+from tactile_bayes.report.trust import check_table, check_words, contacts_words, convergence
+from tactile_bayes.report.wording import chance, fixed, percent, shown_as, spread
+
+__all__ = ["page_of"]
+
+_WELL = "All is well"
+"""How verdicts begin that have found nothing."""
+
+
+def page_of(findings: Findings, name: str) -> dict[str, Any]:
+    """The values of the template's variables; `name` is that of the run."""
+    attrs = findings.posterior.attrs
+    motion = motion_of(findings.posterior)
+    contour, readings = contour_figure(findings), readings_figure(findings, motion)
+    channels, stats = present_channels(findings.record), findings.posterior["sample_stats"].to_dataset()
+    heads = [
+        f"{label} [{unit}]" if unit else label for channel, label, unit in readings.channels if channel in channels
+    ]
+    first = readings.data["first"]
+    return {
+        "name": name,
+        "record_file": str(attrs.get("record_file", "")),
+        "family": str(attrs["family"]),
+        "formula": FORMULAS.get(attrs["family"], "flanks of two shapes, " + str(attrs["family"])),
+        "share": percent(findings.probability),
+        "answer": _answer(findings),
+        "dimensionless": attrs["units"] == "dimensionless",
+        "contour": contour,
+        "band_table": Table(
+            f"The band at some places{contour.unit.bracketed}", ["x", "lower", "median", "upper"], contour.rows, 0
+        ),
+        "gap": _gap_words(findings),
+        "shapes": _shapes(findings.comparison),
+        "parameters": _parameters(findings, mute=True),
+        "is_well": findings.verdicts[0].startswith(_WELL),
+        "verdicts": findings.verdicts,
+        "convergence": convergence(findings),
+        "check_words": check_words(findings),
+        "check": check_table(findings),
+        "contacts": contacts_words(findings),
+        "readings": readings,
+        "frame": {key: values[first] for key, values in readings.data["said"].items()},
+        "moving": [
+            (channel, label, unit, readings.data["said"][channel][first]) for channel, label, unit in readings.channels
+        ],
+        "motion_every": motion.every,
+        "sweeps": sweeps_table(findings),
+        "all_readings": Table("The readings", ["sample", "sweep", "φ₀ [°]", *heads], readings.rows, 0),
+        "priors": priors_table(findings),
+        "everything": _parameters(findings, mute=False) if any(map(is_direction, stats.parameter.values)) else None,
+        "settings": settings_table(findings),
+        "rig": rig_table(findings),
+        "columns": columns_table(findings),
+        "record_attributes": statements_table(findings),
+        "approximations": str(attrs.get("approximations", "")),
+        "versions": versions_table(findings),
+        "hashes": hashes_table(findings),
+        "command": command_of(attrs),
+        "python": python_lines(attrs),
+        "hindrances": hindrances(findings.posterior, findings.record),
+        "data": {"band": contour.band, "frames": readings.data},
+    }
+
+
+def _answer(findings: Findings) -> str:
+    band = findings.band
+    width = band["upper"].values - band["lower"].values
+    unit = shown_as("contact_x", band["x"].attrs, band["x"].values)
+    fine = shown_as("contact_x", band["x"].attrs, width[np.isfinite(width)])
+    if not np.isfinite(width).any():
+        return "No contour of the posterior reaches all of what was touched: there is no band."
+    at = float(band["x"].values[np.nanargmax(width)])
+    return (
+        f"From x = {unit.text(float(band['x'].values[0]))} to {unit.full(float(band['x'].values[-1]))} the contour is "
+        f"known to within a {percent(findings.probability)} band whose median width is "
+        f"{fine.full(float(np.nanmedian(width)), 3)}; it is widest at x = {unit.full(at, 3)}, "
+        f"{fine.full(float(np.nanmax(width)), 3)}."
+    )
+
+
+def _gap_words(findings: Findings) -> list[str]:
+    edges = findings.edges
+    if edges is None:
+        return ["There are sweeps in one direction only, so there is no gap between two."]
+    width = edges["width"]
+    unit = shown_as("contact_x", width.attrs, [abs(float(width.sel(bound="median")))])
+    scale = 10.0**unit.power
+    values = [float(width.sel(bound=bound)) / scale for bound in ("median", "lower", "upper")]
+    middle, low, high = spread(values, values[2] - values[1])
+    share = percent(findings.probability)
+    if gap_ends(findings) is None:
+        said = [f"No gap is left: the sweeps overlap by {middle.removeprefix('−')} {unit.name}".rstrip() + "."]
+    else:
+        said = [
+            f"The gap, which no sweep touches, is {middle} {unit.name} wide".rstrip()
+            + f" ({share} from {low} to {high} {unit.name}".rstrip()
+            + ")."
+        ]
+        certificate, band = float(edges["triangle_width"].sel(bound="median")), float(edges["band_width"])
+        if np.isfinite(certificate) and np.isfinite(band):
+            fine = shown_as("contact_x", width.attrs, [certificate])
+            said.append(
+                "Convexity alone confines the contour there to a triangle "
+                f"{fine.full(certificate, 2)} wide in y; the band is {fine.full(band, 2)} wide."
+            )
+    status = str(edges["status"].values)
+    if status != "ok" and float(edges["share_open"]) > 0.0:
+        said.append(f"{status[0].upper()}{status[1:]}.")
+    if edges.attrs["gaps"] > 1:
+        said.append(f"There are {edges.attrs['gaps']} gaps; this is the widest.")
+    return said
+
+
+def _shapes(comparison: xr.Dataset | None) -> dict[str, Any] | None:
+    if comparison is None:
+        return None
+    order = np.argsort(-np.nan_to_num(comparison["probability"].values), kind="stable")
+    rows, bars = [], []
+    for k in order:
+        row = comparison.isel(family=k)
+        name, probability = str(row["family"].values), float(row["probability"])
+        fits = "not sampled" if not bool(row["sampled"]) else "yes" if bool(row["fits"]) else "no"
+        evidence, p_value = fixed(float(row["log_evidence"]), ".1f"), chance(float(row["p_value"]))
+        rows.append([name, chance(probability), evidence, p_value, fits])
+        bars.append((name, probability if np.isfinite(probability) else 0.0, chance(probability)))
+    heads = ["shape", "probability", "log evidence", "check p", "fits"]
+    return {
+        "verdict": str(comparison.attrs["verdict"]),
+        "table": Table("Shapes, given that it is one of them", heads, rows),
+        "bars": bars,
+    }
+
+
+def _parameters(findings: Findings, *, mute: bool) -> Table:
+    family = str(findings.posterior.attrs["family"])
+    rows = []
+    for name in findings.numbers["quantity"].values:
+        if mute and is_direction(name):
+            continue
+        row = findings.numbers.sel(quantity=name)
+        values = [float(row[column]) for column in ("median", "lower", "upper")]
+        unit = str(row["unit"].values)
+        cells = [str(name), meaning_of(str(name), family), "" if unit == "1" else unit]
+        cells += spread(values, values[2] - values[1])
+        cells += [fixed(float(row["r_hat"]), ".3f"), *(fixed(float(row[c]), ".0f") for c in ("ess_bulk", "ess_tail"))]
+        rows.append(cells)
+    share = percent(findings.probability)
+    heads = ["quantity", "meaning", "unit", "estimate", f"{share} from", "to", "R̂", "ESS bulk", "ESS tails"]
+    caption = "Estimates are medians, intervals central" if mute else "All parameters, and the gap"
+    return Table(caption, heads, rows, 3)

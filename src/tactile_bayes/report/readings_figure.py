@@ -1,0 +1,307 @@
+"""What was measured, and the rod at every sample of it: drawings, and frames for the page's script."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from tactile_bayes.inference.likelihood import bases_of
+from tactile_bayes.plotting.maps import outline
+from tactile_bayes.record import CHANNELS, frame_of, present_channels, turned
+from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
+from tactile_bayes.report.findings import Findings
+from tactile_bayes.report.frames import Motion
+from tactile_bayes.report.wording import Shown, percent, shown_as
+
+__all__ = ["ReadingsFigure", "channel_words", "readings_figure"]
+
+Floats = NDArray[np.float64]
+
+_WORDS = {"holding_moment": "holding moment", "force_x": "force x", "force_y": "force y"}
+_TURNING = {"force_x": "force along the rod", "force_y": "force across the rod"}
+
+_AXES = {"holding_moment": "moment", "force_x": "force x", "force_y": "force y"}
+_TURNING_AXES = {"force_x": "along", "force_y": "across"}
+
+_READINGS_HEIGHT = 190.0
+
+_ARROW = 110.0
+"""Length of the largest force."""
+
+_MOST_DOTS = 1500
+"""Samples drawn of each channel; of a longer record every second, or third, and so on."""
+
+
+class ReadingsFigure(NamedTuple):
+    """What a page needs of it."""
+
+    rods: Markup
+    readings: Markup
+    rods_legend: Markup
+    readings_legend: Markup
+    channels: list[tuple[str, str, str]]
+    """Name, label and unit of every channel."""
+    data: Mapping[str, Any]
+    """Frames."""
+    rows: list[list[str]]
+    """Sample, sweep, angle, then readings."""
+    shown: dict[str, Shown]
+    drawn_every: int
+
+
+def channel_words(record: xr.Dataset) -> dict[str, str]:
+    """What channels are called, in the frame of the load cell."""
+    return _WORDS | (_TURNING if frame_of(record) == "turning" else {})
+
+
+def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
+    """Draw the readings over the drive angle, and the rod, as it is where the first sweep loads it the most."""
+    record, present = findings.record, present_channels(findings.record)
+    words = channel_words(record)
+    # A load that was not measured is still one of the rod, in the unit that fits it.
+    bent = _in_frame(findings, motion)
+    shown = {
+        name: shown_as(name, record[name].attrs, record[name].values if name in present else bent[:, i])
+        for i, name in enumerate(CHANNELS)
+    }
+    force = np.hypot(motion.loads[:, 1], motion.loads[:, 2])
+    first = int(np.argmax(np.where(motion.sweep == motion.sweep[0], force, -1.0)))
+    rods, frames = _rods(findings, motion, first)
+    plots, drawings, every = _readings(findings, present, words, shown, motion, first)
+    angle = np.degrees(record.drive_angle.values)
+    marks = {
+        name: [None if not np.isfinite(value) else plot.y.at(value) for value in record[name].values[motion.samples]]
+        for name, plot in plots.items()
+    }
+    across = next(iter(plots.values())).x
+    said, rows = _said(findings, motion, present, shown, bent)
+    sweeps = [
+        {
+            "name": _sweep_name(record, number),
+            "frames": np.flatnonzero(motion.sweep == number).tolist(),
+        }
+        for number in dict.fromkeys(motion.sweep.tolist())
+    ]
+    data = {
+        **frames,
+        "angle": [across.at(value) for value in angle[motion.samples]],
+        "marks": marks,
+        "said": said,
+        "sweeps": sweeps,
+        "first": first,
+    }
+    entries = [("key-forward", "reading, forward sweep"), ("key-backward", "reading, backward sweep")]
+    have = set(record.direction.values.tolist())
+    entries = [entry for entry in entries if entry[0].removeprefix("key-") in have]
+    entries += [
+        ("key-unloaded", "unloaded for certain (pale)"),
+        ("key-predicted", f"{percent(findings.probability)} of what the posterior predicts"),
+        ("key-event", "first contact and snap-off, medians"),
+    ]
+    return ReadingsFigure(
+        rods,
+        Markup("").join(drawings),
+        legend(
+            [
+                ("key-object", "object, as the likeliest contour has it"),
+                ("key-rod", "rod"),
+                ("key-tip", "tip contact"),
+                ("key-tangential", "tangential contact"),
+                ("key-force", "support reaction at the pivot, contact force at the contact"),
+                ("key-moment", "holding moment"),
+            ]
+        ),
+        legend(entries),
+        [(name, words[name], shown[name].name) for name in CHANNELS],
+        data,
+        rows,
+        shown,
+        every,
+    )
+
+
+def _sweep_name(record: xr.Dataset, number: int) -> str:
+    first = record.isel(sample=int(np.argmax(record.sweep.values == number)))
+    name, bases = f"sweep {number}, {first.direction.item()}", bases_of(record)
+    pivot = first.base_x.item(), first.base_y.item()
+    return name if len(bases) == 1 else f"{name}, pivot {bases.index(pivot) + 1}"
+
+
+def _in_frame(findings: Findings, motion: Motion) -> Floats:
+    """Loads of the rod along the axes that the load cell has, shape (n, 3)."""
+    if frame_of(findings.record) == "fixed":
+        return motion.loads
+    moment, force_x, force_y = motion.loads.T
+    return np.stack([moment, *turned(force_x, force_y, motion.drive_angle)], axis=-1)
+
+
+def _rods(findings: Findings, motion: Motion, first: int) -> tuple[Markup, dict[str, Any]]:
+    """The map of the rod in one frame, and what moves it, in the drawing's own units."""
+    bases = np.array(bases_of(findings.record))
+    attrs = findings.record["base_x"].attrs
+    x, y = motion.rod_x, motion.rod_y
+    unit = shown_as("contact_x", attrs, np.concatenate([x.ravel(), y.ravel()]))
+    labels = f"x{unit.bracketed}", f"y{unit.bracketed}"
+    span = np.concatenate([x.ravel(), bases[:, 0]]), np.concatenate([y.ravel(), bases[:, 1]])
+    plot, height = Plot.map_of(*span, labels, (unit.power, unit.power))
+    along, up = outline(motion.contour, plot.x.low, plot.x.high)
+    up = np.minimum(up, plot.y.high + 1.0 * (plot.y.high - plot.y.low))
+    plot.area(along, up, np.full_like(up, plot.y.high + 2.0 * (plot.y.high - plot.y.low)), "object")
+    plot.path(along, up, "object-edge")
+    for place in bases:
+        plot.put(element("circle", cx=plot.x.at(place[0]), cy=plot.y.at(place[1]), r=5, class_="pivot"))
+
+    rod_x, rod_y = np.round(plot.x(x), 1), np.round(plot.y(y), 1)
+    force = motion.loads[:, 1:]
+    largest = float(np.max(np.hypot(*force.T), initial=0.0)) or 1.0
+    arrow = np.round(force / largest * _ARROW * np.array([1.0, -1.0]), 1)
+    moment = motion.loads[:, 0] / (float(np.max(np.abs(motion.loads[:, 0]), initial=0.0)) or 1.0)
+    frames: dict[str, Any] = {
+        "rod": np.stack([rod_x, rod_y], axis=-1).reshape(len(x), -1).tolist(),
+        "contact": [
+            [plot.x.at(a), plot.y.at(b)] if np.isfinite(a) else None
+            for a, b in zip(motion.contact_x, motion.contact_y, strict=True)
+        ],
+        "phase": motion.phase.tolist(),
+        "force": arrow.tolist(),
+        "moment": np.round(moment, 3).tolist(),
+    }
+    plot.put(*_rod(frames, first))
+    head = element("path", d="M0 0L8 4L0 8z")
+    marker: dict[str, object] = {
+        "markerWidth": 8,
+        "markerHeight": 8,
+        "refX": 7,
+        "refY": 4,
+        "orient": "auto",
+        "viewBox": "0 0 8 8",
+    }
+    defs = element(
+        "defs", element("marker", head, id="head", class_="arrow-head", markerUnits="userSpaceOnUse", **marker)
+    )
+    description = (
+        "The rod from its pivot to its tip, as the likeliest contour bends it at one sample of the record, with the "
+        "contact point, the forces and the holding moment. The slider below chooses the sample; its numbers are in the "
+        "table beside it."
+    )
+    return figure("rod-map", "The rod", description, height, defs, *plot.drawn("rod-clip")), frames
+
+
+def _rod(frames: Mapping[str, Any], first: int) -> tuple[Markup, ...]:
+    """What moves, in one frame; the script draws the others the same way."""
+    rod, contact = frames["rod"][first], frames["contact"][first]
+    force, phase = frames["force"][first], frames["phase"][first]
+    points = " ".join(f"{a:g},{b:g}" for a, b in zip(rod[::2], rod[1::2], strict=True))
+    lines = []
+    for name, sign, place in (("reaction", 1, rod[:2]), ("thrust", -1, contact)):
+        start = place or [-20, -20]
+        ends = dict(zip(("x1", "y1"), start, strict=True))
+        ends |= {"x2": round(start[0] + sign * force[0], 1), "y2": round(start[1] + sign * force[1], 1)}
+        hidden = "hidden" if contact is None else "visible"
+        lines.append(element("line", id=name, class_="force", marker_end="url(#head)", visibility=hidden, **ends))
+    at = contact or [-20, -20]
+    return (
+        element("path", id="moment", class_="moment", d="M0 0", marker_end="url(#head)"),
+        element("polyline", id="rod", points=points, class_="rod"),
+        element("circle", id="contact", cx=at[0], cy=at[1], r=5, class_=f"touch {phase}"),
+        *lines,
+    )
+
+
+def _readings(
+    findings: Findings,
+    present: tuple[str, ...],
+    words: Mapping[str, str],
+    shown: Mapping[str, Shown],
+    motion: Motion,
+    first: int,
+) -> tuple[dict[str, Plot], list[Markup], int]:
+    record, interval = findings.record, findings.interval
+    angle, sweep = np.degrees(record.drive_angle.values), record.sweep.values
+    unloaded, direction = findings.zero.unloaded.values, record.direction.values
+    every = max(1, -(-angle.size // _MOST_DOTS))
+    kept = np.arange(angle.size) % every == 0
+    events = findings.posterior["events"].to_dataset().median(("chain", "draw"))
+    here = int(motion.samples[first])
+    axes = _AXES | (_TURNING_AXES if frame_of(record) == "turning" else {})
+    plots, drawings = {}, []
+    for name in present:
+        values = record[name].values
+        bounds = [interval[f"{name}_{edge}"].values for edge in ("lower", "upper")]
+        unit = shown[name]
+        labels = "drive angle φ₀ [°]", f"{axes[name]}{unit.bracketed}"
+        plot = Plot.around(angle, np.concatenate([values, *bounds]), labels, _READINGS_HEIGHT, (0, unit.power))
+        for number in np.unique(sweep):
+            rows = np.flatnonzero((sweep == number) & kept)
+            rows = rows[np.argsort(angle[rows], kind="stable")]
+            plot.area(angle[rows], bounds[0][rows], bounds[1][rows], "predicted")
+        plot.path([plot.x.low, plot.x.high], [0.0, 0.0], "zero")
+        for event in ("first_drive_angle", "snap_off_drive_angle"):
+            for at in np.degrees(events[event].values):
+                plot.path([at, at], [plot.y.low, plot.y.high], "event")
+        for sense in ("forward", "backward"):
+            for is_unloaded in (True, False):
+                rows = np.flatnonzero(kept & (direction == sense) & (unloaded == is_unloaded))
+                if rows.size:
+                    pale = " unloaded" if is_unloaded else ""
+                    square = sense == "backward"
+                    places = plot.x(angle[rows]), plot.y(values[rows])
+                    plot.put(dots(*places, 1.8, f"reading {sense}{pale}", square=square))
+        across = plot.x.at(angle[here])
+        ends = {"x1": across, "x2": across, "y1": plot.y.end, "y2": plot.y.start}
+        plot.put(
+            element("line", class_="rule moving", **ends),
+            element("circle", class_="mark moving", cx=across, cy=plot.y.at(values[here]), r=5, data_channel=name),
+        )
+        plots[name] = plot
+        title = f"Readings: {words[name]}"
+        description = (
+            f"{words[name].capitalize()} of {angle.size} samples over the drive angle from "
+            f"{angle.min():.4g} to {angle.max():.4g} degrees, over what the posterior predicts; all numbers are in "
+            "the table below."
+        )
+        identity = f"readings-{name.replace('_', '-')}"
+        drawings.append(figure(identity, title, description, _READINGS_HEIGHT, *plot.drawn(f"{identity}-clip")))
+    return plots, drawings, every
+
+
+def _said(
+    findings: Findings, motion: Motion, present: tuple[str, ...], shown: Mapping[str, Shown], bent: Floats
+) -> tuple[dict[str, Any], list[list[str]]]:
+    """What the table beside the rod says in every frame, and a table of all readings."""
+    record, interval = findings.record, findings.interval
+    angle = np.degrees(record.drive_angle.values)
+    length = shown_as("contact_x", record["base_x"].attrs, np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()]))
+    frames: dict[str, Any] = {
+        "angle": [f"{angle[k]:.2f}".replace("-", "−") for k in motion.samples],
+        "sample": motion.samples.tolist(),
+        "contact": [
+            f"({length.text(a)}, {length.text(b)}) {length.name}".rstrip() if np.isfinite(a) else "none"
+            for a, b in zip(motion.contact_x, motion.contact_y, strict=True)
+        ],
+    }
+    for i, name in enumerate(CHANNELS):
+        unit = shown[name]
+        frames[name] = []
+        for row, k in enumerate(motion.samples):
+            reading = between = "not measured"
+            if name in present:
+                reading = unit.text(float(record[name].values[k]))
+                low, high = (unit.text(float(interval[f"{name}_{edge}"].values[k])) for edge in ("lower", "upper"))
+                between = f"{low} to {high}"
+            frames[name].append([reading, between, unit.text(float(bent[row, i]))])
+    rows = [
+        [
+            str(k),
+            str(int(record.sweep.values[k])),
+            f"{angle[k]:.2f}".replace("-", "−"),
+            *(shown[name].text(float(record[name].values[k])) for name in present),
+        ]
+        for k in motion.samples
+    ]
+    return frames, rows

@@ -1,0 +1,96 @@
+"""How a run is made again: its command, and lines of Python that need nothing but the posterior's file."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+from tactile_bayes.inference.contour_problem import default_priors, prior_in_words
+from tactile_bayes.load_cell import LoadCell
+
+__all__ = ["command_of", "hindrances", "python_lines"]
+
+
+def command_of(attrs: Mapping[Any, Any]) -> str:
+    """The command that asked for the run, as a shell takes it; "" if the posterior does not state it."""
+    return shlex.join(json.loads(attrs["command"])) if "command" in attrs else ""
+
+
+def python_lines(attrs: Mapping[Any, Any]) -> str:
+    """Lines that infer the posterior again from the record in its file, and compare the draws.
+
+    Examples
+    --------
+    >>> said = {"family": "circle", "friction": 0.0, "nuisances": "[]", "seed": "1", "settings": '{"ensembles": 2}'}
+    >>> print(python_lines(said))
+    import tactile_bayes as tb
+    from tactile_bayes.inference.result import record_of
+    <BLANKLINE>
+    stored = tb.read_result("posterior.nc")
+    again = tb.infer_contour(
+        record_of(stored),
+        family="circle",
+        friction=0.0,
+        nuisances=[],
+        seed=1,
+        settings=tb.SamplerSettings(
+            ensembles=2,
+        ),
+    )
+    print(again["posterior"].equals(stored["posterior"]))
+    """
+    seed, settings = str(attrs["seed"]), json.loads(attrs["settings"])
+    options = [
+        f"family={json.dumps(str(attrs['family']))}",
+        f"friction={float(attrs['friction'])!r}",
+        f"nuisances={json.dumps(json.loads(attrs['nuisances']))}",
+        *(["events=False"] if not attrs.get("events", 1) else []),
+        f"seed={_seed(seed)}",
+        "settings=tb.SamplerSettings(",
+        *(f"    {name}={value!r}," for name, value in settings.items()),
+        ")",
+    ]
+    lines = [
+        *(["import numpy as np"] if not seed.isdigit() else []),
+        "import tactile_bayes as tb",
+        "from tactile_bayes.inference.result import record_of",
+        "",
+        'stored = tb.read_result("posterior.nc")',
+        "again = tb.infer_contour(",
+        "    record_of(stored),",
+        *(f"    {option}" if option.endswith(("(", ",")) else f"    {option}," for option in options),
+        ")",
+        'print(again["posterior"].equals(stored["posterior"]))',
+    ]
+    return "\n".join(lines)
+
+
+def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
+    """Why those lines may not give the same draws, in sentences."""
+    attrs = posterior.attrs
+    settings = json.loads(attrs["settings"])
+    found = []
+    if settings.get("max_seconds") is not None:
+        found.append("The run could end by the clock, after max_seconds: then the number of its steps is not repeated.")
+    if "interrupted" in attrs["message"]:
+        found.append("The run was interrupted: one that is not goes on for longer.")
+    usual = default_priors(record, attrs["family"], LoadCell.from_record(record), json.loads(attrs["nuisances"]))
+    words = {name: prior_in_words(prior) for name, prior in usual.items()}
+    own = [name for name, said in json.loads(attrs["priors"]).items() if words.get(name) != said]
+    if own:
+        found.append(f"Priors of your own have to be given again: priors={{…}} for {', '.join(own)}.")
+    if not attrs.get("events", 1):
+        found.append("Unloaded samples were left out (events=False), and are not in the file: drifts may differ.")
+    return found
+
+
+def _seed(words: str) -> str:
+    """The seed from the words that an attribute has for it."""
+    if words.isdigit():
+        return words
+    entropy, _, key = words.partition(", spawn key ")
+    return f"np.random.SeedSequence({entropy}, spawn_key={key or '()'})"

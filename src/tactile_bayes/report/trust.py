@@ -1,0 +1,109 @@
+"""Whether a run can be trusted: convergence, the check of the record, and single samples, in words and numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.report.findings import Findings
+from tactile_bayes.report.readings_figure import channel_words
+from tactile_bayes.report.table import Table
+from tactile_bayes.report.wording import chance, fixed, percent, shown_as
+from tactile_bayes.uncertainty.record_check import DISCREPANCIES
+
+__all__ = ["check_table", "check_words", "contacts_words", "convergence"]
+
+
+def convergence(findings: Findings) -> list[str]:
+    """How the ensembles ended, and how they fared."""
+    attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].to_dataset()
+    message = str(attrs["message"])
+    said = [f"{message[0].upper()}{message[1:]}."]
+    draws = stats.sizes["chain"] * stats.sizes["draw"]
+    said.append(
+        f"{stats.sizes['chain']} independent ensembles of {int(stats.attrs['walkers'])} walkers made {draws} draws; "
+        f"they accepted {', '.join(percent(round(float(rate), 2)) for rate in stats['acceptance_rate'].values)} of "
+        "their proposals."
+    )
+    return said
+
+
+def check_words(findings: Findings) -> list[str]:
+    """Whether the record looks like what the posterior predicts, in sentences."""
+    check = findings.check
+    if check is None:
+        return ["There are too few draws for a check of the record."]
+    outcome = "passes" if check.attrs["passed"] else "FAILS"
+    said = [
+        f"The record {outcome} the check against {check.attrs['predictions']} records that the posterior predicts: "
+        f"p = {chance(float(check['overall_p_value']))}, the share of all, this one included, that are at least "
+        "as far off."
+    ]
+    outside, record = [], findings.record
+    words = channel_words(record)
+    for name in present_channels(record):
+        values = record[name].values
+        lower, upper = (findings.interval[f"{name}_{edge}"].values for edge in ("lower", "upper"))
+        count = int(np.count_nonzero((values < lower) | (values > upper)))
+        outside.append(f"{count} of {values.size} in {words[name]}")
+    expected = percent(round(1.0 - findings.probability, 9))
+    said.append(
+        f"Outside of the {percent(findings.probability)} that it predicts are {', '.join(outside)}; "
+        f"{expected} would be usual."
+    )
+    return said
+
+
+def check_table(findings: Findings) -> Table | None:
+    """Misfit by channel; None where there are too few draws to tell."""
+    check = findings.check
+    if check is None:
+        return None
+    record, rows = findings.record, []
+    words = channel_words(record)
+    for name in check["channel"].values:
+        of_channel = check.sel(channel=name)
+        unit = shown_as(name, record[name].attrs, [float(of_channel["worst_residual"])])
+        low, high = sorted(np.degrees([float(of_channel["worst_from"]), float(of_channel["worst_to"])]))
+        rows.append(
+            [
+                words[str(name)],
+                *(chance(float(of_channel["p_value"].sel(discrepancy=d))) for d in DISCREPANCIES),
+                f"sweep {int(of_channel['worst_sweep'])}, {low:.0f}° to {high:.0f}°".replace("-", "−"),
+                unit.full(float(of_channel["worst_residual"]), 2),
+            ]
+        )
+    heads = ["channel", *DISCREPANCIES, "worst stretch", "off there by"]
+    return Table("Misfit by channel: shares of predicted records that are at least as discrepant", heads, rows)
+
+
+def contacts_words(findings: Findings) -> list[str]:
+    """What became of single samples, and whether their four numbers agree with a rod."""
+    contacts = findings.contacts
+    if contacts is None:
+        words = channel_words(findings.record)
+        missing = [words[name] for name in CHANNELS if name not in present_channels(findings.record)]
+        were = "was" if len(missing) == 1 else "were"
+        return [f"Contact points take all three channels, and {' and '.join(missing)} {were} not measured."]
+    fates = Counter(contacts["status"].values.tolist()).most_common()
+    said = ["Single samples: " + ", ".join(f"{count} {fate}" for fate, count in fates) + "."]
+    attrs = contacts.attrs
+    probability, score = (float(attrs.get(key, np.nan)) for key in ("misfit_probability", "axial_score"))
+    if np.isfinite(probability):
+        said.append(
+            f"Four numbers determine three of a contact; what is left over sums to {float(attrs['misfit_sum']):.4g} "
+            f"over {int(attrs['misfit_samples'])} samples, which noise explains with probability {chance(probability)}."
+        )
+    if np.isfinite(score):
+        usual = (
+            "as it should be"
+            if abs(score) < 3.0
+            else ("too small, as friction makes it" if score < 0.0 else "too large: rod, frame or zero may be wrong")
+        )
+        said.append(
+            "In tangential contact D = fAx cos φ₀ + fAy sin φ₀ − m₀²/2 is zero, but for the friction that is stated: "
+            f"its mean is off that by {fixed(score, '+.2f')} standard errors, {usual}."
+        )
+    return said

@@ -1,0 +1,95 @@
+"""Numbers and units as a page writes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tactile_bayes.plotting.axes import number, shown_unit
+
+__all__ = ["Shown", "chance", "fixed", "percent", "shown_as", "spread"]
+
+
+class Shown(NamedTuple):
+    """A unit in which values are written: a power of ten of that in which they are, and its name."""
+
+    power: int
+    name: str
+
+    def text(self, value: float, digits: int = 4) -> str:
+        """The value without its unit, to some figures, never with an exponent unless it is far off; – for none."""
+        shown = value / 10.0**self.power
+        if not math.isfinite(shown):
+            return "–"
+        if not 1e-6 < abs(shown) < 1e9:
+            return number(shown, digits=digits)
+        decimals = digits - 1 - math.floor(math.log10(abs(shown)))
+        return number(round(shown, decimals), digits=15)
+
+    def full(self, value: float, digits: int = 4) -> str:
+        """The value with its unit, which no line break parts from it."""
+        return f"{self.text(value, digits)}\u00a0{self.name}".rstrip()
+
+    @property
+    def bracketed(self) -> str:
+        return f" [{self.name}]" if self.name else ""
+
+
+def shown_as(column: str, attrs: Mapping[Any, Any], values: Any) -> Shown:
+    r"""The unit that fits values of a column of a record: mm, mN m, or that of the rod.
+
+    Examples
+    --------
+    >>> shown_as("force_x", {"units": "N"}, [0.012]).full(0.0123)
+    '12.3\xa0mN'
+    >>> shown_as("force_x", {"units": "1"}, [0.012])
+    Shown(power=0, name='EI/L²')
+    """
+    power, unit = shown_unit(column, attrs, np.asarray(values, dtype=float))
+    return Shown(power, unit.replace("$", "").replace("^2", "²"))
+
+
+def spread(values: Iterable[float], width: float) -> list[str]:
+    """Numbers with as many decimals as show an interval of this width to two figures."""
+    if not (math.isfinite(width) and width > 0.0):
+        return [number(value) if math.isfinite(value) else "–" for value in values]
+    decimals = 1 - math.floor(math.log10(width))
+    if decimals > 9 or decimals < -3:
+        return [fixed(value, ".4g") for value in values]
+    return [fixed(value, f".{max(0, decimals)}f") for value in values]
+
+
+def fixed(value: float, form: str) -> str:
+    """A number in a form, with a true minus, which zero has none of; – for none.
+
+    Examples
+    --------
+    >>> fixed(-0.04, ".1f"), fixed(-1.26, ".1f")
+    ('0.0', '−1.3')
+    """
+    if not math.isfinite(value):
+        return "–"
+    text = f"{value:{form}}"
+    return text.removeprefix("-") if float(text) == 0.0 else text.replace("-", "−")
+
+
+def chance(value: float) -> str:
+    """A probability to three decimals, of which nothing but none and all are rounded to.
+
+    Examples
+    --------
+    >>> chance(0.25), chance(1e-9), chance(1.0), chance(float("nan"))
+    ('0.250', '<0.001', '1', '–')
+    """
+    if not math.isfinite(value):
+        return "–"
+    if 0.0 < value < 1.0:
+        return "<0.001" if value < 0.001 else ">0.999" if value > 0.999 else f"{value:.3f}"
+    return f"{value:g}"
+
+
+def percent(value: float) -> str:
+    return f"{100.0 * value:.6g}\u00a0%"

@@ -1,0 +1,99 @@
+"""The page, put together and written: template, style and script in one file that loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from tactile_bayes.files import write_atomically
+from tactile_bayes.report.findings import findings_of
+from tactile_bayes.report.page import page_of
+
+__all__ = ["write_report"]
+
+_ESCAPES = {code: f"\\u{code:04x}" for code in (ord("<"), ord(">"), ord("&"), 0x2028, 0x2029)}
+
+
+def write_report(
+    run: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    *,
+    compare: str | os.PathLike[str] | None = None,
+) -> Path:
+    """Write the report of a run: one HTML page that needs no network and nothing beside it.
+
+    It says what was found, whether it can be trusted, what was measured, and how to make it again. A slider moves the
+    rod of the likeliest contour through the samples of the record.
+
+    Parameters
+    ----------
+    run : path-like
+        Folder that `tactile-bayes infer` has written, of which posterior.nc is read.
+    out : path-like, optional
+        Where to; by default report.html in that folder. A file that is there is replaced.
+    compare : path-like, optional
+        Folder of `tactile-bayes compare` for the same record, whose probabilities of shapes the report then states; by
+        default `run`, if it holds a comparison.
+
+    Returns
+    -------
+    Path
+        Of the page.
+
+    Raises
+    ------
+    InferenceError
+        If there is no posterior of a contour in the folder, or no comparison where one is named.
+    OSError
+        If the page cannot be written.
+    """
+    folder = Path(run)
+    path = folder / "report.html" if out is None else Path(out)
+    findings = findings_of(folder, None if compare is None else Path(compare))
+    text = _rendered(page_of(findings, folder.resolve().name))
+    with write_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
+def _rendered(page: dict[str, Any]) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    style, script = (_resource(name) for name in ("report.css", "report.js"))
+    environment = Environment(
+        loader=PackageLoader("tactile_bayes", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    template = environment.get_template("template.html.jinja")
+    return template.render(
+        **{name: value for name, value in page.items() if name != "data"},
+        style=Markup(style),
+        script=Markup(script),
+        policy=_policy(style, script),
+        data=Markup(_as_json(page["data"])),
+    )
+
+
+def _resource(name: str) -> str:
+    return "\n" + resources.files("tactile_bayes.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _policy(style: str, script: str) -> str:
+    """What the page may do: run this script, apply this style, and load nothing."""
+    digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in (script, style))
+    run, look = (f"'sha256-{digest}'" for digest in digests)
+    return f"default-src 'none'; script-src {run}; style-src {look}; base-uri 'none'; form-action 'none'"
+
+
+def _as_json(data: Any) -> str:
+    """JSON that no text in it can break out of."""
+    return json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).translate(_ESCAPES)

@@ -1,0 +1,116 @@
+"""Runs to report on, without figures, and pages as parsers and browsers see them."""
+
+from __future__ import annotations
+
+import json
+from html.parser import HTMLParser
+from unittest import mock
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes import run
+from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.record import read_record, write_record
+from tactile_bayes.scanning import scan
+
+FEW = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
+
+COLUMN = "<|script><script>alert(1)<|script>"
+"""What reading makes of a column's name: a slash cannot be stored."""
+
+LONG_NAME = "</script><script>alert(2)</script>"
+UNIT = "\"><svg onload='alert(3)'>"
+ENTRY = '"><img src=x onerror="alert(4)">'
+VALUE = "</td></table><img src=x onerror=alert(5)><!-- \u2028 {{ 7 * 7 }}"
+FILE = "\"'><img src=x onerror=alert(6)>&amp;.csv"
+FOLDER = "<b onclick=alert(7)>run&lt;"
+
+VOID = {"meta", "input", "br", "hr", "img", "link"}
+
+
+def analysed_quickly(record: xr.Dataset, folder, **options) -> run.Run:
+    """A run of few steps, without figures."""
+    with mock.patch.object(run, "_draw", return_value={}):
+        return run.analyse(record, folder, settings=options.pop("settings", FEW), **options)
+
+
+def coarse_record(step: float = float(np.radians(6.0)), **options) -> xr.Dataset:
+    """The demonstration's record, in few samples, as it is measured."""
+    record = LOAD_CELL.measure(scan(CONTOUR, rod=ROD, drive_step=step, **options).record, seed=1)
+    return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
+
+
+def hostile_run(parent):
+    """A run of a record whose every text is an attack on the page; its folder."""
+    record = coarse_record()
+    attrs = {"units": UNIT, "long_name": LONG_NAME}
+    record["</script><script>alert(1)</script>".replace("/", "|")] = (
+        "sample",
+        np.arange(float(record.sizes["sample"])),
+        attrs,
+    )
+    path = parent / FILE
+    write_record(record.assign_attrs({ENTRY: VALUE}), path)
+    folder = parent / FOLDER
+    analysed_quickly(
+        read_record(path),
+        folder,
+        nuisances=[],
+        record_file=path,
+        command=["tactile-bayes", "infer", FILE, "--out", ENTRY],
+    )
+    return folder
+
+
+class Page(HTMLParser):
+    """Elements of a page with their attributes, texts of some of them, and whether all are closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.tables: list[tuple[str, list[list[str]]]] = []
+        self.texts: dict[str, list[str]] = {}
+        self.open: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag in VOID:
+            return
+        self.open.append(tag)
+        self.texts.setdefault(tag, []).append("")
+        if tag == "table":
+            self.tables.append(("", []))
+        elif tag == "tr":
+            self.tables[-1][1].append([])
+        elif tag in ("td", "th"):
+            self.tables[-1][1][-1].append("")
+
+    def handle_endtag(self, tag):
+        assert self.open, f"</{tag}> without anything open"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        for tag in set(self.open):
+            self.texts[tag][-1] += data
+        if self.open and self.open[-1] in ("td", "th"):
+            self.tables[-1][1][-1][-1] += data
+        elif "caption" in self.open:
+            caption, rows = self.tables[-1]
+            self.tables[-1] = (caption + data, rows)
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attrs for name, attrs in self.elements if name == tag]
+
+    def table(self, caption: str) -> list[list[str]]:
+        """Rows of the table whose caption begins so."""
+        return next(rows for words, rows in self.tables if words.startswith(caption))
+
+    @property
+    def data(self):
+        """What the page's script is given."""
+        texts = [text for attrs, text in zip(self.all("script"), self.texts["script"], strict=True) if "type" in attrs]
+        return json.loads(texts[0])

@@ -1,0 +1,40 @@
+"""The public face as a typed program uses it: `make lint` checks these lines as strictly as mypy can."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from scipy import stats
+
+import tactile_bayes as tb
+
+
+def contour_of(record: xr.Dataset) -> tuple[xr.DataTree, xr.Dataset, xr.Dataset]:
+    cell: tb.LoadCell = tb.LoadCell.from_zero_load(record)
+    contacts: xr.Dataset = tb.reconstruct(record, method="constrained", load_cell=cell)
+    posterior: xr.DataTree = tb.infer_contour(
+        record, family="parabola", load_cell=cell, priors={"q": stats.uniform(0.3, 0.4)}, seed=1
+    )
+    band: xr.Dataset = tb.contour_band(posterior, x=[-0.5, 0.0, 0.5], probability=0.95)
+    return posterior, contacts, band
+
+
+def simulated(rod: tb.Rod | None = None) -> xr.Dataset:
+    contour: tb.contours.Contour = tb.contours.Parabola(a=0.5, q=0.5)
+    scan = tb.scan(contour, base=[(0.0, 0.0), (0.25, 0.0)], drive_step=float(np.radians(2.0)), rod=rod)
+    angle: float = scan.sweeps[0].snap_off.drive_angle
+    record: xr.Dataset = scan.record
+    return tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(record.where(record.drive_angle < angle), seed=1)
+
+
+def drawn(posterior: xr.DataTree, band: xr.Dataset) -> Axes:
+    ax: Axes = tb.plotting.contour(band.x.values, band=band, gap=tb.gap(posterior))
+    return ax
+
+
+def planned() -> tuple[xr.DataTree, xr.Dataset, xr.Dataset]:
+    plan = tb.Plan(tb.contours.paper_profile("II", q=0.5))
+    needed: xr.Dataset = tb.required_noise(plan, 0.005)
+    found: xr.Dataset = tb.design("parabola", draws=4, seed=1)
+    return tb.sensitivity(seed=1), needed, found
