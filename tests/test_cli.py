@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
 import signal
 import subprocess
 import sys
@@ -13,10 +15,15 @@ from typer.testing import CliRunner
 
 from tactile_bayes import __version__
 from tactile_bayes.cli import app
+from tactile_bayes.cli.sampling_bar import remaining_seconds
 from tactile_bayes.demonstration import LOAD_CELL, ROD
+from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.record import write_record
 
 HEAVY = {"scipy", "xarray", "matplotlib", "emcee", "numpy", "arviz_stats"}
+COMMANDS = ["scan", "measure", "inspect", "reconstruct", "infer", "compare", "calibrate", "sensitivity", "design"]
+"""In the order in which a record goes through them."""
+
 ROD_OPTIONS = ["--length", str(ROD.length), "--flexural-rigidity", repr(ROD.flexural_rigidity)]
 CELL_OPTIONS = ["--force-noise", str(LOAD_CELL.force_noise), "--moment-noise", str(LOAD_CELL.moment_noise)]
 
@@ -76,19 +83,18 @@ def bare(record):
 def test_help_lists_the_commands():
     result = call("--help")
     assert result.exit_code == 0
-    commands = result.stdout.split("Commands:")[1]
-    assert [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "] == [
-        "infer",
-        "compare",
-        "calibrate",
-        "sensitivity",
-        "design",
-        "demo",
-        "dataset",
-    ]
+    commands = result.stdout.split("Commands:")[1].split("\n\n")[0]
+    found = [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "]
+    assert found[: len(COMMANDS)] == COMMANDS
+    assert {"demo", "dataset"} <= set(found)
 
 
-@pytest.mark.parametrize("command", ["infer", "compare", "calibrate", "sensitivity", "design", "demo"])
+def test_help_states_the_exit_codes():
+    words = " ".join(call("--help").stdout.split())
+    assert "0 for done, 1 for an unexpected error, 2 for input or options that are refused, 130 for Ctrl-C" in words
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "demo"])
 def test_help_of_a_command_ends_with_an_example(command):
     result = call(command, "--help")
     assert result.exit_code == 0
@@ -129,6 +135,36 @@ def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_p
 def test_a_run_may_be_given_a_time(record, tmp_path):
     result = call("infer", record, "--out", tmp_path / "run", "--as-stated", "--max-seconds", 0.1, "--quiet")
     assert result.stdout.startswith("NOT CONVERGED, the time allowed ran out")
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "demo", "dataset generate", "dataset verify", "dataset record"])
+def test_every_command_can_be_quiet_and_answer_in_json(command):
+    shown = call(*command.split(), "--help").stdout
+    assert "--quiet" in shown
+    assert "--json" in shown
+
+
+@pytest.mark.usefixtures("quick")
+def test_an_answer_in_json_is_one_object_and_says_whether_it_is_to_be_trusted(record, tmp_path):
+    result = call("infer", record, "--out", tmp_path / "run", "--json")
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    answer = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert answer["converged"] is False
+    assert answer["message"].startswith("not converged")
+    assert any(sentence.startswith("NOT CONVERGED") for sentence in answer["words"])
+    table = {row["quantity"]: row for row in answer["quantities"]}
+    assert table["a"]["lower"] < 2.5 < table["a"]["upper"]
+    assert table["gap width"]["r_hat"] is None  # of which there is none
+    assert sum(answer["samples"].values()) == len((tmp_path / "run" / "contacts.csv").read_text().splitlines()) - 1
+    assert Path(answer["files"]["posterior"]).stat().st_size > 0
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_demonstration_in_json_has_the_truth_beside_it(tmp_path):
+    answer = json.loads(call("demo", "--out", tmp_path / "demo", "--json").stdout)
+    assert {row["quantity"]: row["truth"] for row in answer["quantities"]}["a"] == 2.5
+    assert answer["files"]["record"] == str(tmp_path / "demo" / "record.csv")
 
 
 @pytest.mark.usefixtures("quick")
@@ -187,6 +223,7 @@ def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(record, tmp_p
     assert result.exit_code == 0, result.output
     assert "effective draws" in result.stderr
     assert "effective draws" not in result.stdout
+    assert " left" in result.stderr
 
 
 @pytest.mark.slow
@@ -278,6 +315,73 @@ def test_refusals_of_the_command_itself(tmp_path):
     assert list(tmp_path.iterdir()) == []
     _, errors = start("infer", "nowhere.csv", "--famly", "circle", code=2)
     assert "No such option: --famly" in errors
+
+
+def test_a_refusal_shows_where_it_comes_from_if_asked(tmp_path):
+    result = call("--debug", "infer", tmp_path / "nowhere.csv", "--out", tmp_path)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Traceback (most recent call last):")
+    assert result.stderr.splitlines()[-1] == f"tactile-bayes: {tmp_path / 'nowhere.csv'}: No such file or directory"
+
+
+@pytest.mark.parametrize("debug", [False, True])
+def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_path, monkeypatch, debug):
+    from tactile_bayes import reconstruction_run
+
+    def broken(*arguments, **options):
+        raise ZeroDivisionError("float division by zero\nand more")
+
+    monkeypatch.setattr(reconstruction_run, "reconstruct", broken)
+    result = call(*(["--debug"] if debug else []), "reconstruct", record, "--out", tmp_path)
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    *before, last = result.stderr.splitlines()
+    first = "tactile-bayes: unexpected error, ZeroDivisionError: float division by zero"
+    if debug:
+        assert before[0] == "Traceback (most recent call last):"
+        assert last == first
+    else:
+        assert before == [first]
+        assert last == "Run it again as tactile-bayes --debug ... to see where it comes from."
+
+
+@pytest.mark.filterwarnings("always::tactile_bayes.errors.StrainWarning")
+def test_a_warning_is_a_line(tmp_path):
+    rod = ["--length", 0.2, "--flexural-rigidity", 1e-2, "--diameter", 0.02]
+    result = call("scan", *rod, "--drive-step", 10, "--direction", "forward", "--out", tmp_path / "record.csv")
+    assert result.exit_code == 0, result.output
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("tactile-bayes: warning: in the forward sweep from (0, 0) the rod is strained by ")
+
+
+def test_shells_can_complete_commands_and_options():
+    """As the script that --show-completion prints asks for it."""
+    asking = {**os.environ, "_TACTILE_BAYES_COMPLETE": "complete_bash"}
+    command = str(Path(sys.executable).with_name("tactile-bayes"))
+    for words, wanted in (("tactile-bayes rec", "reconstruct"), ("tactile-bayes scan --fam", "--family")):
+        typed = {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+        done = subprocess.run([command], env={**asking, **typed}, capture_output=True, text=True, timeout=100)
+        assert done.stdout.split() == [wanted], done.stderr
+
+
+# --- Progress -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("made", "left"),
+    [
+        ({"ess": 250.0}, 30.0),  # a quarter in 10 s
+        ({"ess": 20.0}, 90.0),  # but steps run out
+        ({"ess": 1500.0, "r_hat": 1.2}, 2.0),
+        ({"ess": math.nan}, None),
+        ({"steps": 0, "ess": 0.0}, None),
+    ],
+)
+def test_time_that_is_left_is_that_of_draws_as_they_came(made, left):
+    progress = Progress(**{"steps": 100, "max_steps": 1000, "r_hat": 1.05, "seconds": 10.0, **made})
+    assert remaining_seconds(progress) == pytest.approx(left)
+    if left is not None:
+        assert remaining_seconds(progress, max_seconds=10.5) == pytest.approx(0.5)
 
 
 # --- Interrupts -----------------------------------------------------------------------------------------------------

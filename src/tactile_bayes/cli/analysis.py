@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tactile_bayes.cli.answer import Json, columns_of, print_json
 from tactile_bayes.cli.record_options import (
     AsStated,
     Columns,
@@ -38,6 +39,7 @@ __all__ = ["demo", "infer"]
 
 
 def infer(
+    ctx: typer.Context,
     record: Record,
     out: Out,
     family: Annotated[
@@ -73,6 +75,7 @@ def infer(
     ] = None,
     seed: Seed = 1,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Infer the contour from a measured record: contact points, posterior, band and figures."""
     from tactile_bayes.inference.ensembles import SamplerSettings
@@ -92,7 +95,7 @@ def infer(
         nuisance=nuisance,
         as_stated=as_stated,
     )
-    with sampling_bar(quiet) as progress:
+    with sampling_bar(quiet or json, max_seconds=max_seconds) as progress:
         run = analyse(
             measured,
             out,
@@ -104,15 +107,19 @@ def infer(
             probability=probability,
             seed=seed,
             settings=SamplerSettings(max_steps=max_steps, max_seconds=max_seconds),
+            record_file=record,
+            command=ctx.meta["words"],
             progress=progress,
         )
-    _print_run(run, {})
+    _tell(run, {}, as_json=json)
 
 
 def demo(
+    ctx: typer.Context,
     out: Out = Path("results/demo"),
     seed: Seed = 1,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """A steel wire sweeps along a parabola; its noisy record is turned into a contour with a band."""
     from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
@@ -120,7 +127,7 @@ def demo(
     from tactile_bayes.run import analyse
 
     path = measure_demo(out, seed=seed)
-    if not quiet:
+    if not (quiet or json):
         print(
             f"A wire of {ROD.length * 1e3:g} mm and {ROD.diameter * 1e3:g} mm diameter has swept forward and backward "
             f"along a parabola; a load cell\nwith {LOAD_CELL.force_noise * 1e3:g} mN and "
@@ -129,11 +136,57 @@ def demo(
             f"--out RUN\n",
             flush=True,
         )
-    with sampling_bar(quiet) as progress:
+    with sampling_bar(quiet or json) as progress:
         run = analyse(
-            read_record(path), out, family="parabola", nuisances=[], seed=seed, truth=CONTOUR, progress=progress
+            read_record(path),
+            out,
+            family="parabola",
+            nuisances=[],
+            seed=seed,
+            truth=CONTOUR,
+            record_file=path,
+            command=ctx.meta["words"],
+            progress=progress,
         )
-    _print_run(run, {"record": path}, TRUTH)
+    _tell(run, {"record": path}, TRUTH, as_json=json)
+
+
+def _tell(
+    run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None = None, *, as_json: bool = False
+) -> None:
+    """Print what came out; an interrupted run ends with the exit code of an interrupt all the same."""
+    if as_json:
+        print_json(_numbers(run, {**files, **run.files}, truth))
+    else:
+        _print_run(run, files, truth)
+    if "interrupted" in run.posterior.attrs["message"]:
+        raise typer.Exit(130)
+
+
+def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None) -> dict[str, Any]:
+    from tactile_bayes.run import summary
+
+    attrs = run.posterior.attrs
+    probability = run.band.attrs["probability"]
+    rows = columns_of(summary(run.posterior, probability), "quantity")
+    if truth:
+        rows = [{**row, "truth": truth.get(str(row["quantity"]))} for row in rows]
+    answer: dict[str, Any] = {
+        "words": run.verdicts,
+        "converged": bool(attrs["converged"]),
+        "message": attrs["message"],
+        "family": attrs["family"],
+        "probability": probability,
+        "quantities": rows,
+        "samples": None,
+        "misfit_probability": None,
+        "axial_score": None,
+        "files": files,
+    }
+    if run.contacts is not None:
+        answer["samples"] = dict(Counter(run.contacts.status.values.tolist()).most_common())
+        answer |= {name: run.contacts.attrs.get(name) for name in ("misfit_probability", "axial_score")}
+    return answer
 
 
 def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None = None) -> None:
@@ -179,8 +232,6 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
     console.print()
     for what, path in {**files, **run.files}.items():
         console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)
-    if "interrupted" in attrs["message"]:
-        raise typer.Exit(130)
 
 
 def _digits(width: float) -> int:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -12,44 +13,117 @@ from tactile_bayes.cli.calibration import calibrate
 from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
 from tactile_bayes.cli.design import design
+from tactile_bayes.cli.figures import figures
+from tactile_bayes.cli.inspection import inspect
+from tactile_bayes.cli.measurement import measure
+from tactile_bayes.cli.reconstruction import reconstruct
+from tactile_bayes.cli.report import report
+from tactile_bayes.cli.scanning import scan
 from tactile_bayes.cli.sensitivity import sensitivity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 __all__ = ["app", "main"]
 
 
 class _Commands(TyperGroup):
-    """Refusals are one line on stderr and exit code 2, an interrupt is exit code 130."""
+    """What goes wrong is a line on stderr, and an exit code: 2 for a refusal, 130 for an interrupt, 1 for the rest."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Keep the words of the call, which a run states."""
+        ctx.meta["words"] = ("tactile-bayes", *args)
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        from tactile_bayes.errors import TactileBayesError
-
         try:
-            return super().invoke(ctx)
-        except BrokenPipeError:  # whoever was reading has read enough
+            with _warnings_in_a_line():
+                return super().invoke(ctx)
+        except (BrokenPipeError, typer.Exit, typer.Abort):  # whoever was reading has read enough, or all is said
             raise
-        except TactileBayesError as error:
-            words, code = str(error), 2
-        except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            words, code = where + (error.strerror or str(error)), 2
         except KeyboardInterrupt as interrupt:
             words, code = str(interrupt) or "interrupted, results are incomplete", 130
+        except Exception as error:
+            if hasattr(error, "exit_code"):  # a call that is none, which typer shows with the usage
+                raise
+            words, code = _told(error)
+            if ctx.params["debug"]:
+                import traceback
+
+                typer.echo(traceback.format_exc(), err=True)
+            elif code == 1:
+                words += "\nRun it again as tactile-bayes --debug ... to see where it comes from."
         typer.echo(f"tactile-bayes: {words}", err=True)
         raise typer.Exit(code)
 
 
+def _told(error: Exception) -> tuple[str, int]:
+    """What went wrong in words, and the exit code."""
+    from tactile_bayes.errors import TactileBayesError
+
+    if isinstance(error, TactileBayesError):
+        return str(error), 2
+    if isinstance(error, OSError):
+        where = f"{error.filename}: " if error.filename else ""
+        return where + (error.strerror or str(error)), 2
+    said = str(error).strip().partition("\n")[0] or "no message"
+    return f"unexpected error, {type(error).__name__}: {said}", 1
+
+
+@contextmanager
+def _warnings_in_a_line() -> Iterator[None]:
+    """This package's warnings are a line on stderr; those of others look as always."""
+    import warnings
+
+    usual = warnings.showwarning
+
+    def show(message: Any, category: Any, *rest: Any, **more: Any) -> None:
+        from tactile_bayes.errors import TactileBayesWarning
+
+        if issubclass(category, TactileBayesWarning):
+            typer.echo(f"tactile-bayes: warning: {message}", err=True)
+        else:
+            usual(message, category, *rest, **more)
+
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = usual
+
+
+_EXIT_CODES = """Exit codes: 0 for done, 1 for an unexpected error, 2 for input or options that are refused, 130 for
+Ctrl-C, 143 for a run that was terminated. A result that is not to be trusted says so in its first line, and in "words"
+and "converged" of --json; its exit code is 0.
+
+Example: tactile-bayes demo --out results/demo
+
+tactile-bayes --install-completion has the shell complete commands and options."""
+
 app = typer.Typer(
     cls=_Commands,
     help="Contours from what a flexible rod's base feels: contact points, posteriors, bands.",
+    epilog=_EXIT_CODES,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+app.command(epilog="Example: tactile-bayes scan --profile II --distance 0.5 --out ideal.csv")(scan)
+app.command(
+    epilog="Example: tactile-bayes measure ideal.csv --force-noise 0.05 --moment-noise 0.02 --out measured.csv"
+)(measure)
+app.command(
+    epilog="Example: tactile-bayes inspect rig.csv --length 0.2 --flexural-rigidity 0.0024 --split-sweeps "
+    "--column 'force_x=Fx[mN]' --out inspection/"
+)(inspect)
+app.command(epilog="Example: tactile-bayes reconstruct record.csv --out contacts/")(reconstruct)
 app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")(infer)
 app.command(epilog="Example: tactile-bayes compare record.csv --out run/")(compare)
 app.command(epilog="Example: tactile-bayes calibrate --family parabola --replicates 200 --out calibration/")(calibrate)
 app.command(epilog="Example: tactile-bayes sensitivity --profile II --distance 0.5 --out sensitivity/")(sensitivity)
 app.command(epilog="Example: tactile-bayes design run/ --base 0.05,0 --base 0.1,0 --out design/")(design)
+app.command(epilog="Example: tactile-bayes figures --only 3 --distance 0.4 --format pdf --out figures/")(figures)
+app.command(epilog="Example: tactile-bayes report run/")(report)
 app.command(epilog="Example: tactile-bayes demo --out results/demo")(demo)
 app.add_typer(dataset, name="dataset")
 
@@ -72,6 +146,9 @@ def _options(
     version: Annotated[
         bool,
         typer.Option("--version", help="Print the version and stop.", callback=_print_version, is_eager=True),
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where a refusal or an error comes from, with the traceback.")
     ] = False,
 ) -> None:
     pass

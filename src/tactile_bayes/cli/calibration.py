@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tactile_bayes.cli.answer import Json, columns_of, print_json
 from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
@@ -61,6 +62,7 @@ def calibrate(
     scheduler: Scheduler = None,
     seed: Seed = 1,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Show whether intervals hold: simulate records, infer from each, and compare with the truth.
 
@@ -77,7 +79,7 @@ def calibrate(
     def have() -> str:
         return f"{last.done:,} of {replicates:,} replicates are in {out}" if last else "no further replicate was done"
 
-    with going_on(have) as raise_lost, task_bar(replicates, "replicate", quiet) as show:
+    with going_on(have) as raise_lost, task_bar(replicates, "replicate", quiet or json) as show:
 
         def note(calibrating: TaskProgress) -> None:
             nonlocal last
@@ -102,6 +104,11 @@ def calibrate(
             seed=seed,
             progress=note,
         )
+    if json:
+        found = run.calibration
+        told = {"words": [found.attrs["verdict"]], "probability": found.attrs["probability"]}
+        print_json({**told, "claims": columns_of(found, "claim"), "files": run.files})
+        return
     _print_run(run)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tactile_bayes.cli.answer import Json, columns_of, print_json
 from tactile_bayes.cli.record_options import (
     AsStated,
     Columns,
@@ -74,6 +75,7 @@ def compare(
     ] = None,
     seed: Seed = 1,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Compare shapes of contours: which of them a measured record is of, and whether any fits."""
     from tactile_bayes.comparison_run import compare_into
@@ -94,7 +96,7 @@ def compare(
         nuisance=nuisance,
         as_stated=as_stated,
     )
-    with sampling_bar(quiet) as show:
+    with sampling_bar(quiet or json, max_seconds=max_seconds) as show:
 
         def note(name: str, progress: Progress) -> None:
             if show is not None:
@@ -112,6 +114,13 @@ def compare(
             settings=SamplerSettings(max_seconds=max_seconds),
             progress=note,
         )
+    if json:
+        found = run.comparison
+        told = {name: found.attrs[name] for name in ("verdict", "prior_width") if name in found.attrs}
+        print_json(
+            {"words": [found.attrs["verdict"]], **told, "families": columns_of(found, "family"), "files": run.files}
+        )
+        return
     _print_run(run)
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tactile_bayes.cli.answer import Json, print_json
 from tactile_bayes.cli.interrupts import going_on
+from tactile_bayes.cli.record_options import Quiet
 from tactile_bayes.cli.task_bar import counted, task_bar
 from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
@@ -48,7 +50,8 @@ def generate(
     out: Annotated[Path, typer.Option(help="Folder for the data set; made if it is not there.", file_okay=False)],
     workers: Workers = None,
     scheduler: Scheduler = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Make a data set, or go on where a run stopped.
 
@@ -64,7 +67,7 @@ def generate(
     def have() -> str:
         return f"{last.records:,} of {spec.records:,} records are in {out}" if last else "no further file was finished"
 
-    with going_on(have) as raise_lost, task_bar(spec.records, "record", quiet) as show:
+    with going_on(have) as raise_lost, task_bar(spec.records, "record", quiet or json) as show:
 
         def note(production: Production) -> None:
             nonlocal last
@@ -73,6 +76,9 @@ def generate(
             raise_lost()
 
         datasets.generate(spec, out, workers=workers, scheduler=scheduler, progress=note)
+    if json:
+        print_json(_numbers(out, read_manifest(out)) | {"made": last.made if last else 0})
+        return
     _print_result(out, read_manifest(out), last)
 
 
@@ -80,7 +86,8 @@ def generate(
 def verify(
     folder: Folder,
     regenerate: Annotated[int, typer.Option(help="Files to be made again, and compared number by number.", min=0)] = 0,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Check every byte of a data set.
 
@@ -88,9 +95,12 @@ def verify(
     """
     from tactile_bayes import datasets
 
-    with _verification_progress(quiet) as show:
+    with _verification_progress(quiet or json) as show:
         manifest = datasets.verify(folder, regenerate=regenerate, progress=show)
     count = len(manifest.shards)
+    if json:
+        print_json({**_numbers(folder, manifest), "verified": True, "made_again": min(regenerate, count)})
+        return
     typer.echo(f"{folder}: {_records(manifest.records)} in {_files(count)}, every byte as it was written")
     if regenerate:
         typer.echo(f"{_files(min(regenerate, count))} made again: every number is the same")
@@ -104,12 +114,18 @@ def record(
     truth: Annotated[
         bool, typer.Option("--truth/--no-truth", help="With the columns of the truth, or as a laboratory has it.")
     ] = True,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Write one record to a file, as `infer` takes it."""
     from tactile_bayes import datasets, write_record
 
     found = datasets.record(source, index, truth=truth)
     write_record(found, out)
+    if json:
+        files = {"record": out}
+        print_json({"index": index, "samples": found.sizes["sample"], "units": found.attrs["units"], "files": files})
+        return
     typer.echo(f"record {index} of {source}, {found.sizes['sample']} samples: {out}")
 
 
@@ -132,6 +148,18 @@ def _verification_progress(quiet: bool) -> Iterator[Callable[[Verification], obj
             bar.update(task, total=wanted, completed=done, description=f"{done:,} of {_files(wanted)}", left="left")
 
         yield show
+
+
+def _numbers(folder: Path, manifest: Manifest) -> dict[str, Any]:
+    return {
+        "records": manifest.records,
+        "shards": len(manifest.shards),
+        "bytes": sum(shard.bytes for shard in manifest.shards),
+        "drawn_again": dict(manifest.redrawn),
+        "strained": manifest.strained,
+        "untouched": manifest.untouched,
+        "files": {"folder": folder, "readme": folder / "README.md"},
+    }
 
 
 def _print_result(out: Path, manifest: Manifest, last: Production | None) -> None:

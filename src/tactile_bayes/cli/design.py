@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from tactile_bayes.cli.answer import Json, print_json
 from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
@@ -44,7 +45,9 @@ def design(
     ] = "parabola",
     base: Annotated[
         list[str] | None,
-        typer.Option(help="A pivot to choose from, X,Y [m, or L]; again for another. By default eleven across."),
+        typer.Option(
+            help="A pivot to choose from, X,Y [m, or L]; again for another. By default eleven across at three heights."
+        ),
     ] = None,
     drive_step: Annotated[
         list[float] | None, typer.Option(help="A step of the drive to choose from [degrees]; by default 2.")
@@ -77,12 +80,13 @@ def design(
     scheduler: Scheduler = None,
     seed: Seed = 1,
     quiet: Quiet = False,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object in place of sentences.")] = False,
+    json: Json = False,
 ) -> None:
     """Choose the next record: from which pivot, and in which steps, it makes the contour's band narrowest."""
     import numpy as np
 
     from tactile_bayes.design_run import design_into
+    from tactile_bayes.planning.design import ABOVE, ACROSS
 
     refuse_both(workers, scheduler)
     pivots = [numbers_asked(pivot, "--base", 2) for pivot in base] if base else None
@@ -99,7 +103,7 @@ def design(
             "nuisances": nuisances_asked(nuisance, as_stated),
         }
     steps = drive_step or [2.0]
-    count = (len(pivots) if pivots else 11) * len(steps)
+    count = (len(pivots) if pivots else ACROSS.size * ABOVE.size) * len(steps)
     done = 0
 
     def have() -> str:
@@ -144,17 +148,10 @@ def _posterior(run: Path) -> xr.DataTree:
 
 
 def _print_json(found: xr.Dataset, files: Any) -> None:
-    import json
-
-    import numpy as np
-
     from tactile_bayes.design_run import design_in_words
 
     columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
-    rows = [
-        {name: (float(v) if np.isfinite(v := found[name].values[k]) else None) for name in columns}
-        for k in range(found.sizes["candidate"])
-    ]
+    rows = [{name: float(found[name].values[k]) for name in columns} for k in range(found.sizes["candidate"])]
     answer = {
         "words": list(design_in_words(found)),
         "best": int(found.best),
@@ -162,4 +159,4 @@ def _print_json(found: xr.Dataset, files: Any) -> None:
         "candidates": rows,
         "files": {what: str(path) for what, path in files.items()},
     }
-    typer.echo(json.dumps(answer, ensure_ascii=False, indent=2))
+    print_json(answer)

@@ -1,7 +1,8 @@
-"""The bar that shows how far sampling has come."""
+"""The bar that shows how far sampling has come, and about how long it will take."""
 
 from __future__ import annotations
 
+import math
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
@@ -10,7 +11,12 @@ if TYPE_CHECKING:
 
     from tactile_bayes.inference.ensembles import Progress
 
-__all__ = ["sampling_bar"]
+__all__ = ["remaining_seconds", "sampling_bar"]
+
+_GOAL = 1000.0
+"""Effective draws that sampling goes on for, and R̂ below which it stops: those of `SamplerSettings`."""
+
+_SETTLED = 1.01
 
 
 class Show(Protocol):
@@ -19,23 +25,54 @@ class Show(Protocol):
 
 
 @contextmanager
-def sampling_bar(quiet: bool) -> Iterator[Show | None]:
+def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[Show | None]:
     """A bar that fills with the effective sample size; none where nobody sees it move."""
     from rich.console import Console
-    from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, SpinnerColumn, TextColumn
     from rich.progress import Progress as Bar
 
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
         yield None
         return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(12), TextColumn("{task.fields[left]}"))
     with Bar(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("looking for a start, then sampling", total=1000.0)
+        task = bar.add_task("looking for a start, then sampling", total=None, left="")
 
         def show(progress: Progress, what: str = "", /) -> None:
             words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
-            words = f"{what}, {words}" if what else words
-            bar.update(task, completed=min(progress.ess, 1000.0), description=words)
+            if progress.ess >= _GOAL and progress.r_hat <= _SETTLED:
+                words, left = "sampled" if what else "sampled; checks, band and figures follow", ""
+            else:
+                seconds = remaining_seconds(progress, max_seconds)
+                left = "" if seconds is None else f"about {_in_words(seconds)} left"
+            done = min(progress.ess, _GOAL) if progress.ess == progress.ess else 0.0
+            bar.update(task, total=_GOAL, completed=done, description=f"{what}, {words}" if what else words, left=left)
 
         yield show
+
+
+def remaining_seconds(progress: Progress, max_seconds: float | None = None) -> float | None:
+    """About how long sampling will still take, if effective draws come as they came so far; None if nothing is known.
+
+    At most until the steps, or the time, are used up.
+    """
+    if not (progress.steps and progress.seconds > 0.0):
+        return None
+    rate = progress.seconds / progress.steps
+    most = rate * (progress.max_steps - progress.steps)
+    if max_seconds is not None:
+        most = min(most, max_seconds - progress.seconds)
+    if progress.ess >= _GOAL:  # R̂ has still to settle: a fifth more, and then again
+        return max(0.0, min(0.2 * progress.seconds, most))
+    if not (math.isfinite(progress.ess) and progress.ess > 0.0):
+        return None
+    return max(0.0, min(progress.seconds * (_GOAL / progress.ess - 1.0), most))
+
+
+def _in_words(seconds: float) -> str:
+    """Like "40 s", "5 min" and "2 h 10 min"."""
+    if seconds < 90.0:
+        return f"{max(1, round(seconds))} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from tactile_bayes.cli.answer import Json, print_json
 from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
@@ -94,7 +95,7 @@ def sensitivity(
     scheduler: Scheduler = None,
     seed: Seed = 1,
     quiet: Quiet = False,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object in place of sentences.")] = False,
+    json: Json = False,
 ) -> None:
     """Say what errors of the sensor do to contact points and to a contour, and how small they have to be.
 
@@ -213,10 +214,8 @@ def _waiting(is_silent: bool) -> Iterator[None]:
 
 
 def _tell(run: SensitivityRun, as_json: bool) -> None:
-    import json
-
     if as_json:
-        typer.echo(json.dumps(_numbers(run), ensure_ascii=False, indent=2, allow_nan=False))
+        print_json(_numbers(run))
         return
     from rich.console import Console
 

@@ -1,0 +1,254 @@
+"""The command `inspect`: what is in a file, and what looks wrong, before anything is inferred from it."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tactile_bayes.cli.answer import Json, columns_of, print_files, print_json, print_sentences, print_table, table_of
+from tactile_bayes.cli.record_options import (
+    Columns,
+    Diameter,
+    FlexuralRigidity,
+    ForceNoise,
+    Friction,
+    Length,
+    LoadCellFrame,
+    Missing,
+    MomentNoise,
+    Quiet,
+    Record,
+    SplitSweeps,
+    read_measurement,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import xarray as xr
+
+    from tactile_bayes.inspection import Inspection
+
+__all__ = ["inspect"]
+
+_SOURCES = {
+    "given": "as the options say",
+    "data sheet": "as the file states",
+    "unloaded samples": "not stated, found in the unloaded samples",
+    "nothing": "neither stated nor found",
+}
+
+
+def inspect(
+    record: Record,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for a picture, tables and these words; made if it is not there.", file_okay=False),
+    ] = None,
+    column: Columns = None,
+    split_sweeps: SplitSweeps = False,
+    length: Length = None,
+    flexural_rigidity: FlexuralRigidity = None,
+    diameter: Diameter = 0.0,
+    force_noise: ForceNoise = None,
+    moment_noise: MomentNoise = None,
+    missing: Missing = None,
+    load_cell_frame: LoadCellFrame = None,
+    friction: Friction = 0.0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Look at a record before anything is inferred: what is in the file, and what looks wrong, first.
+
+    It takes the options of infer that say how a file is read; the last line is the command to go on with.
+    """
+    from tactile_bayes.inspection import inspect_record
+
+    measured, cell, _ = read_measurement(
+        record,
+        column=column,
+        split_sweeps=split_sweeps,
+        length=length,
+        flexural_rigidity=flexural_rigidity,
+        diameter=diameter,
+        force_noise=force_noise,
+        moment_noise=moment_noise,
+        missing=missing,
+        load_cell_frame=load_cell_frame,
+        nuisance=None,
+        as_stated=False,
+    )
+    found = inspect_record(measured, load_cell=cell, friction=friction)
+    taken = {
+        **{f"--column {shlex.quote(origin)}": True for origin in column or []},
+        "--split-sweeps": split_sweeps,
+        "--length": length,
+        "--flexural-rigidity": flexural_rigidity,
+        "--diameter": diameter or None,
+        "--force-noise": force_noise,
+        "--moment-noise": moment_noise,
+        **{f"--missing {name}": True for name in missing or []},
+        "--load-cell-frame": load_cell_frame,
+        "--friction": friction or None,
+    }
+    again = f"tactile-bayes infer {shlex.quote(str(record))}{_as_options(taken)} --out run/"
+    origins = dict(part.split("=", 1) for part in column or [])
+    contents = _contents(found, {name.strip(): origin.strip() for name, origin in origins.items()})
+    files: Mapping[str, Path] = {}
+    if out is not None:
+        from tactile_bayes.inspection_run import write_inspection
+
+        files = write_inspection(found, out, text=["", *contents])
+    if json:
+        print_json(_numbers(found, again, files))
+        return
+    print_sentences([*found.words, "", *contents, ""])
+    print_table(_sweeps(found.sweeps))
+    print_sentences([""])
+    print_table(_channels(found.channels))
+    print_sentences(["", *_fates(found)])
+    if files:
+        print_sentences([""])
+        print_files(files)
+    first = "Once that is mended" if found.is_suspect else "Next"
+    print_sentences(["", f"{first}: {again}"])
+
+
+def _as_options(given: Mapping[str, Any]) -> str:
+    words = (name if value is True else f"{name} {value}" for name, value in given.items() if value)
+    return "".join(f" {word}" for word in words)
+
+
+def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
+    """What is in the file, but for its sweeps and channels."""
+    from tactile_bayes.inspection.words import quantity
+    from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
+
+    record, rod = found.record, rod_of(found.record)
+    sweeps = found.sweeps.sizes["sweep"]
+    if record.attrs["units"] == "SI":
+        of_rod = [f"L = {quantity(rod.length, 'm')}", f"EI = {rod.flexural_rigidity:.4g} N m²"]
+        of_rod += [f"diameter {quantity(rod.diameter, 'm')}"] if rod.diameter else []
+        of_rod += [f"EI/L = {quantity(rod.moment_unit, 'N m')}", f"EI/L² = {quantity(rod.force_unit, 'N')}"]
+        units = f"SI, rod: {', '.join(of_rod)}"
+    else:
+        assumed = ", which the file does not say" if record.attrs.get("units_source") == "assumed" else ""
+        units = f"dimensionless, in units of the rod{assumed}"
+    axes = "fixed, along x and y" if frame_of(record) == "fixed" else "turning with the drive, along the rod and across"
+    taken = [f"{name} = {origins[name]}" if name in origins else name for name in MEASURED]
+    others = [str(name) for name in record.data_vars if name not in MEASURED]
+    absent = [name for name in MEASURED[-3:] if name not in present_channels(record)]
+    return [
+        f"samples     {record.sizes['sample']} in {sweeps} sweep{'s' * (sweeps != 1)}",
+        f"columns     {', '.join(name for name in taken if name not in absent)}",
+        *([f"not there   {', '.join(absent)}"] if absent else []),
+        *([f"others      {', '.join(others)}"] if others else []),
+        f"units       {units}",
+        f"load cell   {axes}; noise {_SOURCES[found.load_cell_source]}",
+    ]
+
+
+def _sweeps(sweeps: xr.Dataset) -> Any:
+    """Angles in degrees; contact between the samples beside its ends."""
+    import numpy as np
+
+    pivots = [f"{x:g},{y:g}" for x, y in zip(sweeps.base_x.values, sweeps.base_y.values, strict=True)]
+    with_pivots = set(pivots) != {"0,0"}
+    heads = ["sweep", *(["base"] if with_pivots else []), "samples", "drive [°]", "step", "touches", "lets go"]
+    table = table_of([*heads, "unloaded"], left=["sweep"])
+    for i, number in enumerate(sweeps.sweep.values):
+        row = sweeps.isel(sweep=i)
+        start, end, step = (np.degrees(float(row[f"drive_{name}"])) for name in ("angle_from", "angle_to", "step"))
+        ends = [_place(np.degrees(row[f"{name}_drive_angle"].values)) for name in ("onset", "snap_off")]
+        if not bool(row.contact):
+            ends = ["never", "–"]
+        table.add_row(
+            f"{number} {row.direction.values}",
+            *([pivots[i]] if with_pivots else []),
+            str(int(row.samples)),
+            f"{start:.1f} to {end:.1f}",
+            f"{step:.3g}",
+            *ends,
+            str(int(row.unloaded)),
+        )
+    return table
+
+
+def _place(beside: Any) -> str:
+    """The middle between the samples beside an event."""
+    middle = float(beside.mean())
+    return "–" if middle != middle else f"{middle:.1f}"
+
+
+def _channels(channels: xr.Dataset) -> Any:
+    """Numbers of a channel all in one unit; the last is the correlation of unloaded neighbours."""
+    from tactile_bayes.inspection.words import prefix_of
+
+    table = table_of(["channel", "from", "to", "zero", "± s.e.", "noise", "stated", "step", "corr."], left=["channel"])
+    for i, name in enumerate(channels.channel.values):
+        row = channels.isel(channel=i)
+        unit = str(row.unit.values)
+        size, prefix = (1.0, "") if unit == "1" else prefix_of(max(abs(float(row.smallest)), abs(float(row.largest))))
+        cells = []
+        for column in ("smallest", "largest", "bias", "bias_uncertainty", "noise", "stated_noise", "resolution"):
+            value = float(row[column]) / size
+            none = value != value or (column == "resolution" and value == 0.0)
+            cells.append("–" if none else f"{value:.2g}" if column == "bias_uncertainty" else f"{value:.3g}")
+        like = float(row.neighbour_correlation)
+        label = str(name) if unit == "1" else f"{name} [{prefix}{unit}]"
+        table.add_row(label, *cells, "–" if like != like else f"{like:+.2f}")
+    return table
+
+
+def _fates(found: Inspection) -> Iterator[str]:
+    if found.statuses:
+        fates = ", ".join(f"{count} {fate}" for fate, count in found.statuses.items())
+        yield f"Raw Step 2: {fates}"
+    else:
+        yield "No Step 2, which needs all three load channels; infer works without."
+
+
+def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[str, Any]:
+    from tactile_bayes.record import frame_of
+
+    record = found.record
+    sweeps = columns_of(found.sweeps, "sweep")
+    for row, onset, snap in zip(
+        sweeps, found.sweeps.onset_drive_angle.values, found.sweeps.snap_off_drive_angle.values, strict=True
+    ):
+        row |= {"onset_drive_angle": onset, "snap_off_drive_angle": snap}
+    units: Sequence[str] = found.channels.unit.values.tolist()
+    channels = columns_of(found.channels, "channel")
+    return {
+        "words": found.words,
+        "is_suspect": found.is_suspect,
+        "samples": record.sizes["sample"],
+        "columns": [str(name) for name in record.data_vars],
+        "units": record.attrs["units"],
+        "units_assumed": record.attrs.get("units_source") == "assumed",
+        "rod": {name: record.attrs[f"rod_{name}"] for name in ("length", "flexural_rigidity", "diameter")},
+        "load_cell_frame": frame_of(record),
+        "load_cell": found.load_cell.entries() if found.load_cell is not None else None,
+        "load_cell_source": found.load_cell_source,
+        "sweeps": sweeps,
+        "channels": [{**row, "unit": unit} for row, unit in zip(channels, units, strict=True)],
+        "suspicious_samples": _suspicious(found.samples),
+        "raw_step_2": found.statuses,
+        "next": again,
+        "files": files,
+    }
+
+
+def _suspicious(samples: xr.Dataset) -> dict[str, Any]:
+    """Numbers of samples by kind, and by channel where a kind has them."""
+    by_channel = {
+        kind: {
+            str(channel): samples[kind].sel(channel=channel).values.nonzero()[0].tolist()
+            for channel in samples.channel.values
+        }
+        for kind in ("outlier", "stuck", "cut_off")
+    }
+    return {**by_channel, **{kind: samples[kind].values.nonzero()[0].tolist() for kind in ("repeated", "uneven_step")}}

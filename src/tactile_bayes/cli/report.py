@@ -1,0 +1,39 @@
+"""The command `report`: what a run has found, as one page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tactile_bayes.cli.record_options import Quiet
+
+__all__ = ["report"]
+
+
+def report(
+    run: Annotated[Path, typer.Argument(help="Folder of a run of infer.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File for the page; report.html in that folder if left out.", dir_okay=False)
+    ] = None,
+    compare: Annotated[
+        Path | None,
+        typer.Option(help="Folder of a run of compare on the same record; the run's own if left out.", file_okay=False),
+    ] = None,
+    quiet: Quiet = False,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object in place of sentences.")] = False,
+) -> None:
+    """Write a page on a run: what was found, whether it can be trusted, what was measured, how to make it again."""
+    from tactile_bayes.report import write_report
+
+    path = write_report(run, out, compare=compare)
+    size = path.stat().st_size
+    if json:
+        from json import dumps
+
+        typer.echo(dumps({"report": str(path), "bytes": size}, ensure_ascii=False, indent=2))
+    elif quiet:
+        typer.echo(str(path))
+    else:
+        typer.echo(f"{path} ({size / 1e3:.0f} kB): open it in a browser; it needs no network.")

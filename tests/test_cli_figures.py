@@ -1,0 +1,105 @@
+"""The command figures."""
+
+from __future__ import annotations
+
+import json
+
+import matplotlib as mpl
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+mpl.use("Agg")
+
+from tactile_bayes.cli.app import app
+from tactile_bayes.paper_figures import caption
+
+QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5", "--rods", "3"]
+
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["figures", *map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    out = tmp_path_factory.mktemp("figures") / "new"
+    return run("--out", out, *QUICK, "--format", "png"), out
+
+
+def test_it_says_what_is_where(drawn):
+    result, out = drawn
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [
+        f"Figure 3: {caption(3, distances=[0.5])}",
+        f"    {out / 'figure_03.png'}",
+        f"Figure 7: {caption(7, distances=[0.5])}",
+        f"    {out / 'figure_07.png'}",
+    ]
+    assert sorted(path.name for path in out.iterdir()) == ["figure_03.png", "figure_07.png"]
+
+
+def test_figures_are_as_wide_as_a_page_at_print_resolution(drawn):
+    with Image.open(drawn[1] / "figure_03.png") as image:
+        assert image.size[0] == 2100  # 7 inches at 300 dpi
+        assert image.info["Description"] == caption(3, distances=[0.5])
+
+
+def test_a_column_on_screen_as_json(tmp_path):
+    result = run(
+        "--out", tmp_path, "--only", 3, *QUICK[4:], "--format", "png", "--column", "--style", "screen", "--json"
+    )
+    assert result.exit_code == 0, result.output
+    answer = json.loads(result.stdout)
+    (only,) = answer["figures"]
+    assert only["number"] == 3
+    assert only["files"] == {"png": str(tmp_path / "figure_03.png")}
+    with Image.open(only["files"]["png"]) as image:
+        assert image.size[0] == 525  # 3.5 inches at 150 dpi
+
+
+def test_noise_is_said_in_the_caption(tmp_path):
+    noise = ["--force-noise", "0.05", "--moment-noise", "0.02", "--seed", "4"]
+    result = run("--out", tmp_path, "--only", 11, "--distance", 0.5, "--drive-step", 10, "--format", "svg", *noise)
+    assert result.exit_code == 0, result.output
+    assert "measured with noise (seed 4)" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (["--only", "12"], "there is no figure 12: choose from 2 to 11"),
+        (["--format", "gif"], "choose from pdf, svg, png"),
+        (["--distance", "-1"], "give rod lengths above 0"),
+        (["--only", "3", "--distance", "1.5"], "profile I at the distance q = 1.5: the contour is out of reach"),
+        (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
+        (["--only", "3", "--drive-step", "90"], "drive_step is"),
+        (["--only", "2", "--distance", "0.3"], "figure 2 shows tip contact"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
+    result = run("--out", tmp_path / "out", *wrong)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_interrupt_says_what_is_there(tmp_path, monkeypatch):
+    from tactile_bayes.paper_figures import files
+
+    make, made = files.figure, []
+
+    def interrupted(number, **options):
+        if made:
+            raise KeyboardInterrupt
+        made.append(number)
+        return make(number, **options)
+
+    monkeypatch.setattr(files, "figure", interrupted)
+    result = run("--out", tmp_path, *QUICK, "--format", "svg")
+    assert result.exit_code == 130
+    assert "1 of 2 figures are drawn: the same command goes on" in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["figure_03.svg"]

@@ -1,0 +1,72 @@
+"""The command report."""
+
+from __future__ import annotations
+
+import json
+import shlex
+
+import pytest
+from typer.testing import CliRunner
+
+from helpers.report_pages import Page, analysed_quickly, coarse_record
+from tactile_bayes.cli.app import app
+from tactile_bayes.record import write_record
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, ["report", *map(str, arguments)])
+
+
+@pytest.mark.usefixtures("quick")
+def test_infer_states_its_file_and_its_words(tmp_path):
+    path, out = tmp_path / "my record.csv", tmp_path / "run"
+    write_record(coarse_record(), path)
+    words = ["infer", str(path), "--as-stated", "--out", str(out), "--quiet"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    assert call(out).exit_code == 0
+    page = Page((out / "report.html").read_text(encoding="utf-8"))
+    assert page.texts["code"][0] == shlex.join(["tactile-bayes", *words])
+    assert page.texts["h1"] == ["The contour from my record.csv"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cli") / "run"
+    analysed_quickly(coarse_record(), folder, nuisances=[])
+    return folder
+
+
+def test_it_writes_the_page_into_the_run(folder):
+    result = call(folder)
+    assert result.exit_code == 0, result.output
+    path = folder / "report.html"
+    assert result.stdout == f"{path} ({path.stat().st_size / 1e3:.0f} kB): open it in a browser; it needs no network.\n"
+    assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_it_writes_where_it_is_told_and_the_same_page(folder, tmp_path):
+    out = tmp_path / "page.html"
+    result = call(folder, "--out", out, "--quiet")
+    assert result.stdout == f"{out}\n"
+    call(folder)
+    assert out.read_bytes() == (folder / "report.html").read_bytes()
+
+
+def test_json_for_scripts(folder, tmp_path):
+    out = tmp_path / "page.html"
+    result = call(folder, "--out", out, "--json")
+    assert json.loads(result.stdout) == {"report": str(out), "bytes": out.stat().st_size}
+
+
+def test_what_is_wrong_is_said_in_a_line(folder, tmp_path):
+    for arguments, message in (
+        ([tmp_path / "nowhere"], f"there is no folder {tmp_path / 'nowhere'}: give the folder that"),
+        ([tmp_path], f"{tmp_path} holds no posterior.nc: give the folder that"),
+        ([folder, "--compare", tmp_path], f"{tmp_path} holds no comparison.nc: give --compare the folder that"),
+        ([folder, "--out", tmp_path / "no" / "page.html"], f"{tmp_path / 'no'}: No such file or directory"),
+    ):
+        result = call(*arguments)
+        assert result.exit_code == 2
+        assert result.stdout == ""
+        assert result.stderr.startswith(f"tactile-bayes: {message}")
+        assert len(result.stderr.splitlines()) == 1
