@@ -4,13 +4,14 @@ PYTHON ?= $(shell for p in python3 python3.11 python3.12 python3.13 python3.14 p
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+DOCS_READY := $(VENV)/.docs-ready
 DEMO_OUT ?= results/demo
 # Samplers that ours is compared with, and that nothing else needs.
 PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-slow bench coverage calibration shapes recognition misspecification designs efficiency samplers images lint clean
+.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification designs efficiency samplers images docs lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -18,7 +19,15 @@ demo: $(READY)
 test: $(READY)
 	$(BIN)/python -m pytest -n auto
 	$(BIN)/python -m pytest -n auto --doctest-modules src
-	$(BIN)/python -m pytest --nbmake notebooks
+	$(BIN)/python -m pytest -n auto --nbmake notebooks
+
+# With the lowest versions of the dependencies; what those say of one another is not the project's affair.
+test-lowest: $(READY)
+	$(PYTHON) -m venv --clear .venv-lowest
+	$(BIN)/python tools/lowest.py > .venv-lowest/lowest.txt
+	.venv-lowest/bin/python -m pip install --quiet --upgrade "pip>=25.1"
+	.venv-lowest/bin/python -m pip install --quiet --requirement .venv-lowest/lowest.txt --group dev --editable .
+	NUMBA_CACHE_DIR=.venv-lowest/numba .venv-lowest/bin/python -m pytest -n auto -o filterwarnings=default
 
 test-slow: $(READY)
 	$(BIN)/python -m pytest -m slow
@@ -55,17 +64,25 @@ samplers: $(READY)
 images: $(READY)
 	$(BIN)/python docs/images.py
 
+docs: $(DOCS_READY)
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs docs/_build/html
+	@echo "The documentation begins at $(CURDIR)/docs/_build/html/index.html"
+
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) results .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) .venv-lowest results docs/_build .pytest_cache .mypy_cache .ruff_cache
 
 $(READY): pyproject.toml
 	@test -n "$(PYTHON)" || { echo "tactile_bayes needs Python 3.11 or later: none found. Name one with: make PYTHON=/path/to/python ..." >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install --quiet --editable . --group dev
+	touch $@
+
+$(DOCS_READY): $(READY)
+	$(BIN)/python -m pip install --quiet --group docs
 	touch $@

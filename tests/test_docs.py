@@ -1,0 +1,171 @@
+"""The documentation: its code runs and prints what it says, and it names what there is."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+import typer
+
+import tactile_bayes as tb
+from helpers.pages import DOCS, ROOT, agree, blocks, commands, matter, run
+from tactile_bayes.cli import app
+from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS
+
+PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
+TEXTS = {path: path.read_text(encoding="utf-8") for path in [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "VISION.md"]}
+LINK = re.compile(r"\]\((?!https?:)(?P<target>[^)#\s]*)(?:#(?P<anchor>[^)\s]+))?\)")
+
+
+def pages_tested(how: str) -> list[Path]:
+    return [path for path in PAGES if matter(TEXTS[path]).get("tested") == how]
+
+
+def identify(path: Path) -> str:
+    return str(path.relative_to(DOCS))
+
+
+# --- Code -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings_left_alone: None) -> Path:
+    """A folder of its own, in which a page finds the data that come with the project."""
+    (tmp_path / "data").symlink_to(ROOT / "data")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("path", pages_tested("fast"), ids=identify)
+def test_blocks_run_and_print_what_the_page_says(path: Path, clone: Path) -> None:
+    assert run(path, TEXTS[path]) > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", pages_tested("slow"), ids=identify)
+def test_slow_blocks_run_and_print_what_the_page_says(path: Path, clone: Path) -> None:
+    assert run(path, TEXTS[path]) > 0
+
+
+def test_no_python_block_is_left_untested() -> None:
+    """But for pages that show one name, and what is shown elsewhere."""
+    free = {path for path in PAGES if "tested" not in matter(TEXTS[path])}
+    shown = {path for path in free if any(block.language == "python" for block in blocks(TEXTS[path]))}
+    assert {identify(path) for path in shown} == {"api/index.md"}
+
+
+def test_numbers_agree_up_to_their_last_digit() -> None:
+    assert agree("a 0.1234 of 12", "a 0.1235 of 12", 0.0)
+    assert not agree("a 0.1234 of 12", "a 0.1237 of 12", 0.0)
+    assert not agree("a 0.1234 of 12", "a 0.1234 of 13", 0.0)
+    assert not agree("a 0.1", "b 0.1", 0.0)
+    assert agree("−0.50 ± 0.11", "−0.51 ± 0.10", 0.1)
+    assert not agree("−0.50", "0.50", 0.1)
+
+
+# --- Names ----------------------------------------------------------------------------------------------------------
+
+
+def test_every_public_name_is_in_the_api() -> None:
+    listed = {
+        name
+        for path in (DOCS / "api").glob("*.md")
+        for names in re.findall(r"```\{public\} tactile_bayes\n(.*?)```", TEXTS[path], flags=re.DOTALL)
+        for name in names.split()
+    }
+    modules = {
+        module
+        for path in (DOCS / "api").glob("*.md")
+        for module in re.findall(r"```\{public\} tactile_bayes\.(\w+)\n```", TEXTS[path])
+    }
+    assert listed | modules | {"__version__"} == set(tb.__all__)
+
+
+def test_the_columns_and_the_data_sheet_are_specified() -> None:
+    page = TEXTS[DOCS / "formats.md"]
+    assert [name for name in COLUMNS if f"`{name}`" not in page and f"`truth_{name}`" not in page] == []
+    assert [name for name in LOAD_CELL_UNITS if f"`load_cell_{name}`" not in page] == []
+
+
+def commands_of(group: click.Group, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], click.Command]]:
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands_of(command, (*words, name))
+        else:
+            yield (*words, name), command
+
+
+PROGRAM = typer.main.get_command(app)
+COMMANDS = dict(commands_of(PROGRAM)) | {(): PROGRAM}
+
+
+def test_every_command_is_named() -> None:
+    named = re.findall(r"^\| `tactile-bayes ([\w ]+)` \|", TEXTS[DOCS / "commands.md"], flags=re.MULTILINE)
+    assert set(named) == {" ".join(words) for words in COMMANDS if words}
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
+    for block in blocks(TEXTS[path]):
+        if block.language != "sh":
+            continue
+        for words in commands(block.code):
+            named = tuple(word for word in words if not word.startswith("--"))
+            known = next(named[:count] for count in (2, 1, 0) if named[:count] in COMMANDS)
+            assert known or not named, f"there is no command {' '.join(words)}"
+            options = {option for parameter in COMMANDS[known].params for option in parameter.opts}
+            used = {word.split("=")[0] for word in words if word.startswith("--")}
+            assert used <= options, f"{' '.join(known)} has no option {used - options}"
+
+
+def test_every_notebook_is_named() -> None:
+    named = re.findall(r"`(\w+\.ipynb)`", TEXTS[DOCS / "notebooks.md"])
+    assert named == sorted(path.name for path in (ROOT / "notebooks").glob("*.ipynb"))
+
+
+# --- Links and style ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(path: Path) -> None:
+    for link in LINK.finditer(re.sub(r"`[^`\n]*`", "", TEXTS[path])):
+        target = (path.parent / link["target"]).resolve() if link["target"] else path
+        assert target.exists(), f"{path.name}: {link.group()}"
+        if link["anchor"] and target.suffix == ".md":
+            assert link["anchor"] in anchors(target.read_text(encoding="utf-8")), f"{path.name}: {link.group()}"
+
+
+def anchors(text: str) -> set[str]:
+    heads = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+
+def test_every_page_can_be_reached() -> None:
+    listed = set()
+    for path in PAGES:
+        for tree in re.findall(r"```\{toctree\}\n(.*?)```", TEXTS[path], flags=re.DOTALL):
+            names = [line for line in tree.split("\n") if line and not line.startswith(":")]
+            listed |= {(path.parent / f"{name}.md").resolve() for name in names}
+    assert {path.resolve() for path in PAGES} - listed == {(DOCS / "index.md").resolve()}
+
+
+def test_pages_fetch_nothing() -> None:
+    settings = (DOCS / "conf.py").read_text(encoding="utf-8")
+    assert "intersphinx" not in settings
+    assert "http" not in settings + (DOCS / "static" / "site.css").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_warnings(tmp_path: Path) -> None:
+    pytest.importorskip("sphinx", reason="it takes the group docs, which make docs installs")
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", "-b", "html"]
+    done = subprocess.run([*command, DOCS, tmp_path], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    fetched = re.compile(r"""<(?:script|link|img)[^>]*(?:src|href)=["'](?:https?:)?//""")
+    for page in tmp_path.rglob("*.html"):
+        assert not fetched.search(page.read_text(encoding="utf-8")), page
