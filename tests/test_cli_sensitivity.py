@@ -267,3 +267,43 @@ def amplification_at_once(plan):
     from dataclasses import replace
 
     return amplification(replace(plan, drive_angles=np.radians(np.arange(-30.0, 211.0, 10.0))))
+
+
+def test_a_material_asks_for_the_rod(tmp_path, monkeypatch):
+    monkeypatch.setattr(sensitivity_run, "_LENGTHS", np.array([1.0]))
+    monkeypatch.setattr(sensitivity_run, "_DIAMETERS", np.array([0.7, 1.0, 2.0]))
+    rig = ("--length", 0.2, "--flexural-rigidity", 2.4279e-3, "--force-noise", 3e-3, "--moment-noise", 0.25e-3)
+    material = ("--youngs-modulus", 206e9, "--elastic-strain", 0.01)
+    result = call("--out", tmp_path, *rig, *material, *QUICK, "--json")
+    assert result.exit_code == 0, result.output
+    answer = json.loads(result.stdout)
+    assert answer["rod"]["length"] == pytest.approx(0.2)
+    assert answer["rod"]["diameter"] == pytest.approx(0.7e-3, rel=1e-3)  # of music wire of this stiffness
+    said = "Of 3 rods of this material (1 bent too far) the load cell wants one 200 mm long and 0.7 mm thick"
+    assert answer["words"][-1].startswith(said)
+    assert (tmp_path / "words.txt").read_text(encoding="utf-8").splitlines()[-1] == answer["words"][-1]
+    assert (tmp_path / "required_rod.png").is_file()
+    with xr.open_dataset(tmp_path / "rods.nc", engine="h5netcdf") as rods:
+        assert rods.status.values.tolist() == [["ok", "ok", "bent too far"]]
+
+
+def test_no_rod_that_serves_is_said():
+    rods = xr.Dataset(
+        {"status": (("length", "diameter"), [["bent too far", "does not reach"]]), "best_width": ((), np.nan)}
+    )
+    words = sensitivity_run.rod_in_words(rods)
+    assert words == "None of 2 rods of this material serves (1 bent too far, 1 does not reach)."
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--youngs-modulus", 206e9), "--youngs-modulus and --elastic-strain go together"),
+        (("--youngs-modulus", -1.0, "--elastic-strain", 0.01), "above zero"),
+        (("--youngs-modulus", 206e9, "--elastic-strain", 0.01), "state the rod in SI, and the noise"),
+    ],
+)
+def test_half_a_material_or_no_rig_is_refused(tmp_path, options, message):
+    result = call("--out", tmp_path, *options, *QUICK)
+    assert result.exit_code == 2
+    assert message in result.stderr

@@ -3,21 +3,41 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 import xarray as xr
 
+from tactile_bayes.errors import ParameterError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.planning.error_map import CELLS, error_map
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import sensitivity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SensitivityRun", "sensitivity_into"]
+__all__ = ["Material", "SensitivityRun", "rod_in_words", "sensitivity_into"]
+
+
+_OF_PLAN = tuple(field.name for field in fields(Plan))
+_LENGTHS = np.array([0.7, 0.85, 1.0, 1.2, 1.4])
+_DIAMETERS = np.array([0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0])
+"""Of the rods that are tried, over those of the rod as it is."""
+
+
+class Material(NamedTuple):
+    """Of which a rod is made."""
+
+    youngs_modulus: float
+    """In Pa."""
+    elastic_strain: float
+    """That it takes without staying bent."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +48,8 @@ class SensitivityRun:
     ----------
     sensitivity : xr.DataTree
         From `sensitivity`.
+    rods : xr.Dataset or None
+        From `required_rod`, where a material was given.
     study : xr.Dataset or None
         From `error_map`, where one was asked for.
     files : mapping of str to Path
@@ -35,12 +57,17 @@ class SensitivityRun:
     """
 
     sensitivity: xr.DataTree
+    rods: xr.Dataset | None
     study: xr.Dataset | None
     files: Mapping[str, Path]
 
 
 def sensitivity_into(
-    out: str | os.PathLike[str], *, study: Mapping[str, Any] | None = None, **options: Any
+    out: str | os.PathLike[str],
+    *,
+    material: Material | None = None,
+    study: Mapping[str, Any] | None = None,
+    **options: Any,
 ) -> SensitivityRun:
     """Analyse what errors of the sensor do, and write what comes out to a folder.
 
@@ -48,8 +75,11 @@ def sensitivity_into(
     ----------
     out : path-like
         Folder for sensitivity.nc, words.txt, amplification.png, information.png, noise_shares.png and
-        required_noise.png; made if it is not there. Files of these names in it are replaced. A study is in its folder
-        study: cells.json, which a run that was stopped goes on from, study.nc and study.png.
+        required_noise.png; made if it is not there. Files of these names in it are replaced. With a material there are
+        rods.nc and required_rod.png, too. A study is in its folder study: cells.json, which a run that was stopped goes
+        on from, study.nc and study.png.
+    material : Material, optional
+        Of which the rod that the load cell wants is sought, among lengths and diameters around its own.
     study : mapping, optional
         What `error_map` takes beside `out`: its answer is made as well, after the rest has been written.
     options
@@ -85,15 +115,52 @@ def sensitivity_into(
     for part in found.children:
         files[part] = folder / f"{part}.png"
         _write_figure(_DRAWN[part], found, files[part])
+    rods = None
+    if material is not None:
+        rods = _rods(material, options)
+        files |= {"rods": folder / "rods.nc", "required_rod": folder / "required_rod.png"}
+        with write_atomically(files["rods"]) as temporary:
+            rods.to_netcdf(temporary, engine="h5netcdf")
+        _write_figure(_draw_required_rod, rods, files["required_rod"])
+        with write_atomically(files["words"]) as temporary:
+            temporary.write_text(f"{found.attrs['words']}\n{rod_in_words(rods)}\n", encoding="utf-8")
     if study is None:
-        return SensitivityRun(found, None, files)
+        return SensitivityRun(found, rods, None, files)
     inside = folder / "study"
     studied = error_map(out=inside, **study)
     files |= {"cells": inside / CELLS.file, "study": inside / "study.nc", "errors": inside / "study.png"}
     with write_atomically(files["study"]) as temporary:
         studied.to_netcdf(temporary, engine="h5netcdf")
     _write_figure(_draw_study, studied, files["errors"])
-    return SensitivityRun(found, studied, files)
+    return SensitivityRun(found, rods, studied, files)
+
+
+def rod_in_words(rods: xr.Dataset) -> str:
+    """Which rod the load cell wants, of those that were tried."""
+    count, status = rods.status.size, Counter(rods.status.values.ravel().tolist())
+    others = ", ".join(f"{number} {what}" for what, number in status.most_common() if what != "ok")
+    left_out = f" ({others})" if others else ""
+    if not np.isfinite(rods.best_width):
+        return f"None of {count} rods of this material serves{left_out}."
+    long, thick, wide = (f"{1e3 * float(rods[f'best_{name}']):.3g} mm" for name in ("length", "diameter", "width"))
+    return (
+        f"Of {count} rods of this material{left_out} the load cell wants one {long} long and {thick} thick: its mean "
+        f"band is {wide} wide."
+    )
+
+
+def _rods(material: Material, options: Mapping[str, Any]) -> xr.Dataset:
+    plan = Plan(**{name: value for name, value in options.items() if name in _OF_PLAN})
+    if plan.rod is None or plan.load_cell is None:
+        raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
+    own = (64.0 * plan.rod.flexural_rigidity / (np.pi * material.youngs_modulus)) ** 0.25
+    return required_rod(
+        plan,
+        lengths=(plan.rod.length * _LENGTHS).tolist(),
+        diameters=(own * _DIAMETERS).tolist(),
+        youngs_modulus=material.youngs_modulus,
+        elastic_strain=material.elastic_strain,
+    )
 
 
 def _write_figure(draw: Callable[[Any], Axes], found: xr.DataTree | xr.Dataset, path: Path) -> None:
@@ -137,6 +204,12 @@ def _draw_required_noise(found: xr.DataTree) -> Axes:
     from tactile_bayes import plotting
 
     return plotting.required_noise(found)
+
+
+def _draw_required_rod(rods: xr.Dataset) -> Axes:
+    from tactile_bayes import plotting
+
+    return plotting.required_rod(rods)
 
 
 def _draw_study(studied: xr.Dataset) -> Axes:

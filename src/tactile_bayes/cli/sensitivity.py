@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tactile_bayes.ledger import TaskProgress
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.rod import Rod
-    from tactile_bayes.sensitivity_run import SensitivityRun
+    from tactile_bayes.sensitivity_run import Material, SensitivityRun
 
 __all__ = ["sensitivity"]
 
@@ -65,6 +65,15 @@ def sensitivity(
             help="Mean width of a band for which the noise is sought [m, or L]; give it again for another. "
             "By default 0.0005 to 0.01 rod lengths."
         ),
+    ] = None,
+    youngs_modulus: Annotated[
+        float | None,
+        typer.Option(
+            help="With --elastic-strain, of the rod's material [Pa]: which length and diameter does the load cell want?"
+        ),
+    ] = None,
+    elastic_strain: Annotated[
+        float | None, typer.Option(help="Bending strain that the material takes: 0.005 spring steel, 0.05 nitinol.")
     ] = None,
     samples: Annotated[int, typer.Option(help="For shares of the variance, a power of two.", min=2)] = 1024,
     study: Annotated[
@@ -134,6 +143,7 @@ def sensitivity(
     }
     analysis = {
         **common,
+        "material": _material(youngs_modulus, elastic_strain),
         "contour": enlarged(paper_profile(profile, q=distance), (rod or Rod()).length),
         "base": pivots,
         "band_widths": band_width or None,
@@ -186,6 +196,17 @@ def _refuse_without_study(options: Mapping[str, object]) -> None:
             raise ParameterError(f"{option} is for a study: give --study as well, or leave it out")
 
 
+def _material(youngs_modulus: float | None, elastic_strain: float | None) -> Material | None:
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.sensitivity_run import Material
+
+    if youngs_modulus is None and elastic_strain is None:
+        return None
+    if not youngs_modulus or not elastic_strain or min(youngs_modulus, elastic_strain) < 0.0:
+        raise ParameterError("--youngs-modulus and --elastic-strain go together, above zero: give both, or neither")
+    return Material(youngs_modulus, elastic_strain)
+
+
 def _load_cell(
     rod: Rod | None, force_noise: float | None, moment_noise: float | None, drive_angle_noise: float
 ) -> LoadCell | None:
@@ -220,12 +241,19 @@ def _tell(run: SensitivityRun, as_json: bool) -> None:
     from rich.console import Console
 
     console = Console()
-    console.print(run.sensitivity.attrs["words"], markup=False, highlight=False, soft_wrap=True)
+    for line in _words(run):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print()
     console.print(_table(run.sensitivity))
     console.print()
     for what, path in run.files.items():
         console.print(f"{what:<14} {path}", highlight=False, soft_wrap=True)
+
+
+def _words(run: SensitivityRun) -> list[str]:
+    from tactile_bayes.sensitivity_run import rod_in_words
+
+    return [*run.sensitivity.attrs["words"].splitlines(), *([] if run.rods is None else [rod_in_words(run.rods)])]
 
 
 def _table(found: xr.DataTree) -> object:
@@ -250,7 +278,7 @@ def _numbers(run: SensitivityRun) -> dict[str, Any]:
     found = run.sensitivity
     told, needed = found["information"].to_dataset(), found["required_noise"].to_dataset()
     answer: dict[str, Any] = {
-        "words": found.attrs["words"].splitlines(),
+        "words": _words(run),
         **{name: found.attrs[name] for name in ("contour", "units", "rod_length", "rod_flexural_rigidity")},
         **{name: float(found.attrs[name]) for name in ("force_noise", "moment_noise")},
         "parameters": {
@@ -270,6 +298,8 @@ def _numbers(run: SensitivityRun) -> dict[str, Any]:
         ],
         "files": {what: str(path) for what, path in run.files.items()},
     }
+    if run.rods is not None:
+        answer["rod"] = {name: _finite(run.rods[f"best_{name}"]) for name in ("length", "diameter", "width")}
     if run.study is not None:
         answer["study"] = _cells(run.study)
     return answer
