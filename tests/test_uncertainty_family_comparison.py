@@ -33,6 +33,7 @@ def test_the_simpler_of_two_shapes_that_fit_is_more_probable(compared):
     assert probability[0] > 0.7
     assert compared.fits.all()
     assert compared.attrs["most_probable"] == "circle"
+    assert len(compared.attrs["data_sha256"]) == 64
     assert compared.attrs["verdict"].startswith("circle with probability 0.")
     assert abs(float(compared.elpd_difference.min())) < 5.0
     assert compared.weight.sum() == pytest.approx(1.0)

@@ -100,7 +100,7 @@ def findings_of(run: Path, compare: Path | None = None) -> Findings:
     content = path.read_bytes()
     posterior = _contour_posterior(path)
     record = record_of(posterior)
-    comparison = _comparison_in(run, compare, record.sizes["sample"])
+    comparison = _comparison_in(run, compare, str(posterior.attrs["data_sha256"]))
     probability = float(posterior.attrs.get("probability", _USUAL))
     contacts = contact_points(record, None, posterior)
     try:
@@ -165,7 +165,7 @@ def _contour_posterior(path: Path) -> xr.DataTree:
     return posterior
 
 
-def _comparison_in(run: Path, compare: Path | None, samples: int) -> xr.Dataset | None:
+def _comparison_in(run: Path, compare: Path | None, data_sha256: str) -> xr.Dataset | None:
     path = (compare or run) / "comparison.nc"
     remedy = "give --compare the folder that `tactile-bayes compare RECORD --out FOLDER` has written"
     if not path.is_file():
@@ -178,9 +178,9 @@ def _comparison_in(run: Path, compare: Path | None, samples: int) -> xr.Dataset 
         raise InferenceError(f"{path} cannot be read, it is damaged or cut short: compare again ({error})") from error
     if "family" not in found.dims or not {*_COMPARISON} <= set(found.data_vars) or "verdict" not in found.attrs:
         raise InferenceError(f"{path} is no comparison of shapes: {remedy}")
-    if found.sizes.get("sample", samples) != samples:
+    if found.attrs.get("data_sha256") != data_sha256:
         raise InferenceError(
-            f"{path} is of a record with {found.sizes['sample']} samples, and the run's has {samples}: give the "
-            "comparison of the same record"
+            f"{path} is of another record, or of another rod, than the run: compare the record of the run, with the "
+            "same options"
         )
     return found

@@ -25,7 +25,7 @@ from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.shape_free_posterior.family import SHAPE_FREE
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import rod_of, validate, with_rod
+from tactile_bayes.record import record_hash, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 from tactile_bayes.uncertainty.contour_left_out import ForetoldSamples, foretold_samples
 from tactile_bayes.uncertainty.family_verdict import verdict_on
@@ -139,7 +139,7 @@ def compare_families(
             Of the posterior.
 
         And `log_density` (family, sample), leave-one-out. Attributes: `verdict` in words, `most_probable`, `none_fits`
-        (1 if no family passes the check).
+        (1 if no family passes the check), `data_sha256` of the record.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def compare_families(
         check = check_record(found.tree, false_alarm=false_alarm)
         p_value, passed = float(check.overall_p_value), bool(check.attrs["passed"])
         tried[name] = _Tried(ceiling, found.draws, evidence, foretold, p_value, passed)
-    return _labelled({name: tried[name] for name in names})
+    return _labelled({name: tried[name] for name in names}).assign_attrs(data_sha256=record_hash(measured))
 
 
 def _ceiling(model: ContourModel, walk: Walk) -> float:
