@@ -303,7 +303,8 @@ def test_no_rod_that_serves_is_said():
         (("--youngs-modulus", 206e9, "--elastic-strain", 0.01), "state the rod in SI, and the noise"),
     ],
 )
-def test_half_a_material_or_no_rig_is_refused(tmp_path, options, message):
-    result = call("--out", tmp_path, *options, *QUICK)
+def test_half_a_material_or_no_rig_is_refused_before_any_work(tmp_path, options, message):
+    result = call("--out", tmp_path / "new", *options, *QUICK)
     assert result.exit_code == 2
     assert message in result.stderr
+    assert not (tmp_path / "new").exists()

@@ -41,12 +41,17 @@ def posterior_of(**values):
     return tree
 
 
-def read_with(faults, *, stated=None, bases=((0.0, 0.0), (0.25, 0.0)), friction=0.0):
+def read_with(faults, *, stated=None, frame="fixed"):
     """What the rig reads, without noise, and where the rod really touches."""
-    truth = tb.scan(CONTOUR, base=bases, drive_step=np.radians(4.0), friction=faults.get("friction", friction)).record
+    truth = tb.scan(
+        CONTOUR, base=[(0.0, 0.0), (0.25, 0.0)], drive_step=np.radians(4.0), friction=faults.get("friction", 0.0)
+    ).record
     loads = np.stack([truth[name].values for name in CHANNELS], axis=1) * faults.get("rigidity_scale", 1.0)
     slope = truth.drive_angle.values + faults.get("suspension_compliance", 0.0) * loads[:, 0]
     short = ("moment", "force_x", "force_y")
+    if frame == "turning":
+        cos, sin = np.cos(slope), np.sin(slope)
+        loads[:, 1:] = np.stack([cos * loads[:, 1] + sin * loads[:, 2], cos * loads[:, 2] - sin * loads[:, 1]], axis=1)
     loads = loads * [faults.get(f"{name}_gain", 1.0) for name in short]
     if stated is not None:
         loads = loads @ np.array(stated.gain).T + np.array(stated.bias)
@@ -61,13 +66,20 @@ def read_with(faults, *, stated=None, bases=((0.0, 0.0), (0.25, 0.0)), friction=
     for name in ("base_x", "base_y"):
         columns[name] = truth[name].values - second * faults.get(f"base_2_{name[-1]}", 0.0)
     read = truth.drop_vars([name for name in truth.data_vars if str(name).startswith("truth_")])
-    return read.assign({name: ("sample", values, read[name].attrs) for name, values in columns.items()}), truth
+    read = read.assign({name: ("sample", values, read[name].attrs) for name, values in columns.items()})
+    return read.assign_attrs(load_cell_frame=frame), truth
 
 
 def off(read, truth, cell, posterior):
     """How far contacts of the loaded samples are off, and how much is left over."""
-    record, found, friction = found_rig(read, cell, posterior)
-    contacts = tb.reconstruct(record, method="constrained", load_cell=found, friction=friction)
+    rig = found_rig(read, cell, posterior)
+    contacts = tb.reconstruct(
+        rig.record,
+        method="constrained",
+        load_cell=rig.load_cell,
+        friction=rig.friction,
+        suspension_compliance=rig.suspension_compliance,
+    )
     loaded = np.hypot(truth.force_x, truth.force_y).values > 0.6
     x, y = (contacts[f"contact_{axis}"] - truth[f"truth_contact_{axis}"] for axis in "xy")
     return np.hypot(x, y).values[loaded].max(), np.nanmax(contacts.misfit.values[loaded])
@@ -75,17 +87,18 @@ def off(read, truth, cell, posterior):
 
 GROUPS = [[name] for name in FAULTS] + [
     ["rigidity_scale", "drive_angle_offset", "moment_bias", "force_x_bias", "force_y_bias"],
-    [name for name in FAULTS if name != "suspension_compliance"],
+    list(FAULTS),
 ]
 
 
+@pytest.mark.parametrize("frame", ["fixed", "turning"])
 @pytest.mark.parametrize(
     "names", GROUPS, ids=lambda names: "+".join(names) if len(names) < 3 else f"{len(names)} faults"
 )
-def test_contacts_are_true_if_the_faults_are_found(names):
+def test_contacts_are_true_if_the_faults_are_found(names, frame):
     """Without them they are not: each fault shows, in the contacts or in what is left over."""
     faults = {name: FAULTS[name] for name in names}
-    read, truth = read_with(faults)
+    read, truth = read_with(faults, frame=frame)
     distance, misfit = off(read, truth, CELL, posterior_of(**faults))
     assert distance < 1e-6
     assert misfit < 1e-6
@@ -110,10 +123,10 @@ def test_they_come_on_top_of_what_the_load_cell_states():
 
 def test_what_was_not_inferred_stays_as_stated():
     read, _ = read_with({})
-    record, cell, friction = found_rig(read, CELL, posterior_of(noise_scale=1.3))
-    assert record.identical(read)
-    assert cell == CELL
-    assert friction == 0.0
+    rig = found_rig(read, CELL, posterior_of(noise_scale=1.3))
+    assert rig.record.identical(read)
+    assert rig.load_cell == CELL
+    assert (rig.friction, rig.suspension_compliance) == (0.0, 0.0)
 
 
 def test_noise_that_was_inferred_is_the_load_cells():

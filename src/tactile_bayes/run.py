@@ -189,9 +189,15 @@ def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: 
     """
     if set(present_channels(measured)) != set(CHANNELS):
         return None
-    record, cell, slid = found_rig(measured, load_cell, posterior)
-    heavy = cell.degrees_of_freedom <= 2.0  # no standard deviations to weigh the channels by
-    return reconstruct(record, method="raw" if heavy else "constrained", load_cell=cell, friction=slid)
+    rig = found_rig(measured, load_cell, posterior)
+    heavy = rig.load_cell.degrees_of_freedom <= 2.0  # no standard deviations to weigh the channels by
+    return reconstruct(
+        rig.record,
+        method="raw" if heavy else "constrained",
+        load_cell=rig.load_cell,
+        friction=rig.friction,
+        suspension_compliance=rig.suspension_compliance,
+    )
 
 
 def summary(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:

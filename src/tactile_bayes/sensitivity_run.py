@@ -105,6 +105,8 @@ def sensitivity_into(
     ['information.png', 'sensitivity.nc', 'words.txt']
     """
     folder = Path(out)
+    if material is not None and (options.get("rod") is None or options.get("load_cell") is None):
+        raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
     found = sensitivity(**options)
     folder.mkdir(parents=True, exist_ok=True)
     files = {"sensitivity": folder / "sensitivity.nc", "words": folder / "words.txt"}
@@ -151,12 +153,11 @@ def rod_in_words(rods: xr.Dataset) -> str:
 
 def _rods(material: Material, options: Mapping[str, Any]) -> xr.Dataset:
     plan = Plan(**{name: value for name, value in options.items() if name in _OF_PLAN})
-    if plan.rod is None or plan.load_cell is None:
-        raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
-    own = (64.0 * plan.rod.flexural_rigidity / (np.pi * material.youngs_modulus)) ** 0.25
+    rod = plan.taken_rod
+    own = (64.0 * rod.flexural_rigidity / (np.pi * material.youngs_modulus)) ** 0.25
     return required_rod(
         plan,
-        lengths=(plan.rod.length * _LENGTHS).tolist(),
+        lengths=(rod.length * _LENGTHS).tolist(),
         diameters=(own * _DIAMETERS).tolist(),
         youngs_modulus=material.youngs_modulus,
         elastic_strain=material.elastic_strain,

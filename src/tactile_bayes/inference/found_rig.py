@@ -23,14 +23,19 @@ class FoundRig(NamedTuple):
     """What Step 2 needs to take a record as the posterior does."""
 
     record: xr.Dataset
-    """With pivots, drive angles and readings freed from what the load cell cannot state: shifts, compliance, drift."""
+    """With pivots as they were found, and without drift."""
     load_cell: LoadCell
-    """Noise, bias, gain (a rod that is stiffer than stated makes it larger) and encoder offset as they were found."""
+    """Bias, gain (a rod that is stiffer than stated makes it larger) and encoder offset as they were found.
+
+    So is noise that was not stated; else it is as stated, whatever `noise_scale` says, so that misfits tell of it.
+    """
     friction: float
+    suspension_compliance: float
+    """Per moment of the rod as stated, as `reconstruct` takes it."""
 
 
 def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> FoundRig:
-    """Medians of everything that was inferred beside a contour, put where `reconstruct` takes it.
+    """Medians of what was inferred of the rig beside a contour, put where `reconstruct` takes it.
 
     Parameters
     ----------
@@ -64,9 +69,6 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
     columns = {
         name: measured[name] - drift * way for name, drift in zip(CHANNELS, of_channels("drift", 0.0), strict=True)
     }
-    columns["drive_angle"] = measured.drive_angle - rig.get("suspension_compliance", 0.0) * (
-        (columns["holding_moment"] - bias[0]) / gain[0, 0]
-    )
     pivots = np.stack([measured.base_x.values, measured.base_y.values], axis=1)
     for number, pivot in enumerate(bases_of(measured), start=1):
         here = np.all(pivots == np.asarray(pivot), axis=1)
@@ -74,4 +76,9 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
             shift = rig.get(f"base_{number}_{name[-1]}", 0.0)
             columns[name] = columns.get(name, measured[name]) + shift * here
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
-    return FoundRig(record, cell, rig.get("friction", float(posterior.attrs["friction"])))
+    return FoundRig(
+        record,
+        cell,
+        rig.get("friction", float(posterior.attrs["friction"])),
+        rig.get("suspension_compliance", 0.0) * rig.get("rigidity_scale", 1.0),
+    )

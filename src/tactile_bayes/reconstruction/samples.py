@@ -53,8 +53,11 @@ class Samples(NamedTuple):
         )
 
 
-def samples_of(measured: xr.Dataset, cell: LoadCell) -> Samples:
+def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: float = 0.0) -> Samples:
     """The samples of a valid record with all load channels.
+
+    By a compliance of its suspension [rad per unit of moment of the record] the pivot turns under the moment, so that
+    the rod's slope is not the drive's, along with which the load cell may turn.
 
     Raises
     ------
@@ -95,6 +98,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell) -> Samples:
             turn[:, 2, 1] = np.sin(angle)
             turn[:, 1, 2] = -turn[:, 2, 1]
             covariance = turn @ covariance @ np.swapaxes(turn, 1, 2)
+        angle = angle - suspension_compliance * rod.moment_unit * loads[:, 0]
     signs = np.where(side[:, None] < 0.0, _MIRROR, 1.0)
     if has_noise:
         covariance = signs[:, :, None] * covariance * signs[:, None, :]

@@ -38,6 +38,7 @@ def reconstruct(
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
     friction: float = 0.0,
+    suspension_compliance: float = 0.0,
 ) -> xr.Dataset:
     """Contact point, arc length, slope and phase from every sample of a record, with their uncertainty.
 
@@ -62,6 +63,9 @@ def reconstruct(
         In place of the rod that an SI record states.
     friction : float
         Coulomb's coefficient μ of the sliding rod.
+    suspension_compliance : float
+        By which the pivot's suspension turns under the holding moment [rad/(N m), or rad/(EI/L)]; that the moment's
+        error turns it, too, is neglected.
 
     Returns
     -------
@@ -143,8 +147,10 @@ def reconstruct(
             f"friction is {friction!r}: give Coulomb's coefficient, from 0 to {np.tan(MAX_FRICTION_ANGLE):.2f}"
         )
     measured = with_rod(validate(measured), rod)
+    if not 0.0 <= suspension_compliance < np.inf:
+        raise ParameterError(f"suspension_compliance is {suspension_compliance!r}: give a number from 0 up")
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
-    samples = samples_of(measured, cell)
+    samples = samples_of(measured, cell, suspension_compliance)
     estimate = _METHODS[method](samples, np.full(samples.side.size, np.arctan(friction)))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     return kept.assign(_variables(estimate, samples, measured)).assign_attrs(
