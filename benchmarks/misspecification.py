@@ -87,7 +87,7 @@ CASES: Mapping[str, Case] = {
 }
 
 
-def main(replicates: int = 100, *names: str) -> None:
+def main(replicates: int = 40, *names: str) -> None:
     print(
         f"{replicates} replicates; noise 0.05 EI/L² and 0.02 EI/L, steps of 2°; bands of 90 %; noticed by the check of"
     )
@@ -135,4 +135,4 @@ def row(name: str, found: xr.Dataset, *, cured: bool = False) -> str:
 
 if __name__ == "__main__":
     counts, chosen = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
-    main(*map(int, counts or ["100"]), *chosen)
+    main(*map(int, counts or ["40"]), *chosen)
