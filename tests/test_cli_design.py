@@ -64,6 +64,23 @@ def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("nested", "told"),
+    [
+        ([], "nothing was written: the same command begins anew"),
+        (["--nested"], "0 of 2 candidates are in {}/nested: the same command goes on"),
+    ],
+)
+def test_an_interrupt_says_what_the_same_command_does(tmp_path, monkeypatch, nested, told):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tactile_bayes.design_run.design_into", interrupted)
+    result = run("--out", tmp_path, *nested)
+    assert result.exit_code == 130
+    assert result.stderr == f"tactile-bayes: interrupted, {told.format(tmp_path)}\n"
+
+
 def test_the_figure_shows_the_numbers(made):
     found = xr.load_dataset(made[1] / "design.nc", engine="h5netcdf")
     ax = draw(found)

@@ -23,11 +23,15 @@ READING = [
 ]
 
 
+def record_of_rig():
+    cell = tb.LoadCell(force_noise=LOAD_CELL.force_noise, moment_noise=LOAD_CELL.moment_noise, bias=(1e-4, 4e-3, -2e-3))
+    return cell.measure(tb.scan(CONTOUR, rod=ROD, drive_step=math.radians(2.0)).record, seed=1)
+
+
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
     """A file as a rig writes it: names, units and signs of its own, semicolons, no sweeps, a zero that is off."""
-    cell = tb.LoadCell(force_noise=LOAD_CELL.force_noise, moment_noise=LOAD_CELL.moment_noise, bias=(1e-4, 4e-3, -2e-3))
-    record = cell.measure(tb.scan(CONTOUR, rod=ROD, drive_step=math.radians(2.0)).record, seed=1)
+    record = record_of_rig()
     lines = ["Winkel;Mz [mN m];Fx;Fy [mN];Temp / °C"]
     for angle, moment, x, y in zip(*(record[name].values for name in ("drive_angle", *CHANNELS)), strict=True):
         cells = (90.0 - math.degrees(angle), 1e3 * moment, -1e3 * x, 1e3 * y, 21.5)
@@ -122,6 +126,32 @@ def test_a_rig_that_measures_the_moment_only(measured, tmp_path):
     assert "No Step 2, which needs all three load channels; infer works without." in result.stdout
 
 
+def test_a_channel_that_is_not_connected_is_left_out_as_is_said(measured, tmp_path):
+    write_record(measured.assign(force_x=("sample", np.full(measured.sizes["sample"], 0.1))), tmp_path / "dead.csv")
+    said = call("inspect", tmp_path / "dead.csv").stdout.splitlines()[0]
+    assert said.endswith("empty its column, or remove it and give --missing force_x.")
+    table = pd.read_csv(tmp_path / "dead.csv", comment="#")
+    header = [line for line in (tmp_path / "dead.csv").read_text().splitlines() if line.startswith("#")]
+    for name, kept in {"empty.csv": table.assign(force_x=""), "removed.csv": table.drop(columns="force_x")}.items():
+        (tmp_path / name).write_text("\n".join([*header, kept.to_csv(index=False)]))
+        options = ["--missing", "force_x"] if name == "removed.csv" else []
+        result = call("inspect", tmp_path / name, *options)
+        assert "not there   force_x" in result.stdout, result.output
+
+
+def test_pivots_have_the_unit_of_the_record(tmp_path):
+    for bases, rod, head in (
+        ([(0.0, 0.0), (0.02, 0.01)], ROD, "base [m]"),
+        ([(0.0, 0.0), (0.1, 0.0)], None, "base  samples"),
+    ):
+        contour = CONTOUR if rod else tb.contours.paper_profile("II", q=0.5)
+        write_record(tb.scan(contour, base=bases, rod=rod, drive_step=0.1).record, tmp_path / "r.csv")
+        sweeps = call("inspect", tmp_path / "r.csv").stdout.split("\n\n")[2].splitlines()
+        assert head in sweeps[0]
+        assert f"{bases[1][0]:g},{bases[1][1]:g}" in sweeps[-1]
+        assert max(map(len, sweeps)) <= 80
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -192,6 +222,32 @@ def test_an_ideal_record_is_taken_at_its_word(tmp_path):
     assert not (tmp_path / "no").exists()
 
 
+def test_noise_that_cannot_be_known_is_not_said_to_be_none(rig, tmp_path):
+    lines = rig.read_text(encoding="utf-8").splitlines()
+    loaded = [line for line in lines[1:] if abs(float(line.split(";")[1].replace(",", "."))) > 1.0]
+    (tmp_path / "loaded.csv").write_text("\n".join([lines[0], *loaded]) + "\n", encoding="utf-8")
+    result = call("reconstruct", tmp_path / "loaded.csv", *READING, "--out", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    assert (
+        "No noise is known: neither stated, nor to be found without unloaded samples; every sample counts as loaded. "
+        "Give --force-noise and --moment-noise.\n"
+    ) in result.stdout
+    inspected = call("inspect", tmp_path / "loaded.csv", *READING)
+    assert "noise not stated, and not to be found without unloaded samples\n" in inspected.stdout
+
+
+def test_no_map_of_other_contacts_is_left(tmp_path):
+    """Where there is none to draw, that of an earlier run goes."""
+    record = tb.scan(CONTOUR, rod=ROD, drive_step=0.1).record
+    write_record(record, tmp_path / "touching.csv")
+    write_record(record.isel(sample=slice(0, 5)), tmp_path / "before.csv")
+    call("reconstruct", tmp_path / "touching.csv", "--out", tmp_path / "run")
+    assert (tmp_path / "run" / "contacts.png").exists()
+    result = call("reconstruct", tmp_path / "before.csv", "--out", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["contacts.csv"]
+
+
 def test_a_method_that_is_none(rig, tmp_path):
     assert_misused(call("reconstruct", rig, "--method", "best", "--out", tmp_path), "--method")
 
@@ -199,6 +255,30 @@ def test_a_method_that_is_none(rig, tmp_path):
 # --- From a rig's file to a contour -----------------------------------------------------------------------------------
 
 
+def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured(inspected, tmp_path, monkeypatch):
+    """In SI, with signs and sweeps; what comes of it is below."""
+    asked = []
+
+    def analyse(measured, out, **options):
+        asked.append((measured, out, options))
+        raise tb.errors.InferenceError("that is enough")
+
+    monkeypatch.setattr("tactile_bayes.run.analyse", analyse)
+    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
+    words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
+    assert_refused(call(*words), "that is enough")
+    ((measured, out, options),) = asked
+    expected = record_of_rig()
+    for name in ("drive_angle", *CHANNELS):
+        np.testing.assert_allclose(measured[name].values, expected[name].values, rtol=0.0, atol=2e-6)
+    np.testing.assert_array_equal(measured.sweep.values, expected.sweep.values)
+    assert tb.record.rod_of(measured) == ROD
+    assert out == tmp_path / "run"
+    assert options["family"] == "parabola"
+    assert "bias" in options["nuisances"]
+
+
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_the_command_that_inspect_names_infers_the_contour(inspected, tmp_path):
     last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")

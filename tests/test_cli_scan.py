@@ -140,6 +140,15 @@ def test_a_load_cell_measures_an_ideal_record(ideal, tmp_path):
     xr.testing.assert_equal(found, expected[list(found.data_vars)])
 
 
+def test_a_record_that_states_no_load_cell_is_taken_to_be_ideal(ideal, tmp_path):
+    """As the help says: what is not in the header cannot be known."""
+    noisy = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.read_record(ideal[0]), seed=1)
+    noisy.attrs = {name: value for name, value in noisy.attrs.items() if not name.startswith("load_cell_")}
+    tb.write_record(noisy, tmp_path / "noisy.csv")
+    told("measure", tmp_path / "noisy.csv", "--force-noise", 0.1, "--moment-noise", 0.1, "--out", tmp_path / "m.csv")
+    assert "whose header states a load cell is refused" in " ".join(call("measure", "--help").stdout.split())
+
+
 def test_the_truth_is_kept_if_asked(ideal, tmp_path):
     call("measure", ideal[0], "--force-noise", 0.1, "--moment-noise", 0.1, "--keep-truth", "--out", tmp_path / "m.nc")
     found = tb.read_record(tmp_path / "m.nc")

@@ -17,6 +17,23 @@ SIZES = ("force_noise", "moment_noise", "relative_noise", "force_resolution", "m
 rods = st.builds(Rod, st.floats(0.3, 3.0), st.floats(0.3, 3.0))
 
 
+@pytest.mark.parametrize(
+    ("sheet", "has_them"),
+    [
+        ({}, False),
+        ({"force_noise": 0.1}, False),
+        ({"moment_noise": 0.1, "force_resolution": 0.1}, False),
+        ({"force_noise": 0.1, "moment_noise": 0.1}, True),
+        ({"force_noise": 0.1, "moment_noise": 0.1, "degrees_of_freedom": 2.1}, True),
+        ({"force_noise": 0.1, "moment_noise": 0.1, "degrees_of_freedom": 2.0}, False),
+    ],
+)
+def test_variances_are_of_every_channel_and_finite(sheet, has_them):
+    cell = LoadCell(**sheet)
+    assert cell.has_variances is has_them
+    assert all(0.0 < deviation < np.inf for deviation in cell.standard_deviations.values()) is has_them
+
+
 # --- What is refused --------------------------------------------------------------------------------------------
 
 

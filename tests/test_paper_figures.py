@@ -27,6 +27,7 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.scanning import equilibria, scan
 
 COARSE = np.radians(4.0)
+COARSER = np.radians(12.0)
 PROFILES = ("I", "II", "III", "IV")
 
 pytestmark = pytest.mark.usefixtures("settings_left_alone")
@@ -276,8 +277,8 @@ def test_points_without_noise_lie_on_the_contour_beside_the_gap(points):
 
 def test_points_with_noise_are_those_of_step_two():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02)
-    ax = made(11, distances=[0.5], load_cell=cell, seed=3).axes[1]
-    measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=COARSE).record, seed=3)
+    ax = made(11, distances=[0.5], load_cell=cell, seed=3, drive_step=COARSER).axes[1]
+    measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=COARSER).record, seed=3)
     contacts = reconstruct(measured, load_cell=cell)
     forward = (contacts.direction.values == "forward") & np.isfinite(contacts.contact_x.values)
     x, y = points_of(ax, "o")
@@ -299,7 +300,7 @@ def test_captions_say_what_was_chosen():
 
 def test_files_are_named_by_number_and_carry_their_caption(tmp_path):
     told: list[int] = []
-    options = {"distances": [0.5], "drive_step": COARSE}
+    options = {"distances": [0.5], "drive_step": COARSER}
     files = draw_all(tmp_path / "new", only=[3, 2, 3], formats=["svg"], progress=told.append, **options)
     assert told == [1, 2]
     assert list(files) == [3, 2]

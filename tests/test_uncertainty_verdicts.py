@@ -12,6 +12,7 @@ from helpers.predicted_records import CELL, ideal, predicted, with_readings
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.scanning import scan
 from tactile_bayes.uncertainty.verdicts import verdicts
@@ -53,7 +54,7 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
 def test_a_forgotten_tare_is_told_with_its_size():
     tree = predicted()
     found = verdicts(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
-    assert found[0].startswith("Without load the cell reads more than its data sheet says: force_y 0.3")
+    assert found[0].startswith("Without load the cell does not read what is stated: force_y is off by 0.3")
     assert found[0].endswith("or give LoadCell.from_zero_load(record).")
     assert found[1].startswith("The family parabola does not describe the record")
     assert "sweep" in found[1]
@@ -131,3 +132,32 @@ def test_what_the_prior_forbids_and_what_it_says_alone():
     found = verdicts(changed(tree, "posterior", noise_scale=noise, **near))
     assert found[0].startswith("All is well")
     assert found[1] == "The record tells little more than the prior of x_c."
+
+
+def drifted(tree, sizes=(0.0, 0.2, 0.0)):
+    """Its record with zeros that wander by so much from the first sample to the last."""
+    columns = {
+        name: values + size * np.linspace(-0.5, 0.5, values.size)
+        for (name, values), size in zip(readings(tree).items(), sizes, strict=True)
+    }
+    return with_readings(tree, **columns)
+
+
+def test_a_zero_that_moved_is_told():
+    found = verdicts(drifted(predicted()))
+    (said,) = (words for words in found if words.startswith("The zero moved"))
+    assert re.match(
+        r"The zero moved from one unloaded stretch to another, of force_x \(p = [\d.e-]+ if it had not\)", said
+    )
+    assert "--nuisance drift" in said
+
+
+def test_a_zero_that_moved_is_not_told_where_that_is_inferred_or_stated():
+    tree = drifted(predicted())
+    inferred = tree.copy()
+    inferred.attrs = tree.attrs | {"nuisances": '["force_x_drift"]'}
+    assert not [words for words in verdicts(inferred) if words.startswith("The zero moved")]
+    stated = tree.copy()
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.01))
+    stated.attrs = stated.attrs | {f"load_cell_{name}": value for name, value in cell.entries().items()}
+    assert not [words for words in verdicts(stated) if words.startswith("The zero moved")]

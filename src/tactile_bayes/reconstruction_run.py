@@ -18,7 +18,7 @@ from tactile_bayes.files import write_atomically
 from tactile_bayes.inspection import CellSource, known_cell
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, validate
+from tactile_bayes.record import validate
 
 __all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_in_words"]
 
@@ -38,8 +38,8 @@ class ReconstructionRun:
     contacts : xr.Dataset
         From `reconstruct`.
     load_cell : LoadCell or None
-    source : {"given", "data sheet", "unloaded samples", "nothing"}
-        What the load cell is known from.
+    source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
+        What the load cell is known from; see `known_cell`.
     files : mapping of str to Path
         By what they hold.
     """
@@ -66,7 +66,7 @@ def reconstruct_into(
         A record with all three load channels.
     out : path-like
         Folder for contacts.csv, and contacts.png where there are at least two contact points; made if it is not there.
-        Files of these names in it are replaced.
+        Files of these names in it are replaced, and a contacts.png is removed where none is drawn.
     method : {"raw", "constrained"}, optional
         As `reconstruct` takes it; by default "constrained", or "raw" where the noise of a channel is not known.
     load_cell : LoadCell, optional
@@ -96,17 +96,19 @@ def reconstruct_into(
     measured = validate(measured)
     cell, source = known_cell(measured, load_cell)
     if method is None:
-        method = "constrained" if cell is not None and _has_variances(cell) else "raw"
+        method = "constrained" if cell is not None and cell.has_variances else "raw"
     contacts = reconstruct(measured, method=method, load_cell=cell, friction=friction)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     files = {"contacts": folder / "contacts.csv"}
+    drawn = folder / "contacts.png"
+    drawn.unlink(missing_ok=True)  # which is of other contacts
     with write_atomically(files["contacts"]) as temporary:
         contacts.to_dataframe().to_csv(temporary)
     shown = contacts.contact_x.values[contacts.status.values == "ok"]
     if shown.size > 1 and np.ptp(shown) > 0.0:
-        files["map"] = folder / "contacts.png"
-        _draw(measured, contacts, shown, files["map"])
+        files["map"] = drawn
+        _draw(measured, contacts, shown, drawn)
     return ReconstructionRun(contacts, cell, source, files)
 
 
@@ -166,10 +168,6 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
                 f"In tangential contact the force along the rod agrees with the moment ({score:+.1f} standard errors)."
             )
     return (*against, *told)
-
-
-def _has_variances(cell: LoadCell) -> bool:
-    return all(0.0 < cell.standard_deviations[name] < math.inf for name in CHANNELS)
 
 
 def _draw(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64], path: Path) -> None:

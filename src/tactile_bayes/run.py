@@ -190,10 +190,9 @@ def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: 
     if set(present_channels(measured)) != set(CHANNELS):
         return None
     rig = found_rig(measured, load_cell, posterior)
-    heavy = rig.load_cell.degrees_of_freedom <= 2.0  # no standard deviations to weigh the channels by
     return reconstruct(
         rig.record,
-        method="raw" if heavy else "constrained",
+        method="constrained" if rig.load_cell.has_variances else "raw",
         load_cell=rig.load_cell,
         friction=rig.friction,
         suspension_compliance=rig.suspension_compliance,

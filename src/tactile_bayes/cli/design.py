@@ -109,7 +109,8 @@ def design(
     def have() -> str:
         return f"{done:,} of {counted(count, 'candidate')} are in {out / 'nested'}" if nested else "nothing was written"
 
-    with going_on(have) as raise_lost, task_bar(count, "candidate", quiet or json) as show:
+    then = "the same command goes on" if nested else "the same command begins anew"
+    with going_on(have, then=then) as raise_lost, task_bar(count, "candidate", quiet or json) as show:
 
         def note(progress: TaskProgress) -> None:
             nonlocal done

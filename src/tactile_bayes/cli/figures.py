@@ -61,7 +61,9 @@ def figures(
     numbers = list(dict.fromkeys(only or NUMBERS))
     finished = 0
     with (
-        going_on(lambda: f"{finished} of {len(numbers)} figures are drawn") as raise_lost,
+        going_on(
+            lambda: f"{finished} of {len(numbers)} figures are drawn", then="the same command draws all anew"
+        ) as raise_lost,
         task_bar(len(numbers), "figure", quiet or json) as show,
     ):
 

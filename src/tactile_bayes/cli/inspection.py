@@ -39,6 +39,7 @@ _SOURCES = {
     "data sheet": "as the file states",
     "unloaded samples": "not stated, found in the unloaded samples",
     "nothing": "neither stated nor found",
+    "too few unloaded samples": "not stated, and not to be found without unloaded samples",
 }
 
 
@@ -157,7 +158,9 @@ def _sweeps(sweeps: xr.Dataset) -> Any:
 
     pivots = [f"{x:g},{y:g}" for x, y in zip(sweeps.base_x.values, sweeps.base_y.values, strict=True)]
     with_pivots = set(pivots) != {"0,0"}
-    heads = ["sweep", *(["base"] if with_pivots else []), "samples", "drive [°]", "step", "touches", "lets go"]
+    unit = sweeps.base_x.attrs["units"]
+    base = "base" if unit == "1" else f"base [{unit}]"
+    heads = ["sweep", *([base] if with_pivots else []), "samples", "drive [°]", "step", "touches", "lets go"]
     table = table_of([*heads, "unloaded"], left=["sweep"])
     for i, number in enumerate(sweeps.sweep.values):
         row = sweeps.isel(sweep=i)

@@ -1,4 +1,4 @@
-"""Interrupts of long runs, which go on where they stopped when they are started again."""
+"""Interrupts of long runs: what is there, and what the same command then does."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["going_on"]
 
 
 @contextmanager
-def going_on(have: Callable[[], str]) -> Iterator[Callable[[], object]]:
-    """A run that goes on by the same command: an interrupt ends it with words that say what is there.
+def going_on(have: Callable[[], str], *, then: str = "the same command goes on") -> Iterator[Callable[[], object]]:
+    """A run that an interrupt ends with words that say what is there, and what the same command then does.
 
     What is yielded is to be called now and then: it raises an interrupt that was lost.
     """
@@ -25,7 +25,7 @@ def going_on(have: Callable[[], str]) -> Iterator[Callable[[], object]]:
             yield raise_lost
     except KeyboardInterrupt as interrupt:
         is_terminated = isinstance(interrupt, _Terminated)
-        words = f"{'terminated' if is_terminated else 'interrupted'}, {have()}: the same command goes on"
+        words = f"{'terminated' if is_terminated else 'interrupted'}, {have()}: {then}"
         if is_terminated:
             typer.echo(f"tactile-bayes: {words}", err=True)
             raise typer.Exit(143) from None

@@ -78,7 +78,8 @@ def measure(
 ) -> None:
     """Read an ideal record with a load cell that is not: noise, bias, drift, gain, range, steps and encoder.
 
-    A record that a load cell has measured already is refused: its noise would be there twice.
+    A record whose header states a load cell is refused, as noise would be there twice; one that states none is taken
+    to be ideal.
     """
     refuse_other_suffix(out)
     from tactile_bayes.errors import ParameterError

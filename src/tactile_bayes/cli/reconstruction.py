@@ -34,6 +34,8 @@ _SOURCES = {
     "data sheet": "The noise is what the file states of its load cell.",
     "unloaded samples": "No noise is stated: bias and noise are taken from the unloaded samples.",
     "nothing": "There is no noise, neither stated nor in unloaded samples: no standard deviations.",
+    "too few unloaded samples": "No noise is known: neither stated, nor to be found without unloaded samples; every "
+    "sample counts as loaded. Give --force-noise and --moment-noise.",
 }
 
 

@@ -20,6 +20,8 @@ _SETTLED = 1.01
 
 
 class Show(Protocol):
+    """What moves a bar of sampling on."""
+
     def __call__(self, progress: Progress, what: str = "", /) -> object:
         """Show progress, and of what it is where there is more than one thing."""
 

@@ -26,7 +26,8 @@ def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Rows], 
         likeness[:, index] = autocorrelation(reading, stretches)
         if stated is not None:
             step = stated.resolution[index] / np.sqrt(12.0)
-            columns["stated_noise"][index] = float(np.hypot(stated.standard_deviations[name], step)) or np.nan
+            noise = float(np.hypot(stated.standard_deviations[name], step))
+            columns["stated_noise"][index] = noise if 0.0 < noise < np.inf else np.nan
             columns["stated_bias"][index] = stated.bias[index]
     columns["neighbour_correlation"], columns["neighbour_score"] = likeness
     table = xr.Dataset(

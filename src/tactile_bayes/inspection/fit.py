@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, frame_of
 
@@ -38,6 +40,7 @@ class Fit(NamedTuple):
     share: float
     """Of the loaded samples, those whose status is "does not fit"; NaN of too few."""
     loaded: int
+    """Those that carry a load, and are not cut off."""
     remedy: str
     """What would make most of them fit, in words; "" if nothing that was tried does."""
 
@@ -55,39 +58,60 @@ def fit_of(record: xr.Dataset, cell: LoadCell, *, most: float, friction: float =
         Share above which remedies are tried: other signs, another frame, forces that are exchanged,
         friction.
     """
-    plain = cell.corrected(record)
-    noise = replace(
-        LoadCell(),
-        force_noise=cell.force_noise,
-        moment_noise=cell.moment_noise,
-        degrees_of_freedom=cell.degrees_of_freedom,
-        relative_noise=cell.relative_noise,
-        force_resolution=cell.force_resolution,
-        moment_resolution=cell.moment_resolution,
-        bias_uncertainty=cell.bias_uncertainty,
-        drive_angle_noise=cell.drive_angle_noise,
-    )
-    share, loaded = _unfit(plain, noise, friction)
+    status = _statuses(record, cell, friction)
+    share, loaded = _unfit(status)
     if loaded < _FEWEST:
         return Fit(np.nan, loaded, "")
     if not share > most:
         return Fit(share, loaded, "")
-    plain = plain.isel(sample=slice(None, None, max(1, loaded // _TRIED)))
-    part = _unfit(plain, noise, friction)[0]
-    frame = "turning" if frame_of(plain) == "fixed" else "fixed"
+    loads = cell.corrected(record).isel(sample=status != "cut off")
+    loads = loads.isel(sample=slice(None, None, max(1, loaded // _TRIED)))
+    alone = _of_any_samples(cell, record.sizes["sample"])
+
+    def share_if(remedy: Callable[[xr.Dataset], xr.Dataset], friction: float) -> float:
+        return _unfit(_statuses(_read_by(alone, remedy(loads)), alone, friction))[0]
+
+    part = share_if(lambda given: given, friction)
+    frame = "turning" if frame_of(loads) == "fixed" else "fixed"
     others = [*_REMEDIES, (_FRAME_WORDS[frame], lambda given: given.assign_attrs(load_cell_frame=frame))]
-    tried = [(_unfit(remedy(plain), noise, friction)[0], words) for words, remedy in others]
+    tried = [(share_if(remedy, friction), words) for words, remedy in others]
     for coefficient in _FRICTIONS:
         words = f"there were friction of about {coefficient:g} (have infer find it: --nuisance friction)"
-        tried.append((_unfit(plain, noise, coefficient)[0], words))
+        tried.append((share_if(lambda given: given, coefficient), words))
     best, words = min(tried)
     return Fit(share, loaded, words if best <= _REMEDIED * part else "")
 
 
-def _unfit(record: xr.Dataset, cell: LoadCell, friction: float) -> tuple[float, int]:
-    status = reconstruct(record, method="constrained", load_cell=cell, friction=friction).status.values
-    loaded = int(np.count_nonzero(status != "no contact"))
+def _statuses(record: xr.Dataset, cell: LoadCell, friction: float) -> NDArray[np.str_]:
+    contacts = reconstruct(record, method="constrained", load_cell=cell, friction=friction)
+    return np.asarray(contacts.status.values)
+
+
+def _unfit(status: NDArray[np.str_]) -> tuple[float, int]:
+    loaded = int(np.count_nonzero((status != "no contact") & (status != "cut off")))
     return float(np.count_nonzero(status == "does not fit")) / max(loaded, 1), loaded
+
+
+def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
+    """The cell for some samples of a record: drift, which counts samples, is as unknown as a bias of its size."""
+    one, two, three = np.sqrt(np.mean(wandering_deviation(cell, samples) ** 2, axis=0)).tolist()
+    return replace(
+        cell,
+        bias_uncertainty=(one, two, three),
+        drift=None,
+        force_range=np.inf,
+        moment_range=np.inf,
+        drive_angle_offset=0.0,
+        frame=None,
+    )
+
+
+def _read_by(cell: LoadCell, loads: xr.Dataset) -> xr.Dataset:
+    """What a cell without noise would read of loads: so that its noise is of the right size beside them."""
+    read = cell.expected(np.stack([loads[name].values for name in CHANNELS], axis=-1))
+    return loads.assign(
+        {name: (loads[name].dims, read[:, index], loads[name].attrs) for index, name in enumerate(CHANNELS)}
+    )
 
 
 def _with_sign(*names: str) -> Callable[[xr.Dataset], xr.Dataset]:

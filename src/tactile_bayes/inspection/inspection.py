@@ -7,7 +7,6 @@ import warnings
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -46,16 +45,17 @@ class Inspection:
         too, NaN where there is none), and unloaded, the number of such samples.
     channels : xr.Dataset
         Over "channel", NaN where it is missing: smallest, largest, bias, bias_uncertainty, noise, noise_uncertainty,
-        resolution and same_bias_p_value (see `zero_load`), stated_noise (NaN if none is), neighbour_correlation of the
-        unloaded samples with its neighbour_score (about standard normal for white noise), and coordinate "unit".
+        resolution and same_bias_p_value (see `zero_load`), stated_noise (NaN if none is, or one without a standard
+        deviation), neighbour_correlation of the unloaded samples with its neighbour_score (about standard normal for
+        white noise), and coordinate "unit".
     samples : xr.Dataset
         Over "sample" (and "channel"): unloaded; outlier, stuck and cut_off of each channel; repeated and uneven_step;
         and status, what raw Step 2 makes of it ("" where a load channel is missing).
     statuses : mapping of str to int
         How many samples have which status in raw Step 2; empty where a load channel is missing.
     load_cell : LoadCell or None
-        What is known of the noise, and from what in `load_cell_source`: "given", "data sheet", "unloaded samples" or
-        "nothing".
+        What is known of the noise, and from what in `load_cell_source`: "given", "data sheet", "unloaded samples",
+        "nothing" (an ideal record) or "too few unloaded samples".
     load_cell_source : str
     """
 
@@ -145,7 +145,7 @@ def inspect_record(
         samples["status"] = ("sample", status, {"long_name": "what becomes of it in raw Step 2"})
         statuses = dict(Counter(status.tolist()).most_common())
         dead = any(np.ptp(record[name].values) == 0.0 for name in CHANNELS)
-        if cell is not None and _has_variances(cell) and found["contact"].values.any() and not dead:
+        if cell is not None and cell.has_variances and found["contact"].values.any() and not dead:
             fit = fit_of(record, _with_zero(cell, found), most=UNFIT, friction=friction)
     else:
         samples["status"] = ("sample", np.full(record.sizes["sample"], ""), {"long_name": "none: a channel is missing"})
@@ -172,8 +172,3 @@ def _with_zero(cell: LoadCell | None, found: xr.Dataset) -> LoadCell:
     one, two, three = np.nan_to_num(found["bias"].values).tolist()
     uncertainty = np.nan_to_num(found["bias_uncertainty"].values).tolist()
     return replace(cell or LoadCell(), bias=(one, two, three), bias_uncertainty=tuple(uncertainty))
-
-
-def _has_variances(cell: LoadCell) -> bool:
-    deviations: Any = cell.standard_deviations.values()
-    return all(0.0 < deviation < math.inf for deviation in deviations)

@@ -12,7 +12,7 @@ from tactile_bayes.record import present_channels
 
 __all__ = ["CellSource", "known_cell"]
 
-CellSource = Literal["given", "data sheet", "unloaded samples", "nothing"]
+CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"]
 
 
 def known_cell(measured: xr.Dataset, given: LoadCell | None = None) -> tuple[LoadCell | None, CellSource]:
@@ -29,7 +29,8 @@ def known_cell(measured: xr.Dataset, given: LoadCell | None = None) -> tuple[Loa
     -------
     load_cell : LoadCell or None
         None of a record without noise, and of one with fewer than 3 unloaded samples.
-    source : {"given", "data sheet", "unloaded samples", "nothing"}
+    source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
+        "nothing" is of unloaded samples without noise, as an ideal record has them.
 
     Examples
     --------
@@ -45,8 +46,8 @@ def known_cell(measured: xr.Dataset, given: LoadCell | None = None) -> tuple[Loa
         return stated, "data sheet"
     try:
         found = LoadCell.from_zero_load(measured)
-    except RecordError:  # too few samples are unloaded
-        return None, "nothing"
+    except RecordError:
+        return None, "too few unloaded samples"
     present = present_channels(measured)
     noisy = all(found.standard_deviations[name] for name in present)
     return (found, "unloaded samples") if noisy else (None, "nothing")

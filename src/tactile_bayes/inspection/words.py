@@ -55,7 +55,7 @@ def in_words(
         *_cut_off(record, samples, cell),
         *_without_contact(sweeps),
         *_stuck(samples),
-        *_outlying(samples),
+        *_outlying(samples, cell),
         *_zeros(channels, cell, source, false_alarm),
         *_noise(channels, cell, source, false_alarm),
         *_steps(samples),
@@ -111,7 +111,11 @@ def _dead(record: xr.Dataset, sweeps: xr.Dataset) -> list[str]:
     if not sweeps.contact.values.any():
         return []
     names = [name for name in present_channels(record) if np.ptp(record[name].values) == 0.0]
-    return [f"{name} never changes: is it connected? If it is not measured, give --missing {name}." for name in names]
+    return [
+        f"{name} never changes: is it connected? If it is not measured, empty its column, or remove it and give "
+        f"--missing {name}."
+        for name in names
+    ]
 
 
 def _cut_off(record: xr.Dataset, samples: xr.Dataset, cell: LoadCell | None) -> list[str]:
@@ -164,16 +168,21 @@ def _stuck(samples: xr.Dataset) -> list[str]:
     return told
 
 
-def _outlying(samples: xr.Dataset) -> list[str]:
+def _outlying(samples: xr.Dataset, cell: LoadCell | None) -> list[str]:
     told = []
+    remedy = (
+        "If there are more, state noise with outliers, load_cell_degrees_of_freedom: 4, in the header; else remove the "
+        "row."
+    )
+    if cell is not None and np.isfinite(cell.degrees_of_freedom):
+        remedy = "The noise with outliers that is stated allows for some; else remove the row."
     for index, name in enumerate(CHANNELS):
         flags = samples.outlier.values[:, index]
         if flags.any():
             stands = "stands" if np.sum(flags) == 1 else "stand"
             told.append(
                 f"{_count(flags, 'reading')} of {name} {stands} out from {'its' if stands[-1] == 's' else 'their'} "
-                f"neighbours ({_listed(flags)}): a knock? If there are more, state noise with outliers, "
-                "load_cell_degrees_of_freedom: 4, in the header; else remove the row."
+                f"neighbours ({_listed(flags)}): a knock? {remedy}"
             )
     return told
 
@@ -196,11 +205,12 @@ def _zeros(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
         error = float(np.hypot(error, stated))
         if abs(away) > _OFF_ZERO * error > 0.0:
             off.append(
-                f"{row.channel.values} {quantity(away, str(row.unit.values))} ({abs(away) / error:.0f} standard errors)"
+                f"{row.channel.values} is off by {quantity(away, str(row.unit.values))} "
+                f"({abs(away) / error:.0f} standard errors)"
             )
     if off:
         told.append(
-            f"Without load the cell reads more than its data sheet says: {', '.join(off)}. Was the tare forgotten? "
+            f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? "
             "infer finds it as it is (--nuisance bias, one of the defaults), but not with --as-stated."
         )
     return told

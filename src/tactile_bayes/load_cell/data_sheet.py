@@ -137,6 +137,14 @@ class DataSheet:
         return np.array([self.moment_noise, self.force_noise, self.force_noise])
 
     @property
+    def has_variances(self) -> bool:
+        """Whether the white noise of every channel has a variance: what weighs the channels beside one another.
+
+        It has none where no noise is stated, nor with 2 degrees of freedom and fewer.
+        """
+        return self.degrees_of_freedom > 2.0 and bool(np.all(self.noise > 0.0))
+
+    @property
     def unrest(self) -> NDArray[np.bool_]:
         """Which channels move without load, shape (3,)."""
         drift = 0.0 if self.drift is None else self.drift.sizes

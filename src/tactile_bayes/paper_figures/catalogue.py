@@ -149,7 +149,8 @@ def caption(number: int, **options: Any) -> str:
     >>> caption(7, distances=[0.5])
     'Deformed rods, profile I, forward sweep, q = 0.5 L.'
     """
-    entry, choice = _chosen(number, **options)
+    usual: Mapping[str, Any] = figure.__kwdefaults__ or {}
+    entry, choice = _chosen(number, **{**usual, **options})
     distances = ", ".join(f"{q:g}" for q in choice.distances)
     noise = ""
     if number == 11:
@@ -157,19 +158,8 @@ def caption(number: int, **options: Any) -> str:
     return f"{entry.words}{noise}, q = {distances} L."
 
 
-def _chosen(
-    number: int,
-    *,
-    distances: Sequence[float] | None = None,
-    drive_step: float = float(np.radians(1.0)),
-    rods: int = 15,
-    load_cell: LoadCell | None = None,
-    seed: int = 1,
-    width: float = PAGE_WIDTH,
-) -> tuple[_Entry, Choice]:
+def _chosen(number: int, *, distances: Sequence[float] | None, **options: Any) -> tuple[_Entry, Choice]:
     if isinstance(number, bool) or number not in _ENTRIES:
         raise ParameterError(f"there is no figure {number!r}: choose from {NUMBERS[0]} to {NUMBERS[-1]}")
     entry = _ENTRIES[number]
-    options: dict[str, Any] = {"load_cell": load_cell, "seed": seed, "width": width}
-    chosen = entry.distances if distances is None else distances
-    return entry, choice_of(chosen, drive_step=drive_step, rods=rods, **options)
+    return entry, choice_of(entry.distances if distances is None else distances, **options)

@@ -33,7 +33,7 @@ def draw_all(
     """Write figures of the paper to a folder, and tell where each is.
 
     Files are named figure_02.pdf and so on, and carry their caption. They are written whole: after an interrupt each
-    one is the old or the new one, and the same call makes the rest. The same options give the same bytes.
+    one is the old or the new one, and the same call makes all of them anew. The same options give the same bytes.
 
     Parameters
     ----------

@@ -57,6 +57,7 @@ class Reach:
         return float(self.pivots[:, 0].min() - room), float(self.pivots[:, 0].max() + room)
 
     def draw(self, ax: Axes) -> None:
+        """A dashed circle around each pivot, and its entry in the legend."""
         from matplotlib.patches import Circle
 
         for pivot in self.pivots:
@@ -89,6 +90,7 @@ class Reach:
         ax.set_ylim(lowest - 2.0 * room, float(self.pivots[:, 1].max()) + self.length + room)
 
     def draw_truth(self, ax: Axes, truth: Contour) -> None:
+        """The true contour, dashed, as far as the map goes."""
         ax.plot(
             *outline(truth, *self.span),
             color=PALETTE["change"],
@@ -99,6 +101,7 @@ class Reach:
         )
 
     def draw_pivots(self, ax: Axes) -> None:
+        """A mark on each pivot, of which the first is in the legend."""
         for k, (x, y) in enumerate(self.pivots.tolist()):
             draw_pivot(ax, (x, y), label="" if k else "pivot")
 

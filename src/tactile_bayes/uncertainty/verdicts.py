@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
 from collections.abc import Container, Mapping
@@ -67,11 +68,11 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     Returns
     -------
     tuple of str
-        At least one. Told are: loads that such a rod cannot have (`suspicions`); a zero that is off; a record that
-        does not look like what the posterior predicts (`check_record`); ensembles that have not converged; noise twice
-        as large as stated, or half; loads of a sample that contradict one another; nuisance parameters that are beyond
-        what the prior thought possible. Last, and not against the result, are parameters of which the record tells
-        little.
+        At least one. Told are: loads that such a rod cannot have (`suspicions`); a zero that is off, or that moved;
+        a record that does not look like what the posterior predicts (`check_record`); ensembles that have not
+        converged; noise twice as large as stated, or half; loads of a sample that contradict one another; nuisance
+        parameters that are beyond what the prior thought possible. Last, and not against the result, are parameters of
+        which the record tells little.
 
     Examples
     --------
@@ -90,7 +91,10 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
         check = check_record(posterior)
     except InferenceError:  # too few draws, which the message tells
         check = None
-    against = [*suspicions(record), *_off_zero(record, residuals)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DriftWarning)  # which is told in words
+        unloaded = zero_load(record)
+    against = [*suspicions(record), *_off_zero(record, unloaded, residuals), *_moved_zero(posterior, record, unloaded)]
     if check is not None and not check.attrs["passed"]:
         against.append(_not_described(posterior, check))
     if not posterior.attrs["converged"]:
@@ -106,11 +110,8 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     return (*against, *_prior_dominated(posterior, known=beyond))
 
 
-def _off_zero(record: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
+def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
     """Channels that read something without load which the posterior does not expect."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DriftWarning)  # a drift that is stated makes it too
-        found = zero_load(record)
     off = []
     for name, of_channel in residuals.items():
         unloaded = found.unloaded.values & ~of_channel.loaded
@@ -121,12 +122,30 @@ def _off_zero(record: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
         error = math.hypot(uncertainty, float(np.std(means[1:])))
         if abs(means[0]) > _OFF_ZERO * error > 0.0:
             unit = _unit(record, name)
-            off.append(f"{name} {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
+            off.append(f"{name} is off by {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
     if not off:
         return []
     return [
-        f"Without load the cell reads more than its data sheet says: {', '.join(off)}. Was the tare forgotten? Take it "
-        "out of the readings, or give LoadCell.from_zero_load(record)."
+        f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? Take it out of "
+        "the readings, or give LoadCell.from_zero_load(record)."
+    ]
+
+
+def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[str]:
+    """Channels whose zero wandered, where nothing was said of that, nor asked."""
+    cell = LoadCell.from_record(record)
+    inferred = json.loads(posterior.attrs.get("nuisances", "[]"))
+    level = found.attrs["false_alarm"] / max(int(np.isfinite(found.same_bias_p_value).sum()), 1)
+    moved = [
+        f"{name} (p = {p_value:.1g} if it had not)"
+        for name, p_value in zip(found.channel.values.tolist(), found.same_bias_p_value.values.tolist(), strict=True)
+        if p_value < level and f"{name.removeprefix('holding_')}_drift" not in inferred
+    ]
+    if not moved or (cell is not None and cell.drift is not None):
+        return []
+    return [
+        f"The zero moved from one unloaded stretch to another, of {', '.join(moved)}: infer it, too (--nuisance drift, "
+        "or nuisances=[..., 'drift']), state the drift of the load cell, or tare before each sweep."
     ]
 
 
