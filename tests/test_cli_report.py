@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import shlex
+from typing import get_type_hints
 
 import pytest
 from typer.testing import CliRunner
 
 from helpers.report_pages import Page, analysed_quickly, coarse_record
+from tactile_bayes.cli import report as report_command
+from tactile_bayes.cli.answer import Json
 from tactile_bayes.cli.app import app
 from tactile_bayes.record import write_record
 
@@ -56,6 +59,7 @@ def test_json_for_scripts(folder, tmp_path):
     out = tmp_path / "page.html"
     result = call(folder, "--out", out, "--json")
     assert json.loads(result.stdout) == {"report": str(out), "bytes": out.stat().st_size}
+    assert get_type_hints(report_command.report, include_extras=True)["json"] == Json
 
 
 def test_what_is_wrong_is_said_in_a_line(folder, tmp_path):

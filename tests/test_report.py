@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import ast
 import base64
 import contextlib
+import dataclasses
 import hashlib
+import importlib
+import inspect
 import io
 import json
+import pkgutil
 import re
+import sys
+import tomllib
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -36,11 +44,16 @@ from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, read_result, record_of, write_result
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction_run import reconstruction_in_words
 from tactile_bayes.record import CHANNELS, record_hash, rod_of
 from tactile_bayes.report import write_report
+from tactile_bayes.report.contour_figure import contour_figure
+from tactile_bayes.report.drawing import Plot, Scale
 from tactile_bayes.report.findings import findings_of
 from tactile_bayes.report.frames import motion_of
+from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import hindrances
+from tactile_bayes.report.trust import contacts_words
 from tactile_bayes.run import summary
 
 
@@ -67,6 +80,11 @@ def page(text):
 @pytest.fixture(scope="module")
 def posterior(folder):
     return read_result(folder / "posterior.nc")
+
+
+@pytest.fixture(scope="module")
+def findings(folder):
+    return findings_of(folder)
 
 
 @pytest.fixture(scope="module")
@@ -191,8 +209,7 @@ def test_the_band_in_words_and_table_is_that_of_the_posterior(page, posterior):
     assert re.fullmatch(r"x = \S+\u00a0mm: y from \S+ to \S+\u00a0mm with 90\u00a0%, median \S+\u00a0mm", said[0])
 
 
-def test_what_is_worked_out_again_is_what_the_run_has_written(folder):
-    findings = findings_of(folder)
+def test_what_is_worked_out_again_is_what_the_run_has_written(folder, findings):
     contacts = pd.read_csv(folder / "contacts.csv", index_col="sample")
     np.testing.assert_array_equal(findings.contacts["contact_y"], contacts["contact_y"])
     band = pd.read_csv(folder / "band.csv", index_col="x")
@@ -200,6 +217,30 @@ def test_what_is_worked_out_again_is_what_the_run_has_written(folder):
     lines = (folder / "summary.txt").read_text(encoding="utf-8").splitlines()
     assert findings.verdicts == tuple(lines[: lines.index("")])
     assert findings.probability == 0.9
+
+
+def test_the_gap_is_told_as_far_as_convexity_confines_it_with_uncertain_ends(page, findings):
+    edges = findings.edges
+    said = next(words for words in page.texts["p"] if "convexity alone" in words)
+    shown = re.findall(r"up to (\S+)\u00a0(µm|mm) wide", said)
+    certificate, band = (float(value) * {"µm": 1e-6, "mm": 1e-3}[unit] for value, unit in shown)
+    assert certificate == pytest.approx(float((edges["triangle_upper"] - edges["triangle_lower"]).max()), rel=0.05)
+    assert band == pytest.approx(float(edges["band_width"]), rel=0.05)
+    assert band < certificate
+
+
+@pytest.mark.parametrize("score", [-7.0, -5.9, -4.0, 4.0, 5.9, 7.0])
+def test_the_force_along_the_rod_is_judged_as_by_reconstruct(findings, score):
+    contacts = findings.contacts.assign_attrs(axial_score=score)
+    said = contacts_words(dataclasses.replace(findings, contacts=contacts))[-1]
+    elsewhere = " ".join(reconstruction_in_words(contacts))
+    for words in ("agrees with the moment", "too small", "too large", "as friction makes it", "check the zero"):
+        assert (words in said) == (words in elsewhere)
+    assert "the friction that was stated" in said
+    tree = findings.posterior.copy()
+    tree.attrs["nuisances"] = '["friction"]'
+    found = dataclasses.replace(findings, contacts=contacts, posterior=tree)
+    assert "the friction that was found" in contacts_words(found)[-1]
 
 
 def test_the_verdicts_come_first_and_say_whether_to_trust(page, folder, text):
@@ -279,28 +320,73 @@ def test_the_rig_of_the_likeliest_draw_moves_it(posterior):
         "base_2_x": 0.002,
         "moment_bias": 1e-4,
     }
+    tree = with_rig(posterior, rig)
+    motion, record = motion_of(tree), record_of(tree)
+    expected = predicted(tree, rig)[motion.samples]
+    largest = np.abs(expected).max(axis=0)
+    np.testing.assert_allclose(motion.loads / largest, expected / largest, atol=1e-5)
+    driven = record["drive_angle"].values[motion.samples] - rig["drive_angle_offset"]
+    turned = motion.drive_angle + rig["suspension_compliance"] * motion.loads[:, 0]
+    np.testing.assert_allclose(turned, driven, atol=1e-9)
+    np.testing.assert_allclose(motion.cell_angle, driven, atol=1e-9)
+    np.testing.assert_allclose(motion.rod_x[:, 0], np.where(motion.sweep == 1, 0.052, 0.0))
+    np.testing.assert_allclose(motion.pivots, [[0.0, 0.0], [0.052, 0.0]])
+
+
+def test_loads_are_shown_along_the_axes_of_a_cell_that_turns_with_the_drive(findings):
+    """The suspension gives way beyond the cell, so that the cell is not turned with the rod."""
+    rig = {"suspension_compliance": 3.0, "drive_angle_offset": 0.01}
+    tree = with_rig(findings.posterior, rig, load_cell_frame="turning")
+    turning, motion = dataclasses.replace(findings, posterior=tree, record=record_of(tree)), motion_of(tree)
+    expected = predicted(tree, rig)[motion.samples]
+    figure = readings_figure(turning, motion)
+    for k, name in enumerate(CHANNELS):
+        shown = [number(rows[2]) for rows in figure.data["said"][name]]
+        wanted = expected[:, k] * 10.0 ** -figure.shown[name].power
+        rounding, interpolation = 5e-4, 1e-5 * np.abs(wanted).max()
+        np.testing.assert_allclose(shown, wanted, rtol=rounding, atol=interpolation)
+    assert np.abs(motion.cell_angle - motion.drive_angle).max() > 0.05
+
+
+def test_pivots_are_marked_where_they_were_found(findings):
+    tree = with_rig(findings.posterior, {"base_2_x": 0.02})
+    shifted, motion = dataclasses.replace(findings, posterior=tree, record=record_of(tree)), motion_of(tree)
+    moving, overview = readings_figure(shifted, motion), contour_figure(shifted)
+    ends_of_rods = np.array(moving.data["rod"])[:, :2]
+    assert marked(moving.rods) == sorted(set(map(tuple, ends_of_rods.tolist())))
+    per_metre = np.ptp(overview.band["mapX"]) / np.ptp(findings.band["x"].values)
+    apart = np.diff(marked(overview.map), axis=0)
+    np.testing.assert_allclose(apart, [[0.07 * per_metre, 0.0]], atol=0.5)  # of the drawing's tenths
+
+
+def marked(drawing):
+    """Places of pivots in a drawing, from left to right."""
+    found = [attrs for attrs in Page(drawing).all("circle") if attrs["class"] == "pivot"]
+    return sorted((float(attrs["cx"]), float(attrs["cy"])) for attrs in found)
+
+
+def with_rig(posterior, rig, **attrs):
+    """The posterior as if every draw had this rig; its second sweep has a pivot of its own."""
     draws = posterior_draws(posterior)
     draws = draws.assign({name: xr.full_like(draws["q"], value) for name, value in rig.items()})
     columns = posterior["constant_data"].to_dataset()
     columns["base_x"] = columns["base_x"].copy(data=np.where(columns["sweep"] == 1, 0.05, 0.0))
     groups = {name: group.to_dataset() for name, group in posterior.children.items()}
     tree = xr.DataTree.from_dict({**groups, "posterior": draws, "constant_data": columns})
-    tree.attrs = posterior.attrs | {"nuisances": json.dumps(list(rig))}
+    tree.attrs = posterior.attrs | {"nuisances": json.dumps(list(rig))} | attrs
+    return tree
 
-    motion, record = motion_of(tree), record_of(tree)
-    best = draws.isel(posterior["sample_stats"]["lp"].argmax(("chain", "draw")))
+
+def predicted(tree, rig):
+    """Loads of the likeliest draw by which the likelihood judges the record, shape (samples, 3)."""
+    record = record_of(tree)
+    best = posterior_draws(tree).isel(tree["sample_stats"]["lp"].argmax(("chain", "draw")))
     cell, rod = LoadCell.from_record(record), rod_of(record)
     nuisances = nuisances_of(record, list(rig), {}, cell, 0.0)
     values = {name: np.array([value]) for name, value in rig.items()}
     likelihood = RecordLikelihood(record, cell, order=FINE_ORDER)
-    predicted, _ = likelihood.predict(contours_of(best, "parabola"), nuisances.rig(values))
-    expected = predicted[0][motion.samples] * [rod.moment_unit, rod.force_unit, rod.force_unit]
-    largest = np.abs(expected).max(axis=0)
-    np.testing.assert_allclose(motion.loads / largest, expected / largest, atol=1e-5)
-    driven = record["drive_angle"].values[motion.samples] - rig["drive_angle_offset"]
-    turned = motion.drive_angle + rig["suspension_compliance"] * motion.loads[:, 0]
-    np.testing.assert_allclose(turned, driven, atol=1e-9)
-    np.testing.assert_allclose(motion.rod_x[:, 0], np.where(motion.sweep == 1, 0.052, 0.0))
+    loads, _ = likelihood.predict(contours_of(best, "parabola"), nuisances.rig(values))
+    return loads[0] * [rod.moment_unit, rod.force_unit, rod.force_unit]
 
 
 def test_of_a_long_record_some_samples_are_shown_of_every_sweep(posterior):
@@ -376,6 +462,15 @@ def test_probabilities_of_shapes_are_told_where_there_are_some(folder, posterior
         ["circle", "–", "–", "–", "not sampled"],
     ]
     assert [float(attrs["value"]) for attrs in page.all("meter")] == [0.9, 0.1, 0.0]
+
+
+def test_a_comparison_that_does_not_state_its_record_is_left_out_unless_it_is_asked_for(folder, tmp_path):
+    unstated = comparison()
+    del unstated.attrs["data_sha256"]
+    unstated.to_netcdf(tmp_path / "comparison.nc", engine="h5netcdf")
+    refused(folder, r"comparison\.nc does not state which record it is of: compare again", compare=tmp_path)
+    (tmp_path / "posterior.nc").write_bytes((folder / "posterior.nc").read_bytes())
+    assert findings_of(tmp_path).comparison is None
 
 
 # --- Escaping -----------------------------------------------------------------------------------------------------
@@ -460,3 +555,52 @@ def test_a_posterior_that_states_little_is_reported_all_the_same(posterior, tmp_
     assert dict(page.table("Software")[1:])["tactile-bayes"] == tb.__version__
     assert page.texts["h1"] == [f"The contour of the run {tmp_path.name}"]
     assert "95\u00a0% from" in page.table("Estimates are medians")[0]
+
+
+# --- Parts --------------------------------------------------------------------------------------------------------
+
+
+def areas(x, lower, upper):
+    plot = Plot(Scale(0.0, 1.0, 0.0, 1.0), Scale(0.0, 1.0, 0.0, 1.0), "x", "y")
+    plot.area(x, lower, upper, "band")
+    return Page(plot.content[0]).all("path")[0]["d"]
+
+
+def test_a_band_is_drawn_in_pieces_where_both_edges_are_known():
+    nan = np.nan
+    assert areas([0, 1, 2], [1, 1, 1], [2, 2, 2]) == "M0 1L1 1L2 1L2 2L1 2L0 2Z"
+    assert areas([0, 1, 2, 3], [1, 1, 1, nan], [2, 2, 2, nan]) == "M0 1L1 1L2 1L2 2L1 2L0 2Z"
+    assert areas([0, 1, 2, 3, 4], [1, 1, nan, 1, 1], [2, 2, 2, 2, 2]) == "M0 1L1 1L1 2L0 2ZM3 1L4 1L4 2L3 2Z"
+    assert areas([0, 1, 2], [1, 1, 1], [nan, 2, 2]) == "M1 1L2 1L2 2L1 2Z"
+    assert areas([0, 1], [nan, nan], [2, 2]) == areas([], [], []) == ""
+
+
+MODULES = [
+    importlib.import_module(f"tactile_bayes.report.{module.name}")
+    for module in pkgutil.iter_modules(importlib.import_module("tactile_bayes.report").__path__)
+]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_every_public_name_says_what_it_is(module):
+    here = {n: v for n, v in vars(module).items() if getattr(v, "__module__", None) == module.__name__}
+    for name, value in here.items():
+        own = vars(value).items() if inspect.isclass(value) else ()
+        methods = {f"{name}.{n}": v for n, v in own if isinstance(v, property | classmethod) or inspect.isfunction(v)}
+        for called, described in ({name: value} | methods).items():
+            assert called.rpartition(".")[2].startswith("_") or inspect.getdoc(described), called
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_imports_go_down_and_to_what_the_package_depends_on(module):
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {re.match(r"[\w-]+", words)[0] for words in project["dependencies"]}
+    imported = set()
+    for node in ast.walk(ast.parse(inspect.getsource(module))):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module)
+    assert imported.isdisjoint({"tactile_bayes", "tactile_bayes.cli"})
+    others = {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names) - {"tactile_bayes"}
+    assert others <= declared

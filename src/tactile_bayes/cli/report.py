@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from tactile_bayes.cli.answer import Json, print_json
 from tactile_bayes.cli.record_options import Quiet
 
 __all__ = ["report"]
@@ -22,7 +23,7 @@ def report(
         typer.Option(help="Folder of a run of compare on the same record; the run's own if left out.", file_okay=False),
     ] = None,
     quiet: Quiet = False,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object in place of sentences.")] = False,
+    json: Json = False,
 ) -> None:
     """Write a page on a run: what was found, whether it can be trusted, what was measured, how to make it again."""
     from tactile_bayes.report import write_report
@@ -30,9 +31,7 @@ def report(
     path = write_report(run, out, compare=compare)
     size = path.stat().st_size
     if json:
-        from json import dumps
-
-        typer.echo(dumps({"report": str(path), "bytes": size}, ensure_ascii=False, indent=2))
+        print_json({"report": path, "bytes": size})
     elif quiet:
         typer.echo(str(path))
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -122,16 +123,13 @@ def _plain(value: Any) -> str:
 
 def versions_table(findings: Findings) -> Table:
     """Software of the inference and of this report."""
-    from tactile_bayes import __version__
-
     attrs = findings.posterior.attrs
     stated = json.loads(attrs.get("versions", "{}"))
-    rows = [[name, version] for name, version in stated.items()]
+    rows = [[name, of_name] for name, of_name in stated.items()]
     if not rows:
         rows = [["tactile-bayes", str(attrs.get("inference_library_version", "not stated"))]]
-    return Table(
-        "Software of the inference", ["name", "version"], [*rows, ["this report: tactile-bayes", __version__]], 2
-    )
+    rows.append(["this report: tactile-bayes", version("tactile-bayes")])
+    return Table("Software of the inference", ["name", "version"], rows, 2)
 
 
 def hashes_table(findings: Findings) -> Table:

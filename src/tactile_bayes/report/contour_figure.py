@@ -9,6 +9,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
@@ -48,7 +49,7 @@ def contour_figure(findings: Findings) -> ContourFigure:
     """Draw what was found of the contour."""
     band, attrs = findings.band, findings.band["lower"].attrs
     x, lower, median, upper = (band[name].values for name in ("x", "lower", "median", "upper"))
-    bases = np.array(bases_of(findings.record))
+    bases = np.array(bases_of(found_rig(findings.record, None, findings.posterior).record))  # as contacts have them
     unit = shown_as("contact_x", attrs, np.concatenate([x, bases.ravel()]))
     ends = gap_ends(findings)
 

@@ -71,6 +71,7 @@ class Scale:
         return np.asarray(self.start + share * (self.end - self.start))
 
     def at(self, value: float) -> float:
+        """The place of one value, to a tenth of the drawing's unit."""
         return round(float(self(value)), 1)
 
     def ticks(self, power: int = 0, most: int = 6) -> list[float]:
@@ -139,15 +140,24 @@ class Plot:
         return cls(across, Scale(low, high, height - _BOTTOM, _TOP), *labels, *powers), height
 
     def put(self, *content: Markup) -> None:
+        """Put elements over all that is there."""
         self.content.extend(content)
 
     def path(self, x: ArrayLike, y: ArrayLike, class_: str) -> None:
+        """A line through points, interrupted where they are no numbers."""
         self.put(element("path", d=outline_path(self.x(x), self.y(y)), class_=class_))
 
     def area(self, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, class_: str) -> None:
-        across = self.x(np.concatenate([np.asarray(x), np.asarray(x)[::-1]]))
-        edge = self.y(np.concatenate([np.asarray(lower), np.asarray(upper)[::-1]]))
-        self.put(element("path", d=outline_path(across, edge) + "Z", class_=class_))
+        """What lies between two edges, in a piece for each run of points at which both are numbers."""
+        across, low, high = self.x(x), self.y(lower), self.y(upper)
+        known = np.isfinite(across) & np.isfinite(low) & np.isfinite(high)
+        pieces = np.split(np.arange(known.size), np.flatnonzero(np.diff(known)) + 1)
+        outlines = [
+            outline_path(np.r_[across[run], across[run][::-1]], np.r_[low[run], high[run][::-1]]) + "Z"
+            for run in pieces
+            if run.size and known[run[0]]
+        ]
+        self.put(element("path", d="".join(outlines), class_=class_))
 
     def stretch(self, low: float, high: float, class_: str) -> None:
         """A stretch in x, from bottom to top."""

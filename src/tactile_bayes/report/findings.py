@@ -89,7 +89,7 @@ def findings_of(run: Path, compare: Path | None = None) -> Findings:
     run : Path
         Folder that `tactile_bayes.run.analyse` has written.
     compare : Path, optional
-        Folder of a comparison of families; by default `run`, if there is one in it.
+        Folder of a comparison of families; by default `run`, if there is one in it that states its record.
 
     Raises
     ------
@@ -178,7 +178,13 @@ def _comparison_in(run: Path, compare: Path | None, data_sha256: str) -> xr.Data
         raise InferenceError(f"{path} cannot be read, it is damaged or cut short: compare again ({error})") from error
     if "family" not in found.dims or not {*_COMPARISON} <= set(found.data_vars) or "verdict" not in found.attrs:
         raise InferenceError(f"{path} is no comparison of shapes: {remedy}")
-    if found.attrs.get("data_sha256") != data_sha256:
+    if "data_sha256" not in found.attrs:
+        if compare is None:
+            return None
+        raise InferenceError(
+            f"{path} does not state which record it is of: compare again, the record of the run with the same options"
+        )
+    if found.attrs["data_sha256"] != data_sha256:
         raise InferenceError(
             f"{path} is of another record, or of another rod, than the run: compare the record of the run, with the "
             "same options"

@@ -50,8 +50,13 @@ class Motion:
         "tip", "tangential", "none".
     drive_angle : ndarray, shape (n,)
         Slope of the rod at the pivot [rad].
+    cell_angle : ndarray, shape (n,)
+        Drive angle as read, without the encoder's offset [rad]: by it a load cell is turned that turns with the drive.
+        A suspension that gives way lies between it and the rod.
     loads : ndarray, shape (n, 3)
         Holding moment and support reaction, along the axes of the world, free of noise and of the cell's errors.
+    pivots : ndarray, shape (pivots, 2)
+        Where that draw has them.
     every : int
         One of how many samples is shown.
     """
@@ -65,7 +70,9 @@ class Motion:
     contact_y: Floats
     phase: NDArray[np.str_]
     drive_angle: Floats
+    cell_angle: Floats
     loads: Floats
+    pivots: Floats
     every: int
 
 
@@ -127,6 +134,8 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
         contact_y=np.where(loaded, world["contact_y"], np.nan),
         phase=world["contact_phase"],
         drive_angle=np.where(mirrored, np.pi - slope, slope),
+        cell_angle=angle,
         loads=np.where(loaded[:, None], loads, 0.0),
+        pivots=np.unique(np.stack([paths.seen.base_x, paths.seen.base_y], axis=-1), axis=0),
         every=every,
     )

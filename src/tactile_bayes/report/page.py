@@ -123,12 +123,13 @@ def _gap_words(findings: Findings) -> list[str]:
             + f" ({share} from {low} to {high} {unit.name}".rstrip()
             + ")."
         ]
-        certificate, band = float(edges["triangle_width"].sel(bound="median")), float(edges["band_width"])
+        certificate = float(np.max(edges["triangle_upper"].values - edges["triangle_lower"].values))
+        band = float(edges["band_width"])
         if np.isfinite(certificate) and np.isfinite(band):
             fine = shown_as("contact_x", width.attrs, [certificate])
             said.append(
-                "Convexity alone confines the contour there to a triangle "
-                f"{fine.full(certificate, 2)} wide in y; the band is {fine.full(band, 2)} wide."
+                f"With its ends as uncertain as they are, convexity alone confines the contour there, with {share}, to "
+                f"a strip up to {fine.full(certificate, 2)} wide in y; the band is up to {fine.full(band, 2)} wide."
             )
     status = str(edges["status"].values)
     if status != "ok" and float(edges["share_open"]) > 0.0:

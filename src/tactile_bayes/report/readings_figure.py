@@ -137,23 +137,21 @@ def _in_frame(findings: Findings, motion: Motion) -> Floats:
     if frame_of(findings.record) == "fixed":
         return motion.loads
     moment, force_x, force_y = motion.loads.T
-    return np.stack([moment, *turned(force_x, force_y, motion.drive_angle)], axis=-1)
+    return np.stack([moment, *turned(force_x, force_y, motion.cell_angle)], axis=-1)
 
 
 def _rods(findings: Findings, motion: Motion, first: int) -> tuple[Markup, dict[str, Any]]:
     """The map of the rod in one frame, and what moves it, in the drawing's own units."""
-    bases = np.array(bases_of(findings.record))
     attrs = findings.record["base_x"].attrs
     x, y = motion.rod_x, motion.rod_y
     unit = shown_as("contact_x", attrs, np.concatenate([x.ravel(), y.ravel()]))
     labels = f"x{unit.bracketed}", f"y{unit.bracketed}"
-    span = np.concatenate([x.ravel(), bases[:, 0]]), np.concatenate([y.ravel(), bases[:, 1]])
-    plot, height = Plot.map_of(*span, labels, (unit.power, unit.power))
+    plot, height = Plot.map_of(x.ravel(), y.ravel(), labels, (unit.power, unit.power))
     along, up = outline(motion.contour, plot.x.low, plot.x.high)
     up = np.minimum(up, plot.y.high + 1.0 * (plot.y.high - plot.y.low))
     plot.area(along, up, np.full_like(up, plot.y.high + 2.0 * (plot.y.high - plot.y.low)), "object")
     plot.path(along, up, "object-edge")
-    for place in bases:
+    for place in motion.pivots:
         plot.put(element("circle", cx=plot.x.at(place[0]), cy=plot.y.at(place[1]), r=5, class_="pivot"))
 
     rod_x, rod_y = np.round(plot.x(x), 1), np.round(plot.y(y), 1)

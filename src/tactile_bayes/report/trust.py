@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 
 import numpy as np
@@ -14,6 +15,9 @@ from tactile_bayes.report.wording import chance, fixed, percent, shown_as
 from tactile_bayes.uncertainty.record_check import DISCREPANCIES
 
 __all__ = ["check_table", "check_words", "contacts_words", "convergence"]
+
+_OFF = 6.0
+"""Standard errors beyond which the force along the rod is told not to agree with the moment, as `reconstruct` does."""
 
 
 def convergence(findings: Findings) -> list[str]:
@@ -97,13 +101,17 @@ def contacts_words(findings: Findings) -> list[str]:
             f"over {int(attrs['misfit_samples'])} samples, which noise explains with probability {chance(probability)}."
         )
     if np.isfinite(score):
-        usual = (
-            "as it should be"
-            if abs(score) < 3.0
-            else ("too small, as friction makes it" if score < 0.0 else "too large: rod, frame or zero may be wrong")
-        )
+        known = "found" if "friction" in json.loads(findings.posterior.attrs["nuisances"]) else "stated"
         said.append(
-            "In tangential contact D = fAx cos φ₀ + fAy sin φ₀ − m₀²/2 is zero, but for the friction that is stated: "
-            f"its mean is off that by {fixed(score, '+.2f')} standard errors, {usual}."
+            "In tangential contact D = fAx cos φ₀ + fAy sin φ₀ − m₀²/2 is zero, but for the friction that was "
+            f"{known}: its mean is off that by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."
         )
     return said
+
+
+def _agreement(score: float) -> str:
+    if score < -_OFF:
+        return "too small, as friction makes it"
+    if score > _OFF:
+        return "too large: check the zero of the drive angle, the axes of the forces, and the rod"
+    return "so that the force along the rod agrees with the moment"

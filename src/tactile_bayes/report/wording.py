@@ -35,6 +35,7 @@ class Shown(NamedTuple):
 
     @property
     def bracketed(self) -> str:
+        """The unit as it stands behind a label; nothing where there is none."""
         return f" [{self.name}]" if self.name else ""
 
 
@@ -92,4 +93,11 @@ def chance(value: float) -> str:
 
 
 def percent(value: float) -> str:
+    """A share in per cent, with all the figures it has, but rounding.
+
+    Examples
+    --------
+    >>> percent(0.95)
+    '95\\xa0%'
+    """
     return f"{100.0 * value:.6g}\u00a0%"

@@ -38,7 +38,7 @@ def write_report(
         Where to; by default report.html in that folder. A file that is there is replaced.
     compare : path-like, optional
         Folder of `tactile-bayes compare` for the same record, whose probabilities of shapes the report then states; by
-        default `run`, if it holds a comparison.
+        default `run`, if it holds a comparison that states its record.
 
     Returns
     -------
