@@ -41,7 +41,7 @@ def measured():
 @pytest.fixture(scope="session")
 def analysed(measured, tmp_path_factory):
     """That record, analysed: the run and its folder."""
-    from tactile_bayes.run import analyse
+    from tactile_bayes.runs.contour import analyse
 
     folder = tmp_path_factory.mktemp("analysed") / "made" / "on the way"
     return analyse(measured, folder, nuisances=[], settings=QUICK, truth=CONTOUR), folder

@@ -12,9 +12,9 @@ import pytest
 import xarray as xr
 
 from helpers.comparisons import NAMES, made_up
-from tactile_bayes import comparison_run
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.record import write_record
+from tactile_bayes.runs import comparison as comparison_run
 from test_cli import assert_misused, assert_refused, call
 
 FILES = {"comparison.nc", "comparison.csv", "families.png"}

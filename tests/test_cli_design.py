@@ -75,7 +75,7 @@ def test_an_interrupt_says_what_the_same_command_does(tmp_path, monkeypatch, nes
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tactile_bayes.design_run.design_into", interrupted)
+    monkeypatch.setattr("tactile_bayes.runs.design.design_into", interrupted)
     result = run("--out", tmp_path, *nested)
     assert result.exit_code == 130
     assert result.stderr == f"tactile-bayes: interrupted, {told.format(tmp_path)}\n"

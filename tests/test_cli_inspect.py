@@ -263,7 +263,7 @@ def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured
         asked.append((measured, out, options))
         raise tb.errors.InferenceError("that is enough")
 
-    monkeypatch.setattr("tactile_bayes.run.analyse", analyse)
+    monkeypatch.setattr("tactile_bayes.runs.contour.analyse", analyse)
     last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
     words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
     assert_refused(call(*words), "that is enough")

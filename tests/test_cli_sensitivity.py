@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 
 import tactile_bayes as tb
 import tactile_bayes.planning.error_map as error_map_module
-from tactile_bayes import sensitivity_run
 from tactile_bayes.cli.app import app
 from tactile_bayes.contours import Joined, Parabola
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.error_cell import CellOutcome
+from tactile_bayes.runs import sensitivity as sensitivity_run
 
 QUICK = ("--samples", "8", "--drive-step", "6", "-q")
 STUDY = ("--study", "--noise-factor", "0.3", "--noise-factor", "1", "--replicates", "1", "--workers", "1")

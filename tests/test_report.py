@@ -44,7 +44,6 @@ from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, read_result, record_of, write_result
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction_run import reconstruction_in_words
 from tactile_bayes.record import CHANNELS, record_hash, rod_of
 from tactile_bayes.report import write_report
 from tactile_bayes.report.contour_figure import contour_figure
@@ -54,7 +53,8 @@ from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import hindrances
 from tactile_bayes.report.trust import contacts_words
-from tactile_bayes.run import summary
+from tactile_bayes.runs.contour import summary
+from tactile_bayes.runs.reconstruction import reconstruction_in_words
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ from tactile_bayes.cli.sampling_bar import sampling_bar
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tactile_bayes.run import Run
+    from tactile_bayes.runs.contour import Run
 
 __all__ = ["demo", "infer"]
 
@@ -79,7 +79,7 @@ def infer(
 ) -> None:
     """Infer the contour from a measured record: contact points, posterior, band and figures."""
     from tactile_bayes.inference.ensembles import SamplerSettings
-    from tactile_bayes.run import analyse
+    from tactile_bayes.runs.contour import analyse
 
     measured, cell, nuisances = read_measurement(
         record,
@@ -124,7 +124,7 @@ def demo(
     """A steel wire sweeps along a parabola; its noisy record is turned into a contour with a band."""
     from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
     from tactile_bayes.record import read_record
-    from tactile_bayes.run import analyse
+    from tactile_bayes.runs.contour import analyse
 
     path = measure_demo(out, seed=seed)
     if not (quiet or json):
@@ -164,7 +164,7 @@ def _tell(
 
 
 def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None) -> dict[str, Any]:
-    from tactile_bayes.run import summary
+    from tactile_bayes.runs.contour import summary
 
     attrs = run.posterior.attrs
     probability = run.band.attrs["probability"]
@@ -193,7 +193,7 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
     from rich.console import Console
     from rich.table import Table
 
-    from tactile_bayes.run import summary
+    from tactile_bayes.runs.contour import summary
 
     numbers = summary(run.posterior, run.band.attrs["probability"])
     share = f"{run.band.attrs['probability']:.0%}"

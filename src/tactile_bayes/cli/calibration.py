@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from tactile_bayes.calibration.world import World
-    from tactile_bayes.calibration_run import CalibrationRun
     from tactile_bayes.ledger import TaskProgress
+    from tactile_bayes.runs.calibration import CalibrationRun
 
 __all__ = ["calibrate"]
 
@@ -70,7 +70,7 @@ def calibrate(
     """
     import numpy as np
 
-    from tactile_bayes.calibration_run import calibrate_into
+    from tactile_bayes.runs.calibration import calibrate_into
 
     refuse_both(workers, scheduler)
     rod = rod_asked(length, flexural_rigidity, diameter)

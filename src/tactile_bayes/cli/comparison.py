@@ -31,8 +31,8 @@ from tactile_bayes.cli.sampling_bar import sampling_bar
 if TYPE_CHECKING:
     import xarray as xr
 
-    from tactile_bayes.comparison_run import ComparisonRun
     from tactile_bayes.inference.ensembles import Progress
+    from tactile_bayes.runs.comparison import ComparisonRun
 
 __all__ = ["compare"]
 
@@ -78,8 +78,8 @@ def compare(
     json: Json = False,
 ) -> None:
     """Compare shapes of contours: which of them a measured record is of, and whether any fits."""
-    from tactile_bayes.comparison_run import compare_into
     from tactile_bayes.inference.ensembles import SamplerSettings
+    from tactile_bayes.runs.comparison import compare_into
     from tactile_bayes.uncertainty.family_comparison import SHAPES
 
     measured, cell, nuisances = read_measurement(

@@ -85,8 +85,8 @@ def design(
     """Choose the next record: from which pivot, and in which steps, it makes the contour's band narrowest."""
     import numpy as np
 
-    from tactile_bayes.design_run import design_into
     from tactile_bayes.planning.design import ABOVE, ACROSS
+    from tactile_bayes.runs.design import design_into
 
     refuse_both(workers, scheduler)
     pivots = [numbers_asked(pivot, "--base", 2) for pivot in base] if base else None
@@ -149,7 +149,7 @@ def _posterior(run: Path) -> xr.DataTree:
 
 
 def _print_json(found: xr.Dataset, files: Any) -> None:
-    from tactile_bayes.design_run import design_in_words
+    from tactile_bayes.runs.design import design_in_words
 
     columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
     rows = [{name: float(found[name].values[k]) for name in columns} for k in range(found.sizes["candidate"])]

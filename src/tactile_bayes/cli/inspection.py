@@ -100,7 +100,7 @@ def inspect(
     contents = _contents(found, {name.strip(): origin.strip() for name, origin in origins.items()})
     files: Mapping[str, Path] = {}
     if out is not None:
-        from tactile_bayes.inspection_run import write_inspection
+        from tactile_bayes.runs.inspection import write_inspection
 
         files = write_inspection(found, out, text=["", *contents])
     if json:

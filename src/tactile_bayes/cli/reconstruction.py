@@ -26,7 +26,7 @@ from tactile_bayes.cli.record_options import (
 )
 
 if TYPE_CHECKING:
-    from tactile_bayes.reconstruction_run import ReconstructionRun
+    from tactile_bayes.runs.reconstruction import ReconstructionRun
 
 __all__ = ["reconstruct"]
 
@@ -66,7 +66,7 @@ def reconstruct(
 
     What noise is not stated is taken from the samples before first contact and after snap-off.
     """
-    from tactile_bayes.reconstruction_run import reconstruct_into, reconstruction_in_words
+    from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_in_words
 
     measured, cell, _ = read_measurement(
         record,

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tactile_bayes.ledger import TaskProgress
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.rod import Rod
-    from tactile_bayes.sensitivity_run import Material, SensitivityRun
+    from tactile_bayes.runs.sensitivity import Material, SensitivityRun
 
 __all__ = ["sensitivity"]
 
@@ -115,7 +115,7 @@ def sensitivity(
     from tactile_bayes.contours import paper_profile
     from tactile_bayes.planning.family_parameters import enlarged
     from tactile_bayes.rod import Rod
-    from tactile_bayes.sensitivity_run import sensitivity_into
+    from tactile_bayes.runs.sensitivity import sensitivity_into
 
     refuse_both(workers, scheduler)
     of_study = {
@@ -198,7 +198,7 @@ def _refuse_without_study(options: Mapping[str, object]) -> None:
 
 def _material(youngs_modulus: float | None, elastic_strain: float | None) -> Material | None:
     from tactile_bayes.errors import ParameterError
-    from tactile_bayes.sensitivity_run import Material
+    from tactile_bayes.runs.sensitivity import Material
 
     if youngs_modulus is None and elastic_strain is None:
         return None
@@ -251,7 +251,7 @@ def _tell(run: SensitivityRun, as_json: bool) -> None:
 
 
 def _words(run: SensitivityRun) -> list[str]:
-    from tactile_bayes.sensitivity_run import rod_in_words
+    from tactile_bayes.runs.sensitivity import rod_in_words
 
     return [*run.sensitivity.attrs["words"].splitlines(), *([] if run.rods is None else [rod_in_words(run.rods)])]
 

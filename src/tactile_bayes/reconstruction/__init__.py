@@ -2,6 +2,15 @@
 
 from tactile_bayes.reconstruction.estimate import STATUSES
 from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, contact_sides, loaded_samples, samples_of
-from tactile_bayes.reconstruction.step2 import reconstruct
+from tactile_bayes.reconstruction.step2 import AXIAL_ALARM, reconstruct
 
-__all__ = ["FALSE_ALARM", "STATUSES", "Samples", "contact_sides", "loaded_samples", "reconstruct", "samples_of"]
+__all__ = [
+    "AXIAL_ALARM",
+    "FALSE_ALARM",
+    "STATUSES",
+    "Samples",
+    "contact_sides",
+    "loaded_samples",
+    "reconstruct",
+    "samples_of",
+]

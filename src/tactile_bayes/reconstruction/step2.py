@@ -21,12 +21,14 @@ from tactile_bayes.record import COLUMNS, validate, with_rod
 from tactile_bayes.rod import Rod
 from tactile_bayes.touching import PLACE
 
-__all__ = ["reconstruct"]
+__all__ = ["AXIAL_ALARM", "reconstruct"]
 
 Floats = NDArray[np.float64]
 
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
+AXIAL_ALARM = 6.0
+"""Size of the axial score beyond which the force along the rod is told not to agree with the moment."""
 _CLEAR = 3.0
 """Standard deviations from the edge between the phases at which the misfit is χ² with one degree of freedom."""
 

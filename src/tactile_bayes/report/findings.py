@@ -13,7 +13,7 @@ from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.record import record_hash
-from tactile_bayes.run import contact_points, reach, summary
+from tactile_bayes.runs.contour import contact_points, reach, summary
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.gap import gap
 from tactile_bayes.uncertainty.predictive import predictive_interval
@@ -48,7 +48,7 @@ class Findings:
     edges : xr.Dataset or None
         The gap; None where there are sweeps in one direction only.
     numbers : xr.Dataset
-        Of the parameters, from `tactile_bayes.run.summary`.
+        Of the parameters, from `tactile_bayes.runs.contour.summary`.
     verdicts : tuple of str
     check : xr.Dataset or None
         Of the record; None where there are too few draws for one.
@@ -87,7 +87,7 @@ def findings_of(run: Path, compare: Path | None = None) -> Findings:
     Parameters
     ----------
     run : Path
-        Folder that `tactile_bayes.run.analyse` has written.
+        Folder that `tactile_bayes.runs.contour.analyse` has written.
     compare : Path, optional
         Folder of a comparison of families; by default `run`, if there is one in it that states its record.
 

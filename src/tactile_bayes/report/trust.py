@@ -7,6 +7,7 @@ from collections import Counter
 
 import numpy as np
 
+from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_words
@@ -15,9 +16,6 @@ from tactile_bayes.report.wording import chance, fixed, percent, shown_as
 from tactile_bayes.uncertainty.record_check import DISCREPANCIES
 
 __all__ = ["check_table", "check_words", "contacts_words", "convergence"]
-
-_OFF = 6.0
-"""Standard errors beyond which the force along the rod is told not to agree with the moment, as `reconstruct` does."""
 
 
 def convergence(findings: Findings) -> list[str]:
@@ -110,8 +108,8 @@ def contacts_words(findings: Findings) -> list[str]:
 
 
 def _agreement(score: float) -> str:
-    if score < -_OFF:
+    if score < -AXIAL_ALARM:
         return "too small, as friction makes it"
-    if score > _OFF:
+    if score > AXIAL_ALARM:
         return "too large: check the zero of the drive angle, the axes of the forces, and the rod"
     return "so that the force along the rod agrees with the moment"

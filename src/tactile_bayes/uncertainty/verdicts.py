@@ -15,6 +15,7 @@ from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
+from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.uncertainty.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.uncertainty.suspicions import suspicions
@@ -33,9 +34,6 @@ _OFF_ZERO = 5.0
 
 _CONTRADICTION = 1e-4
 """Probability of the misfit of single samples below which it is told."""
-
-_DRAGGING = 6.0
-"""Standard errors by which the force along the rod must be too small to speak of friction."""
 
 _FEWEST_PRIOR_DRAWS = 500
 
@@ -214,7 +212,7 @@ def _contradictions(record: xr.Dataset, contacts: xr.Dataset | None, noisier: fl
 
 def _dragging(axial_score: float) -> str:
     """What friction would do to the force along the rod."""
-    if not axial_score < -_DRAGGING:
+    if not axial_score < -AXIAL_ALARM:
         return ""
     return (
         f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "

@@ -17,7 +17,7 @@ from tactile_bayes.inference.result import read_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import to_dimensionless
-from tactile_bayes.run import analyse, summary
+from tactile_bayes.runs.contour import analyse, summary
 from tactile_bayes.scanning import scan
 
 FIGURES = ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs")

@@ -17,16 +17,13 @@ from numpy.typing import NDArray
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inspection import CellSource, known_cell
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
 from tactile_bayes.record import validate
 
 __all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_in_words"]
 
 _CONTRADICTION = 1e-4
 """Probability of the misfit below which it is told first."""
-
-_OFF = 6.0
-"""Standard errors beyond which the force along the rod is told not to agree with the moment."""
 
 
 @dataclass(frozen=True)
@@ -153,12 +150,12 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
         else:
             told.append(f"{words}, which noise explains with probability {chance:.2g}.")
         score = float(contacts.attrs["axial_score"])
-        if score < -_OFF:
+        if score < -AXIAL_ALARM:
             against.append(
                 f"In tangential contact the force along the rod is too small by {-score:.0f} standard errors, as "
                 "friction makes it: give --friction, or have infer find it (--nuisance friction)."
             )
-        elif score > _OFF:
+        elif score > AXIAL_ALARM:
             against.append(
                 f"In tangential contact the force along the rod is too large by {score:.0f} standard errors: check the "
                 "zero of the drive angle, the axes of the forces, and the rod."

@@ -1,0 +1,1 @@
+"""Runs: everything that a command makes, in one folder of files."""
