@@ -176,8 +176,12 @@ def test_a_rod_that_hardly_touches_is_no_answer():
     assert np.isnan(float(found.best_width))
 
 
-def test_no_rod_will_do():
-    found = required_rod(METAL, lengths=[0.2], diameters=[1e-3], youngs_modulus=206e9, elastic_strain=1e-5)
+def test_no_rod_will_do_and_progress_is_told_after_each():
+    told = []
+    found = required_rod(
+        METAL, lengths=[0.2], diameters=[1e-3], youngs_modulus=206e9, elastic_strain=1e-5, progress=told.append
+    )
+    assert [(step.done, step.wanted) for step in told] == [(1, 1)]
     assert found.status.values.tolist() == [["bent too far"]]
     assert np.isnan([found.best_length, found.best_diameter, found.best_width]).all()
 

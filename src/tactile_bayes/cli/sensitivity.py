@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -26,7 +25,7 @@ from tactile_bayes.cli.task_bar import counted, task_bar
 from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     import xarray as xr
 
@@ -115,7 +114,7 @@ def sensitivity(
     from tactile_bayes.contours import paper_profile
     from tactile_bayes.planning.family_parameters import enlarged
     from tactile_bayes.rod import Rod
-    from tactile_bayes.runs.sensitivity import sensitivity_into
+    from tactile_bayes.runs.sensitivity import sensitivity_into, steps_of
 
     refuse_both(workers, scheduler)
     of_study = {
@@ -141,17 +140,18 @@ def sensitivity(
         "nuisances": nuisances_asked(nuisance, as_stated),
         "seed": seed,
     }
+    material = _material(youngs_modulus, elastic_strain)
     analysis = {
         **common,
-        "material": _material(youngs_modulus, elastic_strain),
+        "material": material,
         "contour": enlarged(paper_profile(profile, q=distance), (rod or Rod()).length),
         "base": pivots,
         "band_widths": band_width or None,
         "samples": samples,
     }
     if not study:
-        with _waiting(quiet or json):
-            run = sensitivity_into(out, **analysis)
+        with task_bar(steps_of(material), "step", quiet or json) as show:
+            run = sensitivity_into(out, progress=show, **analysis)
         _tell(run, json)
         return
     profiles, distances = study_profile or [profile], study_distance or [distance]
@@ -219,19 +219,6 @@ def _load_cell(
     if not drive_angle_noise:
         return cell
     return replace(cell or usual_load_cell(rod or Rod()), drive_angle_noise=float(np.radians(drive_angle_noise)))
-
-
-@contextmanager
-def _waiting(is_silent: bool) -> Iterator[None]:
-    """Some seconds, of which nothing more can be told."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if is_silent or not console.is_terminal:
-        yield
-        return
-    with console.status("following errors through the reconstruction"):
-        yield
 
 
 def _tell(run: SensitivityRun, as_json: bool) -> None:

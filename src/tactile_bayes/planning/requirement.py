@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
+from tactile_bayes.ledger import TaskProgress
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
@@ -134,6 +136,7 @@ def required_rod(
     elastic_strain: float,
     where: Where = "everywhere",
     probability: float = 0.95,
+    progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.Dataset:
     """Which rod a load cell wants: the expected band of every length and diameter, and whether the rod bears it.
 
@@ -152,6 +155,8 @@ def required_rod(
         Bending strain that the material takes without staying bent: about 0.005 for spring steel, 0.05 for nitinol.
     where, probability
         As in `required_noise`.
+    progress : callable, optional
+        Is given a `TaskProgress` after each rod.
 
     Returns
     -------
@@ -179,25 +184,13 @@ def required_rod(
             raise ParameterError(f"{name}s are {values!r}: give a list of positive numbers [m]")
     shape = (sides["length"].size, sides["diameter"].size)
     width, strain = np.full(shape, np.nan), np.full(shape, np.nan)
-    status = np.full(shape, "does not reach", dtype="U16")
-    for i, length in enumerate(sides["length"]):
-        for j, diameter in enumerate(sides["diameter"]):
-            rod = Rod.circular(float(length), float(diameter), youngs_modulus, elastic_strain)
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", StrainWarning)
-                    tried = replace(plan, rod=rod)
-                    strain[i, j] = max(sweep.largest_strain for sweep in tried.scan.sweeps)
-                    width[i, j] = _Band(tried, x, probability).width(1.0)
-            except ReachError:
-                continue
-            except (ContourError, ParameterError):
-                status[i, j] = "cannot be swept"
-                continue
-            arcs = stretches(tried.scan)
-            seen = np.mean((x >= arcs[0].begin) & (x <= arcs[-1].end))
-            bears = strain[i, j] <= elastic_strain
-            status[i, j] = "bent too far" if not bears else "ok" if seen >= _SEEN else "touches little"
+    status = np.full(shape, "", dtype="U16")
+    began = time.monotonic()
+    for done, (i, j) in enumerate(np.ndindex(shape), start=1):
+        rod = Rod.circular(float(sides["length"][i]), float(sides["diameter"][j]), youngs_modulus, elastic_strain)
+        width[i, j], strain[i, j], status[i, j] = _judged(replace(plan, rod=rod), elastic_strain, x, probability)
+        if progress is not None:
+            progress(TaskProgress(done, width.size, done, time.monotonic() - began))
     usable = np.where(status == "ok", width, np.inf)
     best = np.unravel_index(int(np.argmin(usable)), shape)
     found = bool(np.isfinite(usable[best]))
@@ -214,6 +207,25 @@ def required_rod(
         coords={name: (name, values, metres) for name, values in sides.items()},
         attrs={"where": where, "probability": probability, "elastic_strain": elastic_strain},
     )
+
+
+def _judged(plan: Plan, elastic_strain: float, x: Floats, probability: float) -> tuple[float, float, str]:
+    """Width of the band and largest strain, NaN where there are none, and what speaks for or against a plan's rod."""
+    strain = math.nan
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StrainWarning)
+            strain = max(sweep.largest_strain for sweep in plan.scan.sweeps)
+            width = _Band(plan, x, probability).width(1.0)
+    except ReachError:
+        return math.nan, strain, "does not reach"
+    except (ContourError, ParameterError):
+        return math.nan, strain, "cannot be swept"
+    if strain > elastic_strain:
+        return width, strain, "bent too far"
+    arcs = stretches(plan.scan)
+    seen = np.mean((x >= arcs[0].begin) & (x <= arcs[-1].end))
+    return width, strain, "ok" if seen >= _SEEN else "touches little"
 
 
 def _places(plan: Plan, where: Where) -> Floats:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.ledger import TaskProgress
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.family_parameters import enlarged
@@ -48,6 +50,7 @@ def sensitivity(
     probability: float = 0.95,
     samples: int = 1024,
     parts: Sequence[str] = PARTS,
+    progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.DataTree:
     """What errors of the sensor do to contact points and to a contour, and how small they have to be.
 
@@ -72,6 +75,8 @@ def sensitivity(
         For Sobol' indices, a power of two.
     parts : sequence of str
         Which of the groups are made.
+    progress : callable, optional
+        Is given a `TaskProgress` after each part.
 
     Returns
     -------
@@ -123,16 +128,20 @@ def sensitivity(
         nuisances=tuple(nuisances) if not isinstance(nuisances, str) else nuisances,
         priors=dict(priors or {}),
     )
+    widths = band_widths if band_widths is not None else [width * taken.length for width in _WIDTHS]
+    made_by: dict[str, Callable[[], xr.Dataset]] = {
+        "amplification": lambda: amplification(plan),
+        "information": lambda: information(plan, probability=probability),
+        "noise_shares": lambda: noise_shares(plan, seed=seed, samples=samples),
+        "required_noise": lambda: required_noise(plan, widths, probability=probability),
+    }
+    chosen = [part for part in made_by if part in parts]
     groups: dict[str, xr.Dataset] = {}
-    if "amplification" in parts:
-        groups["amplification"] = amplification(plan)
-    if "information" in parts:
-        groups["information"] = information(plan, probability=probability)
-    if "noise_shares" in parts:
-        groups["noise_shares"] = noise_shares(plan, seed=seed, samples=samples)
-    if "required_noise" in parts:
-        widths = band_widths if band_widths is not None else [width * taken.length for width in _WIDTHS]
-        groups["required_noise"] = required_noise(plan, widths, probability=probability)
+    began = time.monotonic()
+    for done, part in enumerate(chosen, start=1):
+        groups[part] = made_by[part]()
+        if progress is not None:
+            progress(TaskProgress(done, len(chosen), done, time.monotonic() - began))
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = {
         "contour": repr(contour),

@@ -14,15 +14,16 @@ import xarray as xr
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.files import write_atomically
+from tactile_bayes.ledger import TaskProgress
 from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
-from tactile_bayes.planning.sensitivity import sensitivity
+from tactile_bayes.planning.sensitivity import PARTS, sensitivity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Material", "SensitivityRun", "rod_in_words", "sensitivity_into"]
+__all__ = ["Material", "SensitivityRun", "rod_in_words", "sensitivity_into", "steps_of"]
 
 
 _OF_PLAN = tuple(field.name for field in fields(Plan))
@@ -67,6 +68,7 @@ def sensitivity_into(
     *,
     material: Material | None = None,
     study: Mapping[str, Any] | None = None,
+    progress: Callable[[int], object] | None = None,
     **options: Any,
 ) -> SensitivityRun:
     """Analyse what errors of the sensor do, and write what comes out to a folder.
@@ -82,6 +84,8 @@ def sensitivity_into(
         Of which the rod that the load cell wants is sought, among lengths and diameters around its own.
     study : mapping, optional
         What `error_map` takes beside `out`: its answer is made as well, after the rest has been written.
+    progress : callable, optional
+        Is given the number of steps that are done, of `steps_of(material)`; a study has a progress of its own.
     options
         As `sensitivity` takes them.
 
@@ -107,7 +111,8 @@ def sensitivity_into(
     folder = Path(out)
     if material is not None and (options.get("rod") is None or options.get("load_cell") is None):
         raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
-    found = sensitivity(**options)
+    told = progress or (lambda done: None)
+    found = sensitivity(**options, progress=lambda part: told(part.done))
     folder.mkdir(parents=True, exist_ok=True)
     files = {"sensitivity": folder / "sensitivity.nc", "words": folder / "words.txt"}
     with write_atomically(files["sensitivity"]) as temporary:
@@ -119,7 +124,7 @@ def sensitivity_into(
         _write_figure(_DRAWN[part], found, files[part])
     rods = None
     if material is not None:
-        rods = _rods(material, options)
+        rods = _rods(material, options, lambda rod: told(len(PARTS) + rod.done))
         files |= {"rods": folder / "rods.nc", "required_rod": folder / "required_rod.png"}
         with write_atomically(files["rods"]) as temporary:
             rods.to_netcdf(temporary, engine="h5netcdf")
@@ -151,7 +156,12 @@ def rod_in_words(rods: xr.Dataset) -> str:
     )
 
 
-def _rods(material: Material, options: Mapping[str, Any]) -> xr.Dataset:
+def steps_of(material: Material | None) -> int:
+    """How many steps an analysis without a study takes."""
+    return len(PARTS) + (0 if material is None else _LENGTHS.size * _DIAMETERS.size)
+
+
+def _rods(material: Material, options: Mapping[str, Any], progress: Callable[[TaskProgress], object]) -> xr.Dataset:
     plan = Plan(**{name: value for name, value in options.items() if name in _OF_PLAN})
     rod = plan.taken_rod
     own = (64.0 * rod.flexural_rigidity / (np.pi * material.youngs_modulus)) ** 0.25
@@ -161,6 +171,7 @@ def _rods(material: Material, options: Mapping[str, Any]) -> xr.Dataset:
         diameters=(own * _DIAMETERS).tolist(),
         youngs_modulus=material.youngs_modulus,
         elastic_strain=material.elastic_strain,
+        progress=progress,
     )
 
 
