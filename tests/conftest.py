@@ -50,7 +50,7 @@ def analysed(measured, tmp_path_factory):
 @pytest.fixture
 def quick(monkeypatch):
     """Runs without figures and of few steps, whatever settings they are given."""
-    from tactile_bayes import run
+    from tactile_bayes.runs import contour as run
 
     infer = run.infer_contour
 

@@ -388,7 +388,7 @@ def test_time_that_is_left_is_that_of_draws_as_they_came(made, left):
 
 SAMPLING = """
 import functools
-from tactile_bayes import run
+from tactile_bayes.runs import contour as run
 from tactile_bayes.cli import main
 from tactile_bayes.inference import contour, ensembles
 

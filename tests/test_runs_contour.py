@@ -69,7 +69,7 @@ def test_the_summary_begins_with_the_verdicts(analysed):
 
 
 def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path, monkeypatch):
-    from tactile_bayes import run as module
+    from tactile_bayes.runs import contour as module
 
     def infer_nothing(*arguments, **options):
         raise InferenceError("no parabola was found.")
@@ -163,7 +163,7 @@ def test_units_do_not_matter(analysed, measured, tmp_path):
 
 
 def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
-    from tactile_bayes import run as module
+    from tactile_bayes.runs import contour as module
 
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
