@@ -270,23 +270,23 @@ def _numbers(run: SensitivityRun) -> dict[str, Any]:
         **{name: float(found.attrs[name]) for name in ("force_noise", "moment_noise")},
         "parameters": {
             str(name): {
-                "value": _finite(told.value.sel(parameter=name)),
-                "bound": _finite(told.bound.sel(parameter=name)),
-                "bound_with_priors": _finite(told.bound_with_priors.sel(parameter=name)),
+                "value": float(told.value.sel(parameter=name)),
+                "bound": float(told.bound.sel(parameter=name)),
+                "bound_with_priors": float(told.bound_with_priors.sel(parameter=name)),
                 "unit": str(told.unit.sel(parameter=name).item()),
             }
             for name in told.parameter.values
         },
-        "band": {name: _finite(told[f"{name}_width"]) for name in ("touched", "gap")}
+        "band": {name: float(told[f"{name}_width"]) for name in ("touched", "gap")}
         | {"probability": float(told.attrs["probability"])},
         "required_noise": [
-            {name: _finite(needed[name][i]) for name in ("band_width", "noise_factor", "force_noise", "moment_noise")}
+            {name: float(needed[name][i]) for name in ("band_width", "noise_factor", "force_noise", "moment_noise")}
             for i in range(needed.sizes["band_width"])
         ],
         "files": {what: str(path) for what, path in run.files.items()},
     }
     if run.rods is not None:
-        answer["rod"] = {name: _finite(run.rods[f"best_{name}"]) for name in ("length", "diameter", "width")}
+        answer["rod"] = {name: float(run.rods[f"best_{name}"]) for name in ("length", "diameter", "width")}
     if run.study is not None:
         answer["study"] = _cells(run.study)
     return answer
@@ -302,17 +302,10 @@ def _cells(study: xr.Dataset) -> list[dict[str, Any]]:
             "distance": float(distance),
             "noise_factor": float(factor),
             "message": str(cell.message.item()),
-            **{name: _finite(cell[name]) for name in names},
+            **{name: float(cell[name]) for name in names},
         }
         for contour in study.contour.values
         for distance in study.distance.values
         for factor in study.noise_factor.values
         for cell in [of_method.sel(contour=contour, distance=distance, noise_factor=factor)]
     ]
-
-
-def _finite(value: xr.DataArray) -> float | None:
-    import math
-
-    number = float(value)
-    return number if math.isfinite(number) else None

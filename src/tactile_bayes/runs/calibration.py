@@ -14,6 +14,7 @@ import xarray as xr
 from tactile_bayes.calibration.calibrate import calibrate
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.files import write_atomically
+from tactile_bayes.runs.picture import write_picture
 
 __all__ = ["CalibrationRun", "calibrate_into"]
 
@@ -82,6 +83,5 @@ def _draw(found: xr.Dataset, ranks: Path, coverage: Path) -> None:
             axes[ranks] = plotting.calibration_ranks(found)[0]
         for path, ax in axes.items():
             plt.sca(ax)
-            with write_atomically(path) as temporary:
-                plt.savefig(temporary, dpi=200, format="png")
+            write_picture(plt.gcf(), path)
             plt.close()

@@ -13,6 +13,7 @@ import xarray as xr
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.runs.picture import write_picture
 from tactile_bayes.uncertainty.family_comparison import compare_families
 from tactile_bayes.uncertainty.suspicions import suspicions
 
@@ -108,5 +109,4 @@ def _draw(comparison: xr.Dataset, path: Path) -> None:
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, panel_count(comparison), squeeze=False, sharey=True)
     plotting.families(comparison, axes=panels[0])
-    with write_atomically(path) as temporary:
-        figure.savefig(temporary, dpi=200, format="png")
+    write_picture(figure, path)

@@ -26,6 +26,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
+from tactile_bayes.runs.picture import write_picture
 from tactile_bayes.scanning import scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.gap import gap
@@ -267,8 +268,7 @@ def _draw(
     def save(name: str, figure: Any) -> None:
         files[name] = folder / f"{name.replace(' ', '_')}.png"
         FigureCanvasAgg(figure)
-        with write_atomically(files[name]) as temporary:
-            figure.savefig(temporary, dpi=200, format="png")
+        write_picture(figure, files[name])
 
     def panels(rows: int, columns: int, width: float, height: float, **options: Any) -> tuple[Any, Any]:
         figure = Figure(figsize=(width, height), layout="constrained")

@@ -13,6 +13,7 @@ import xarray as xr
 
 from tactile_bayes.files import write_atomically
 from tactile_bayes.planning.design import design
+from tactile_bayes.runs.picture import write_picture
 
 __all__ = ["DesignRun", "design_in_words", "design_into"]
 
@@ -118,6 +119,5 @@ def _draw(found: xr.Dataset, path: Path) -> None:
 
     with plt.ioff():
         plt.sca(plotting.design(found))
-        with write_atomically(path) as temporary:
-            plt.savefig(temporary, dpi=200, format="png")
+        write_picture(plt.gcf(), path)
         plt.close()

@@ -10,6 +10,7 @@ import numpy as np
 
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inspection import Inspection
+from tactile_bayes.runs.picture import write_picture
 
 __all__ = ["write_inspection"]
 
@@ -92,5 +93,4 @@ def _draw(inspection: Inspection, path: Path) -> None:
     figure = Figure(figsize=(7.0, 5.6), layout="constrained")
     FigureCanvasAgg(figure)
     plotting.inspection(inspection, axes=figure.subplots(3, 2, sharex="col", width_ratios=(2.2, 1.0)))
-    with write_atomically(path) as temporary:
-        figure.savefig(temporary, dpi=200, format="png")
+    write_picture(figure, path)

@@ -19,6 +19,7 @@ from tactile_bayes.inspection import CellSource, known_cell
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
 from tactile_bayes.record import validate
+from tactile_bayes.runs.picture import write_picture
 
 __all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_in_words"]
 
@@ -181,5 +182,4 @@ def _draw(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64]
     plotting.contour(
         [low, high] if high > low else [shown.min(), shown.max()], contacts=contacts, base=base, ax=figure.subplots()
     )
-    with write_atomically(path) as temporary:
-        figure.savefig(temporary, dpi=200, format="png")
+    write_picture(figure, path)

@@ -19,6 +19,7 @@ from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
+from tactile_bayes.runs.picture import write_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -180,8 +181,7 @@ def _write_figure(draw: Callable[[Any], Axes], found: xr.DataTree | xr.Dataset, 
 
     with plt.ioff():
         plt.sca(draw(found))
-        with write_atomically(path) as temporary:
-            plt.savefig(temporary, dpi=200, format="png")
+        write_picture(plt.gcf(), path)
         plt.close()
 
 
