@@ -273,6 +273,20 @@ def test_a_drive_that_loses_steps_and_a_sweep_that_is_cut(record):
     )
 
 
+def test_progress_counts_remedies_only_where_they_are_tried(coarse):
+    def told(record):
+        steps = []
+        tb.inspect_record(record, progress=lambda done, count: steps.append((done, count)))
+        return steps
+
+    assert told(coarse) == [(1, 3), (2, 3), (3, 3)]
+    tried = told(changed(coarse, force_x=-coarse.force_x))
+    assert tried[:2] == [(1, 3), (2, 3)]
+    assert [done for done, _ in tried] == list(range(1, len(tried) + 1))
+    assert {count for _, count in tried[2:]} == {3 + 10}
+    assert len(tried) == 3 + 10  # five exchanges and signs, a frame, four coefficients of friction
+
+
 def test_a_false_alarm_that_is_no_probability(record):
     with pytest.raises(ParameterError, match=r"false_alarm is 0\.7: give a probability between 0 and 0.5"):
         tb.inspect_record(record, false_alarm=0.7)

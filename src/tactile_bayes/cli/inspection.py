@@ -24,6 +24,7 @@ from tactile_bayes.cli.record_options import (
     SplitSweeps,
     read_measurement,
 )
+from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -66,23 +67,30 @@ def inspect(
 
     It takes the options of infer that say how a file is read; the last line is the command to go on with.
     """
-    from tactile_bayes.inspection import inspect_record
+    with step_bar(quiet or json) as show:
+        from tactile_bayes.inspection import inspect_record
 
-    measured, cell, _ = read_measurement(
-        record,
-        column=column,
-        split_sweeps=split_sweeps,
-        length=length,
-        flexural_rigidity=flexural_rigidity,
-        diameter=diameter,
-        force_noise=force_noise,
-        moment_noise=moment_noise,
-        missing=missing,
-        load_cell_frame=load_cell_frame,
-        nuisance=None,
-        as_stated=False,
-    )
-    found = inspect_record(measured, load_cell=cell, friction=friction)
+        measured, cell, _ = read_measurement(
+            record,
+            column=column,
+            split_sweeps=split_sweeps,
+            length=length,
+            flexural_rigidity=flexural_rigidity,
+            diameter=diameter,
+            force_noise=force_noise,
+            moment_noise=moment_noise,
+            missing=missing,
+            load_cell_frame=load_cell_frame,
+            nuisance=None,
+            as_stated=False,
+        )
+        found = inspect_record(measured, load_cell=cell, friction=friction, progress=show)
+        contents = _contents(found, column)
+        files: Mapping[str, Path] = {}
+        if out is not None:
+            from tactile_bayes.runs.inspection import write_inspection
+
+            files = write_inspection(found, out, text=["", *contents])
     taken = {
         **{f"--column {shlex.quote(origin)}": True for origin in column or []},
         "--split-sweeps": split_sweeps,
@@ -96,13 +104,6 @@ def inspect(
         "--friction": friction or None,
     }
     again = f"tactile-bayes infer {shlex.quote(str(record))}{_as_options(taken)} --out run/"
-    origins = dict(part.split("=", 1) for part in column or [])
-    contents = _contents(found, {name.strip(): origin.strip() for name, origin in origins.items()})
-    files: Mapping[str, Path] = {}
-    if out is not None:
-        from tactile_bayes.runs.inspection import write_inspection
-
-        files = write_inspection(found, out, text=["", *contents])
     if json:
         print_json(_numbers(found, again, files))
         return
@@ -123,11 +124,12 @@ def _as_options(given: Mapping[str, Any]) -> str:
     return "".join(f" {word}" for word in words)
 
 
-def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
-    """What is in the file, but for its sweeps and channels."""
+def _contents(found: Inspection, column: Sequence[str] | None) -> list[str]:
+    """What is in the file, but for its sweeps and channels; `column` is what the option says."""
     from tactile_bayes.inspection.words import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
+    origins = {name.strip(): origin.strip() for name, origin in (part.split("=", 1) for part in column or [])}
     record, rod = found.record, rod_of(found.record)
     sweeps = found.sweeps.sizes["sweep"]
     if record.attrs["units"] == "SI":

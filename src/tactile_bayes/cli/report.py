@@ -9,6 +9,7 @@ import typer
 
 from tactile_bayes.cli.answer import Json, print_json
 from tactile_bayes.cli.record_options import Quiet
+from tactile_bayes.cli.task_bar import step_bar
 
 __all__ = ["report"]
 
@@ -26,9 +27,10 @@ def report(
     json: Json = False,
 ) -> None:
     """Write a page on a run: what was found, whether it can be trusted, what was measured, how to make it again."""
-    from tactile_bayes.report import write_report
+    with step_bar(quiet or json) as show:
+        from tactile_bayes.report import write_report
 
-    path = write_report(run, out, compare=compare)
+        path = write_report(run, out, compare=compare, progress=show)
     size = path.stat().st_size
     if json:
         print_json({"report": path, "bytes": size})

@@ -1,4 +1,4 @@
-"""The bar that shows how many of many tasks are done, and how long the rest will take."""
+"""Bars that show how many of many tasks, or of a few steps, are done, and how long the rest will take."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-__all__ = ["counted", "task_bar"]
+__all__ = ["counted", "step_bar", "task_bar"]
 
 
 @contextmanager
@@ -36,6 +36,27 @@ def task_bar(total: int, noun: str, quiet: bool) -> Iterator[Callable[[int], obj
         def show(done: int) -> None:
             description = f"{done:,} of {counted(total, noun)}"
             bar.update(task, total=total, completed=done, description=description, left="left")
+
+        yield show
+
+
+@contextmanager
+def step_bar(quiet: bool) -> Iterator[Callable[[int, int], object]]:
+    """A bar that is told how many of how many steps are done, and that moves before the first of them is."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield lambda done, count: None
+        return
+    words = (TextColumn("{task.description}"), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
+    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
+        task = bar.add_task("beginning", total=None, left="")
+
+        def show(done: int, count: int) -> None:
+            description = f"{done} of {counted(count, 'step')}"
+            bar.update(task, total=count, completed=done, description=description, left="left")
 
         yield show
 

@@ -45,7 +45,14 @@ class Fit(NamedTuple):
     """What would make most of them fit, in words; "" if nothing that was tried does."""
 
 
-def fit_of(record: xr.Dataset, cell: LoadCell, *, most: float, friction: float = 0.0) -> Fit:
+def fit_of(
+    record: xr.Dataset,
+    cell: LoadCell,
+    *,
+    most: float,
+    friction: float = 0.0,
+    progress: Callable[[int, int], object] = lambda done, count: None,
+) -> Fit:
     """The share of samples that do not fit, and the remedy where there are more than `most`.
 
     Parameters
@@ -57,12 +64,15 @@ def fit_of(record: xr.Dataset, cell: LoadCell, *, most: float, friction: float =
     most : float
         Share above which remedies are tried: other signs, another frame, forces that are exchanged,
         friction.
+    progress : callable
+        Is given the number of remedies that were tried, and of how many.
     """
     status = _statuses(record, cell, friction)
     share, loaded = _unfit(status)
     if loaded < _FEWEST:
         return Fit(np.nan, loaded, "")
     if not share > most:
+        progress(0, 0)
         return Fit(share, loaded, "")
     loads = cell.corrected(record).isel(sample=status != "cut off")
     loads = loads.isel(sample=slice(None, None, max(1, loaded // _TRIED)))
@@ -71,13 +81,18 @@ def fit_of(record: xr.Dataset, cell: LoadCell, *, most: float, friction: float =
     def share_if(remedy: Callable[[xr.Dataset], xr.Dataset], friction: float) -> float:
         return _unfit(_statuses(_read_by(alone, remedy(loads)), alone, friction))[0]
 
-    part = share_if(lambda given: given, friction)
     frame = "turning" if frame_of(loads) == "fixed" else "fixed"
     others = [*_REMEDIES, (_FRAME_WORDS[frame], lambda given: given.assign_attrs(load_cell_frame=frame))]
-    tried = [(share_if(remedy, friction), words) for words, remedy in others]
+    remedies = [(words, remedy, friction) for words, remedy in others]
     for coefficient in _FRICTIONS:
         words = f"there were friction of about {coefficient:g} (have infer find it: --nuisance friction)"
-        tried.append((share_if(lambda given: given, coefficient), words))
+        remedies.append((words, _as_it_is, coefficient))
+    progress(0, len(remedies))
+    part = share_if(_as_it_is, friction)
+    tried = []
+    for words, remedy, coefficient in remedies:
+        tried.append((share_if(remedy, coefficient), words))
+        progress(len(tried), len(remedies))
     best, words = min(tried)
     return Fit(share, loaded, words if best <= _REMEDIED * part else "")
 
@@ -112,6 +127,10 @@ def _read_by(cell: LoadCell, loads: xr.Dataset) -> xr.Dataset:
     return loads.assign(
         {name: (loads[name].dims, read[:, index], loads[name].attrs) for index, name in enumerate(CHANNELS)}
     )
+
+
+def _as_it_is(record: xr.Dataset) -> xr.Dataset:
+    return record
 
 
 def _with_sign(*names: str) -> Callable[[xr.Dataset], xr.Dataset]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,9 @@ from tactile_bayes.record import CHANNELS, present_channels, validate
 from tactile_bayes.uncertainty.suspicions import suspicions
 
 __all__ = ["Inspection", "inspect_record"]
+
+_STEPS = 3
+"""Of an inspection: unloaded samples, Step 2, whether contacts fit. Each remedy that is tried is a further one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,12 @@ class Inspection:
 
 
 def inspect_record(
-    record: xr.Dataset, *, load_cell: LoadCell | None = None, friction: float = 0.0, false_alarm: float = 1e-3
+    record: xr.Dataset,
+    *,
+    load_cell: LoadCell | None = None,
+    friction: float = 0.0,
+    false_alarm: float = 1e-3,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Inspection:
     """What is in a record, and what looks wrong with it, before anything is inferred.
 
@@ -88,6 +96,9 @@ def inspect_record(
     false_alarm : float
         Level of every test: the probability that it speaks of a record in white normal noise with nothing wrong, for
         each sweep in `zero_load`, and for all channels and samples together in the others.
+    progress : callable, optional
+        Is given the number of steps that are done, and of how many; these become more where samples do not fit, as
+        what would mend it is tried.
 
     Returns
     -------
@@ -130,6 +141,7 @@ def inspect_record(
     if not 0.0 < false_alarm < 0.5:
         raise ParameterError(f"false_alarm is {false_alarm!r}: give a probability between 0 and 0.5, such as 1e-3")
     record = validate(record)
+    told = progress or (lambda done, count: None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # which is told in words
         found = zero_load(record, false_alarm=false_alarm)
@@ -138,15 +150,23 @@ def inspect_record(
     stretches = unloaded_stretches(sweeps, found["unloaded"].values)
     channels = channel_table(record, found, stretches, cell if source in ("given", "data sheet") else None)
     samples = sample_table(record, found, sweeps, stretches, cell, false_alarm=false_alarm)
+    told(1, _STEPS)
     statuses: dict[str, int] = {}
     fit = Fit(math.nan, 0, "")
     if len(present_channels(record)) == len(CHANNELS):
         status = reconstruct(record, method="raw", load_cell=cell, friction=friction).status.values
         samples["status"] = ("sample", status, {"long_name": "what becomes of it in raw Step 2"})
         statuses = dict(Counter(status.tolist()).most_common())
+        told(2, _STEPS)
         dead = any(np.ptp(record[name].values) == 0.0 for name in CHANNELS)
         if cell is not None and cell.has_variances and found["contact"].values.any() and not dead:
-            fit = fit_of(record, _with_zero(cell, found), most=UNFIT, friction=friction)
+            fit = fit_of(
+                record,
+                _with_zero(cell, found),
+                most=UNFIT,
+                friction=friction,
+                progress=lambda done, count: told(_STEPS + done, _STEPS + count),
+            )
     else:
         samples["status"] = ("sample", np.full(record.sizes["sample"], ""), {"long_name": "none: a channel is missing"})
     table = sweep_table(record, found, sweeps)

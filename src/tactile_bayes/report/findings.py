@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,10 @@ from tactile_bayes.uncertainty.predictive import predictive_interval
 from tactile_bayes.uncertainty.record_check import check_record
 from tactile_bayes.uncertainty.verdicts import verdicts
 
-__all__ = ["Findings", "findings_of"]
+__all__ = ["FINDING_STEPS", "Findings", "findings_of"]
+
+FINDING_STEPS = 4
+"""Of which `findings_of` tells: the posterior is read, the contacts and the check are there, and all the rest."""
 
 _GROUPS = ("posterior", "sample_stats", "posterior_predictive", "events", "observed_data", "constant_data", "prior")
 _SAID = ("family", "units", "friction", "nuisances", "priors", "settings", "seed", "message", "data_sha256")
@@ -78,7 +82,9 @@ class Findings:
     probability: float
 
 
-def findings_of(run: Path, compare: Path | None = None) -> Findings:
+def findings_of(
+    run: Path, compare: Path | None = None, progress: Callable[[int], object] = lambda done: None
+) -> Findings:
     """Read a run, and work out what a report states of it.
 
     All of it follows from posterior.nc, in which the record lies, too; the tables that `infer` writes beside it are
@@ -90,6 +96,8 @@ def findings_of(run: Path, compare: Path | None = None) -> Findings:
         Folder that `tactile_bayes.runs.contour.analyse` has written.
     compare : Path, optional
         Folder of a comparison of families; by default `run`, if there is one in it that states its record.
+    progress : callable
+        Is given the number of steps that are done, of `FINDING_STEPS`.
 
     Raises
     ------
@@ -102,16 +110,19 @@ def findings_of(run: Path, compare: Path | None = None) -> Findings:
     record = record_of(posterior)
     comparison = _comparison_in(run, compare, str(posterior.attrs["data_sha256"]))
     probability = float(posterior.attrs.get("probability", _USUAL))
+    progress(1)
     contacts = contact_points(record, None, posterior)
+    progress(2)
     try:
         check = check_record(posterior)
     except InferenceError:  # too few draws, which is among the verdicts
         check = None
+    progress(3)
     both = set(posterior["events"].stroke.values) == {"forward", "backward"}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # as the verdicts do
         zero = zero_load(record)
-    return Findings(
+    found = Findings(
         posterior=posterior,
         record=record,
         contacts=contacts,
@@ -127,6 +138,8 @@ def findings_of(run: Path, compare: Path | None = None) -> Findings:
         record_sha256=record_hash(record),
         probability=probability,
     )
+    progress(FINDING_STEPS)
+    return found
 
 
 def _posterior_in(run: Path) -> Path:

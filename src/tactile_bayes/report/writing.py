@@ -6,12 +6,13 @@ import base64
 import hashlib
 import json
 import os
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from tactile_bayes.files import write_atomically
-from tactile_bayes.report.findings import findings_of
+from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.page import page_of
 
 __all__ = ["write_report"]
@@ -24,6 +25,7 @@ def write_report(
     out: str | os.PathLike[str] | None = None,
     *,
     compare: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Path:
     """Write the report of a run: one HTML page that needs no network and nothing beside it.
 
@@ -39,6 +41,8 @@ def write_report(
     compare : path-like, optional
         Folder of `tactile-bayes compare` for the same record, whose probabilities of shapes the report then states; by
         default `run`, if it holds a comparison that states its record.
+    progress : callable, optional
+        Is given the number of steps that are done, and of how many.
 
     Returns
     -------
@@ -54,10 +58,14 @@ def write_report(
     """
     folder = Path(run)
     path = folder / "report.html" if out is None else Path(out)
-    findings = findings_of(folder, None if compare is None else Path(compare))
+    told = progress or (lambda done, count: None)
+    findings = findings_of(
+        folder, None if compare is None else Path(compare), lambda done: told(done, FINDING_STEPS + 1)
+    )
     text = _rendered(page_of(findings, folder.resolve().name))
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+    told(FINDING_STEPS + 1, FINDING_STEPS + 1)
     return path
 
 

@@ -1,0 +1,76 @@
+"""The bar of steps, as a terminal gets it."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import sys
+from contextlib import contextmanager, nullcontext, suppress
+
+from typer.testing import CliRunner
+
+from helpers.report_pages import analysed_quickly, coarse_record
+from tactile_bayes.cli.app import app
+from tactile_bayes.cli.task_bar import step_bar
+from tactile_bayes.record import write_record
+
+
+@contextmanager
+def terminal():
+    """A terminal for standard error; what it was sent is in the list once it is closed."""
+    ours, theirs = pty.openpty()
+    sent, before = [], sys.stderr
+    try:
+        with open(theirs, "w", encoding="utf-8") as sys.stderr:
+            yield sent
+            sys.stderr.flush()
+            os.set_blocking(ours, False)
+            with suppress(BlockingIOError):
+                while True:
+                    sent.append(os.read(ours, 65536).decode())
+    finally:
+        sys.stderr = before
+        os.close(ours)
+
+
+def test_it_says_how_many_steps_are_done_and_how_long_the_rest_takes(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    with terminal() as sent, step_bar(quiet=False) as show:
+        show(1, 3)
+        show(2, 3)
+    words = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", "".join(sent))
+    assert "2 of 3 steps" in words
+    assert "left" in words
+
+
+def test_it_is_silent_where_it_is_told_to_be_and_where_nobody_looks(monkeypatch, capsys):
+    monkeypatch.setenv("TERM", "xterm")
+    with terminal() as sent, step_bar(quiet=True) as show:
+        show(1, 3)
+    assert sent == []
+    with step_bar(quiet=False) as show:
+        show(1, 3)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_report_shows_its_steps(tmp_path, monkeypatch):
+    analysed_quickly(coarse_record(), tmp_path, nuisances=[])
+    steps = _steps_shown(monkeypatch, "report", ["report", str(tmp_path)])
+    assert steps == [(done, 5) for done in range(1, 6)]
+
+
+def test_an_inspection_shows_its_steps(tmp_path, monkeypatch):
+    write_record(coarse_record(), tmp_path / "record.csv")
+    steps = _steps_shown(monkeypatch, "inspection", ["inspect", str(tmp_path / "record.csv")])
+    assert steps == [(done, 3) for done in range(1, 4)]
+
+
+def _steps_shown(monkeypatch, module, words):
+    steps = []
+    monkeypatch.setattr(
+        f"tactile_bayes.cli.{module}.step_bar", lambda quiet: nullcontext(lambda *step: steps.append(step))
+    )
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    return steps
