@@ -15,7 +15,7 @@ from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.result import read_result, to_arviz, write_result
+from tactile_bayes.inference.result import posterior_draws, read_result, to_arviz, write_result
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, record_hash
@@ -219,8 +219,8 @@ def test_round_trip_and_arviz(contacts, tmp_path):
         warnings.simplefilter("ignore")
         import arviz
 
-        loaded = handed.posterior[list(NAMES)].isel(sample=slice(2, 4))
-        table = arviz.summary(loaded)
+        draws = posterior_draws(handed) if isinstance(handed, xr.DataTree) else handed.posterior
+        table = arviz.summary(draws[list(NAMES)].isel(sample=slice(2, 4)))
     assert len(table) == 6
     assert table["mean"].notna().all()
 

@@ -185,6 +185,6 @@ def to_arviz(posterior: xr.DataTree) -> Any:
         warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 announces its refactoring
         import arviz
 
-    if hasattr(arviz, "InferenceData"):
-        return arviz.from_datatree(posterior)
-    return posterior
+    if int(arviz.__version__.split(".")[0]) >= 1:  # it answers for the names of former versions, too
+        return posterior
+    return arviz.from_datatree(posterior)
