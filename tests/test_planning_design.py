@@ -10,7 +10,7 @@ import xarray as xr
 from scipy import stats
 
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import InferenceError, ParameterError, StudyError
+from tactile_bayes.errors import InferenceError, ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
@@ -29,7 +29,7 @@ STEP = float(np.radians(4.0))
 
 
 def designed(known="parabola", **options):
-    asked = {"bases": [(0.0, 0.0), (0.2, 0.0)], "drive_steps": [STEP], "draws": 3, "seed": 1}
+    asked = {"bases": [(0.0, 0.0), (0.2, 0.0)], "drive_steps": [2.5 * STEP], "draws": 3, "seed": 1}
     own = {"priors": PRIORS, "nuisances": []} if isinstance(known, str) else {}
     return design(known, **(asked | own | options))
 
@@ -135,10 +135,16 @@ def test_the_best_is_the_best(posterior, criterion, name, best):
 
 def test_what_cannot_be_reached_tells_nothing(posterior):
     """The band stays as it is."""
-    found = designed(posterior, bases=[(0.0, -2.0)])
-    assert float(found.reached[0]) == 0.0
-    assert found.width.values[0] == pytest.approx(float(found.present_width), rel=1e-9)
-    assert found.information.values[0] == pytest.approx(0.0, abs=1e-9)
+    found = designed(posterior, bases=[(0.0, 0.0), (0.0, -2.0)])
+    assert found.reached.values.tolist() == [1.0, 0.0]
+    assert found.width.values[1] == pytest.approx(float(found.present_width), rel=1e-9)
+    assert found.information.values[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_candidates_that_are_all_out_of_reach_are_refused(posterior):
+    told = r"at x = 0 and y from -3 to -2, does the rod, 1 L long, reach .*: give pivots nearer to it"
+    with pytest.raises(ReachError, match=told):
+        designed(posterior, bases=[(0.0, -2.0), (0.0, -3.0)])
 
 
 @pytest.mark.slow
@@ -153,12 +159,12 @@ def test_it_goes_on_where_it_was_stopped(tmp_path):
     def stop(progress):
         raise StoppedError
 
-    asked = {"bases": [(0.0, 0.0), (0.2, 0.0), (0.0, -2.0)], "draws": 2}
+    asked = {"bases": [(0.0, 0.0), (0.0, -2.0)], "draws": 2}
     with pytest.raises(StoppedError):
         designed(out=tmp_path, progress=stop, **asked)
     steps = []
     found = designed(out=tmp_path, progress=steps.append, **asked)
-    assert [(step.done, step.made) for step in steps] == [(2, 1), (3, 2)]
+    assert [(step.done, step.made) for step in steps] == [(2, 1)]
     assert found.identical(designed(**asked))
     by_gap = designed(out=tmp_path, criterion="gap", **asked)  # of the same numbers
     assert by_gap.width.identical(found.width)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactile_bayes.cli.answer import Json, columns_of, print_json
+from tactile_bayes.cli.interrupts import answered
 from tactile_bayes.cli.record_options import (
     AsStated,
     Columns,
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from tactile_bayes.runs.contour import Run
 
 __all__ = ["demo", "infer"]
+
+_STOPPING = "stopping; what has been drawn is judged, drawn and written now (Ctrl-C again drops it)"
 
 
 def infer(
@@ -95,7 +98,7 @@ def infer(
         nuisance=nuisance,
         as_stated=as_stated,
     )
-    with sampling_bar(quiet or json, max_seconds=max_seconds) as progress:
+    with answered(_STOPPING), sampling_bar(quiet or json, max_seconds=max_seconds) as progress:
         run = analyse(
             measured,
             out,
@@ -111,7 +114,10 @@ def infer(
             command=ctx.meta["words"],
             progress=progress,
         )
-    _tell(run, {}, as_json=json)
+    go_on = "give --checkpoint FOLDER, and the same command can go on after an interrupt"
+    if checkpoint is not None:
+        go_on = f"the same command goes on with the steps in {checkpoint}"
+    _tell(run, {}, as_json=json, go_on=go_on)
 
 
 def demo(
@@ -136,7 +142,7 @@ def demo(
             f"--out RUN\n",
             flush=True,
         )
-    with sampling_bar(quiet or json) as progress:
+    with answered(_STOPPING), sampling_bar(quiet or json) as progress:
         run = analyse(
             read_record(path),
             out,
@@ -152,7 +158,12 @@ def demo(
 
 
 def _tell(
-    run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None = None, *, as_json: bool = False
+    run: Run,
+    files: Mapping[str, Path],
+    truth: Mapping[str, float] | None = None,
+    *,
+    as_json: bool = False,
+    go_on: str = "the same command begins anew",
 ) -> None:
     """Print what came out; an interrupted run ends with the exit code of an interrupt all the same."""
     if as_json:
@@ -160,6 +171,7 @@ def _tell(
     else:
         _print_run(run, files, truth)
     if "interrupted" in run.posterior.attrs["message"]:
+        typer.echo(f"tactile-bayes: interrupted, results are of what was drawn by then: {go_on}", err=True)
         raise typer.Exit(130)
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-__all__ = ["going_on"]
+__all__ = ["answered", "going_on"]
 
 
 @contextmanager
@@ -30,6 +30,31 @@ def going_on(have: Callable[[], str], *, then: str = "the same command goes on")
             typer.echo(f"tactile-bayes: {words}", err=True)
             raise typer.Exit(143) from None
         raise KeyboardInterrupt(words) from None
+
+
+@contextmanager
+def answered(words: str) -> Iterator[None]:
+    """The first interrupt is answered at once, with words on stderr, as what comes of it takes a while."""
+    import os
+    import signal
+    import sys
+    import threading
+
+    usual = signal.default_int_handler
+    if signal.getsignal(signal.SIGINT) is not usual or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def answer(number: int, frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, usual)
+        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"\ntactile-bayes: {words}\n".encode())
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, answer)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
 
 class _Terminated(KeyboardInterrupt):

@@ -112,8 +112,8 @@ def _scattered(
     except InferenceError as error:
         best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, optimum.point, strict=False))
         raise InferenceError(
-            f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, rod, "
-            "base and family right?"
+            f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, "
+            "signs, drive angle, rod, base and family right? tactile-bayes inspect may tell"
         ) from error
     positive = (model.low == 0.0) & ~np.isin(model.names, MAY_VANISH)
     walked = Logarithms(positive)

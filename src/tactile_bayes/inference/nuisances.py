@@ -20,7 +20,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import present_channels, rod_of
 from tactile_bayes.rod import Rod
 
-__all__ = ["MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
+__all__ = ["BIAS", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 
 Floats = NDArray[np.float64]
 
@@ -33,8 +33,11 @@ MAY_VANISH = ("friction", "suspension_compliance")
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}
 
-_RIGIDITY, _OFFSET, _BIAS, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.1, 0.02, 0.3, 0.05, 0.01
-"""Standard deviations (scales of half normals) of the priors: of ratios; rad; EI/L and EI/L²; rad per EI/L; and L."""
+BIAS = 0.1
+"""Standard deviation of the prior of a bias, in EI/L and EI/L²."""
+
+_RIGIDITY, _OFFSET, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.02, 0.3, 0.05, 0.01
+"""Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; and L."""
 
 
 _BASE = re.compile(r"base_(\d+)_([xy])")
@@ -228,4 +231,4 @@ def _default_prior(name: str, unit: float) -> Prior:
             return stats.norm(1.0, _GAIN)
         case _ if _BASE.fullmatch(name):
             return stats.norm(0.0, _SHIFT * unit)
-    return stats.norm(0.0, _BIAS * unit)
+    return stats.norm(0.0, BIAS * unit)

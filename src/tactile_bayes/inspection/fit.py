@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.inspection.remedies import Remedy, as_it_is, remedies_for
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.reconstruction import reconstruct
@@ -20,18 +20,14 @@ __all__ = ["Fit", "fit_of"]
 _FEWEST = 10
 """Loaded samples below which nothing is told."""
 
-_REMEDIED = 0.3
+_REMEDIED = 1 / 3
 """Share of the misfits that may remain for a remedy to be named."""
 
-_TRIED = 60
-"""Loaded samples, about, on which remedies are tried: where nothing fits, each takes long."""
+_CHANGE = 0.1
+"""Share of the samples that a further change must mend: what is mirrored twice fits as well as what never was."""
 
-_FRICTIONS = (0.1, 0.2, 0.3, 0.5)
-
-_FRAME_WORDS = {
-    "turning": "the load cell turned with the drive (--load-cell-frame turning)",
-    "fixed": "the load cell did not turn with the drive (--load-cell-frame fixed)",
-}
+_TRIED = 40
+"""Loaded samples, at most, on which remedies are tried: where nothing fits, each takes long."""
 
 
 class Fit(NamedTuple):
@@ -39,10 +35,12 @@ class Fit(NamedTuple):
 
     share: float
     """Of the loaded samples, those whose status is "does not fit"; NaN of too few."""
+    below: float
+    """Of the loaded samples, those whose contact would lie below the pivot, where no object is."""
     loaded: int
     """Those that carry a load, and are not cut off."""
     remedy: str
-    """What would make most of them fit, in words; "" if nothing that was tried does."""
+    """What would make most of them fit above the pivot, in words; "" if nothing that was tried does."""
 
 
 def fit_of(
@@ -53,7 +51,7 @@ def fit_of(
     friction: float = 0.0,
     progress: Callable[[int, int], object] = lambda done, count: None,
 ) -> Fit:
-    """The share of samples that do not fit, and the remedy where there are more than `most`.
+    """The shares of samples that fit no contact above the pivot, and the remedy where one is more than `most`.
 
     Parameters
     ----------
@@ -62,49 +60,48 @@ def fit_of(
     cell : LoadCell
         With noise of finite variance on each channel.
     most : float
-        Share above which remedies are tried: other signs, another frame, forces that are exchanged,
-        friction.
+        Share above which remedies are tried: other signs, another frame, forces that are exchanged, friction, a drive
+        angle that is counted from elsewhere or the other way round.
     progress : callable
         Is given the number of remedies that were tried, and of how many.
     """
-    status = _statuses(record, cell, friction)
-    share, loaded = _unfit(status)
+    contacts = _contacts(record, cell, friction)
+    share, below, loaded = _shares(contacts)
     if loaded < _FEWEST:
-        return Fit(np.nan, loaded, "")
-    if not share > most:
+        return Fit(np.nan, np.nan, loaded, "")
+    if not max(share, below) > most:
         progress(0, 0)
-        return Fit(share, loaded, "")
-    loads = cell.corrected(record).isel(sample=status != "cut off")
-    loads = loads.isel(sample=slice(None, None, max(1, loaded // _TRIED)))
+        return Fit(share, below, loaded, "")
+    loads = cell.corrected(record).isel(sample=contacts.status.values != "cut off")
+    loads = loads.isel(sample=slice(None, None, -(-loaded // _TRIED)))
     alone = _of_any_samples(cell, record.sizes["sample"])
 
-    def share_if(remedy: Callable[[xr.Dataset], xr.Dataset], friction: float) -> float:
-        return _unfit(_statuses(_read_by(alone, remedy(loads)), alone, friction))[0]
+    def share_if(remedy: Remedy) -> float:
+        return sum(_shares(_contacts(_read_by(alone, remedy.mended(loads)), alone, remedy.friction))[:2])
 
-    frame = "turning" if frame_of(loads) == "fixed" else "fixed"
-    others = [*_REMEDIES, (_FRAME_WORDS[frame], lambda given: given.assign_attrs(load_cell_frame=frame))]
-    remedies = [(words, remedy, friction) for words, remedy in others]
-    for coefficient in _FRICTIONS:
-        words = f"there were friction of about {coefficient:g} (have infer find it: --nuisance friction)"
-        remedies.append((words, _as_it_is, coefficient))
+    remedies = remedies_for(frame_of(loads), friction)
     progress(0, len(remedies))
-    part = share_if(_as_it_is, friction)
-    tried = []
-    for words, remedy, coefficient in remedies:
-        tried.append((share_if(remedy, coefficient), words))
-        progress(len(tried), len(remedies))
-    best, words = min(tried)
-    return Fit(share, loaded, words if best <= _REMEDIED * part else "")
+    part = share_if(Remedy("", as_it_is, friction))
+    left = []
+    for remedy in remedies:
+        left.append(share_if(remedy))
+        progress(len(left), len(remedies))
+    best = int(np.argmin([over + _CHANGE * remedy.changes for over, remedy in zip(left, remedies, strict=True)]))
+    return Fit(share, below, loaded, remedies[best].words if left[best] <= _REMEDIED * part else "")
 
 
-def _statuses(record: xr.Dataset, cell: LoadCell, friction: float) -> NDArray[np.str_]:
-    contacts = reconstruct(record, method="constrained", load_cell=cell, friction=friction)
-    return np.asarray(contacts.status.values)
+def _contacts(record: xr.Dataset, cell: LoadCell, friction: float) -> xr.Dataset:
+    return reconstruct(record, method="constrained", load_cell=cell, friction=friction)
 
 
-def _unfit(status: NDArray[np.str_]) -> tuple[float, int]:
-    loaded = int(np.count_nonzero((status != "no contact") & (status != "cut off")))
-    return float(np.count_nonzero(status == "does not fit")) / max(loaded, 1), loaded
+def _shares(contacts: xr.Dataset) -> tuple[float, float, int]:
+    """Of the loaded samples those that fit no contact, and those that fit one below the pivot; and their number."""
+    status = contacts.status.values
+    is_loaded = (status != "no contact") & (status != "cut off")
+    is_unfit = status == "does not fit"
+    is_below = is_loaded & ~is_unfit & (contacts.contact_y.values < contacts.base_y.values)
+    loaded = int(np.count_nonzero(is_loaded))
+    return np.count_nonzero(is_unfit) / max(loaded, 1), np.count_nonzero(is_below) / max(loaded, 1), loaded
 
 
 def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
@@ -127,28 +124,3 @@ def _read_by(cell: LoadCell, loads: xr.Dataset) -> xr.Dataset:
     return loads.assign(
         {name: (loads[name].dims, read[:, index], loads[name].attrs) for index, name in enumerate(CHANNELS)}
     )
-
-
-def _as_it_is(record: xr.Dataset) -> xr.Dataset:
-    return record
-
-
-def _with_sign(*names: str) -> Callable[[xr.Dataset], xr.Dataset]:
-    def turned_round(record: xr.Dataset) -> xr.Dataset:
-        return record.assign({name: (record[name].dims, -record[name].values, record[name].attrs) for name in names})
-
-    return turned_round
-
-
-def _exchanged(record: xr.Dataset) -> xr.Dataset:
-    x, y = record[CHANNELS[1]], record[CHANNELS[2]]
-    return record.assign({x.name: (x.dims, y.values, x.attrs), y.name: (y.dims, x.values, y.attrs)})
-
-
-_REMEDIES: tuple[tuple[str, Callable[[xr.Dataset], xr.Dataset]], ...] = (
-    ("force_x had the other sign", _with_sign("force_x")),
-    ("force_y had the other sign", _with_sign("force_y")),
-    ("both forces had the other sign", _with_sign("force_x", "force_y")),
-    ("holding_moment had the other sign", _with_sign("holding_moment")),
-    ("force_x and force_y were exchanged", _exchanged),
-)

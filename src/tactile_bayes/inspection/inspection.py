@@ -152,7 +152,7 @@ def inspect_record(
     samples = sample_table(record, found, sweeps, stretches, cell, false_alarm=false_alarm)
     told(1, _STEPS)
     statuses: dict[str, int] = {}
-    fit = Fit(math.nan, 0, "")
+    fit = Fit(math.nan, math.nan, 0, "")
     if len(present_channels(record)) == len(CHANNELS):
         status = reconstruct(record, method="raw", load_cell=cell, friction=friction).status.values
         samples["status"] = ("sample", status, {"long_name": "what becomes of it in raw Step 2"})

@@ -9,9 +9,11 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_bayes.inference.nuisances import BIAS
 from tactile_bayes.inspection.fit import Fit
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.record import CHANNELS, present_channels, rod_of
+from tactile_bayes.uncertainty.suspicions import CHECK_UNITS
 
 __all__ = ["UNFIT", "in_words", "prefix_of", "quantity"]
 
@@ -24,6 +26,9 @@ _FACTOR = 2.0
 
 _OFF_ZERO = 5.0
 """Standard errors by which a zero must differ from the stated one."""
+
+_FAR = 3.0
+"""Standard deviations of a bias's prior beyond which infer would object."""
 
 _CORRELATED = 0.2
 """Coefficient of neighbours below which noise is as good as white."""
@@ -56,7 +61,7 @@ def in_words(
         *_without_contact(sweeps),
         *_stuck(samples),
         *_outlying(samples, cell),
-        *_zeros(channels, cell, source, false_alarm),
+        *_zeros(record, channels, cell, source, false_alarm),
         *_noise(channels, cell, source, false_alarm),
         *_steps(samples),
         *_unfinished(sweeps),
@@ -93,17 +98,21 @@ def prefix_of(value: float) -> tuple[float, str]:
 def _of_loads(suspected: Sequence[str], fit: Fit) -> list[str]:
     """Units and signs, and loads that contradict one another."""
     told = list(suspected)
-    if not fit.share > UNFIT:
+    if not max(fit.share, fit.below) > UNFIT:
         return told
     if fit.remedy:
         would = f"nearly all would if {fit.remedy}"
     else:
         would = "check the rod, the units, signs and axes of the loads, the zero of the drive angle, and the friction"
-    if told and not fit.remedy:  # the first sentence says it all
+    if told and (not fit.remedy or told[0].endswith(CHECK_UNITS)):  # the first sentence says it all
         return told
-    told.append(
-        f"The loads of {fit.share:.0%} of the {fit.loaded} loaded samples fit no contact of such a rod: {would}."
-    )
+    if fit.share > UNFIT:
+        against = f"The loads of {fit.share:.0%} of the {fit.loaded} loaded samples fit no contact of such a rod"
+    else:
+        against = f"Of the {fit.loaded} loaded samples {fit.below:.0%} touch something below the pivot, not above"
+        would = would.replace("all would", "all would touch something above")
+    of_angle = fit.remedy.startswith("the drive angle")  # as then the directions may be wrong, too
+    told.insert(0 if of_angle else len(told), f"{against}: {would}.")
     return told
 
 
@@ -187,7 +196,9 @@ def _outlying(samples: xr.Dataset, cell: LoadCell | None) -> list[str]:
     return told
 
 
-def _zeros(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float) -> list[str]:
+def _zeros(
+    record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float
+) -> list[str]:
     told = []
     level = false_alarm / max(int(np.isfinite(channels.same_bias_p_value.values).sum()), 1)
     moved = [str(row.channel.values) for row in _rows(channels) if float(row.same_bias_p_value) < level]
@@ -196,10 +207,19 @@ def _zeros(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
             f"The zero of {_and(moved)} moved between one unloaded stretch and another: tare before each sweep, or "
             "have infer find a drift (--nuisance drift)."
         )
-    if source not in ("given", "data sheet") or _drifts(cell):
+    is_stated = source in ("given", "data sheet")
+    far = _far_off(record, channels, cell if is_stated else None)
+    if far:
+        told.append(
+            f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Take it off as the "
+            "column is read: --column 'force_x=NAME+12.5' adds 12.5 in the column's unit."
+        )
+    if not is_stated or _drifts(cell):
         return told
     off = []
     for row in _rows(channels):
+        if str(row.channel.values) in far:
+            continue
         away, error = float(row.bias - row.stated_bias), float(row.bias_uncertainty)
         stated = 0.0 if cell is None else cell.bias_uncertainty[CHANNELS.index(str(row.channel.values))]
         error = float(np.hypot(error, stated))
@@ -214,6 +234,19 @@ def _zeros(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
             "infer finds it as it is (--nuisance bias, one of the defaults), but not with --as-stated."
         )
     return told
+
+
+def _far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) -> dict[str, str]:
+    """Zeros by channel, in words, that the prior of a bias hardly allows, and that are not stated."""
+    rod, found = rod_of(record), {}
+    for row in _rows(channels):
+        name, bias = str(row.channel.values), float(row.bias)
+        index = CHANNELS.index(name)
+        stated, uncertain = (0.0, 0.0) if cell is None else (cell.bias[index], cell.bias_uncertainty[index])
+        expected = BIAS * (rod.moment_unit if name == CHANNELS[0] else rod.force_unit)
+        if abs(bias - stated) > _FAR * max(expected, uncertain):
+            found[name] = f"{quantity(bias, str(row.unit.values))} of {name}"
+    return found
 
 
 def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float) -> list[str]:

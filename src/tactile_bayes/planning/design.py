@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
@@ -122,7 +122,7 @@ def design(
     InferenceError
         If the tree is no posterior of a contour.
     ReachError
-        If the rod hardly ever reaches a contour of the prior.
+        If the rod hardly ever reaches a contour of the prior, or from none of the candidates.
     StudyError
         If the folder holds candidates of another design.
 
@@ -179,7 +179,21 @@ def design(
         found = keep_outcomes(
             ledger, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
         )
+    if not any(expected.reached for expected in found.values()):
+        raise ReachError(_out_of_reach(question))
     return _labelled(question, [found[number] for number in range(len(candidates))], criterion)
+
+
+def _out_of_reach(question: Question) -> str:
+    known, pivots = question.known, np.array([candidate.base for candidate in question.candidates])
+    unit = "" if known.rod is None or known.rod.is_dimensionless else " m"
+    (left, low), (right, high) = pivots.min(axis=0), pivots.max(axis=0)
+    here = f"x = {left:g}" if left == right else f"x from {left:g} to {right:g}"
+    there = f"y = {low:g}" if low == high else f"y from {low:g} to {high:g}"
+    return (
+        f"from none of the candidates, at {here}{unit} and {there}{unit}, does the rod, {known.length:g}{unit or ' L'} "
+        "long, reach an object that may be there: give pivots nearer to it, in that unit"
+    )
 
 
 def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:

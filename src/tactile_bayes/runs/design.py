@@ -92,9 +92,13 @@ def design_in_words(found: xr.Dataset) -> tuple[str, ...]:
     sentences = [
         f"Put the pivot at {place} and step the drive by {np.degrees(float(best.drive_step)):.3g}°: the {probability} "
         f"band is then to be expected {length(float(best.width))} wide; now it is "
-        f"{length(float(found.present_width))}. Of the contour between the outermost contacts "
-        f"{length(float(best.gap))} stay untouched."
+        f"{length(float(found.present_width))}."
     ]
+    if np.isfinite(float(best.gap)):
+        sentences[0] += f" Of the contour between the outermost contacts {length(float(best.gap))} stay untouched."
+    outermost = _outermost(found)
+    if outermost:
+        sentences.append(f"It is the {outermost} of the candidates: beyond there may be a better one, try with more.")
     worst = found.isel(candidate=int(np.nanargmax(found.width.values)))
     if found.sizes["candidate"] > 1:
         ratio = float(worst.width / best.width)
@@ -110,6 +114,16 @@ def design_in_words(found: xr.Dataset) -> tuple[str, ...]:
             f"there, Laplace's approximation {length(float(best.width))}."
         )
     return tuple(sentences)
+
+
+def _outermost(found: xr.Dataset) -> str:
+    """In which directions nothing beyond the best candidate was tried, in words; "" if in none."""
+    best, sides = found.isel(candidate=int(found.best)), []
+    for name, least, most in (("base_x", "leftmost", "rightmost"), ("base_y", "lowest", "highest")):
+        tried = found[name].values
+        if np.ptp(tried) > 0.0:
+            sides += [least] * bool(best[name] == tried.min()) + [most] * bool(best[name] == tried.max())
+    return " and ".join(sides)
 
 
 def _draw(found: xr.Dataset, path: Path) -> None:

@@ -151,10 +151,18 @@ def rod_in_words(rods: xr.Dataset) -> str:
     if not np.isfinite(rods.best_width):
         return f"None of {count} rods of this material serves{left_out}."
     long, thick, wide = (f"{1e3 * float(rods[f'best_{name}']):.3g} mm" for name in ("length", "diameter", "width"))
-    return (
+    words = (
         f"Of {count} rods of this material{left_out} the load cell wants one {long} long and {thick} thick: its mean "
         f"band is {wide} wide."
     )
+    ends = []
+    for name, least, most in (("length", "shortest", "longest"), ("diameter", "thinnest", "thickest")):
+        tried, best = rods[name].values, float(rods[f"best_{name}"])
+        if tried.size > 1:
+            ends += [least] * bool(best == tried.min()) + [most] * bool(best == tried.max())
+    if ends:
+        words += f" It is the {' and '.join(ends)} that was tried: begin with a rod like it, and look further."
+    return words
 
 
 def steps_of(material: Material | None) -> int:

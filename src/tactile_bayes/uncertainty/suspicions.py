@@ -10,7 +10,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
-__all__ = ["suspicions"]
+__all__ = ["CHECK_UNITS", "suspicions"]
 
 Floats = NDArray[np.float64]
 
@@ -22,6 +22,9 @@ _WEAKEST = 0.02
 
 _LONGEST_LEVER = 2.0
 """Moment over force, in L, above which units are doubted: no contact is further away than L."""
+
+CHECK_UNITS = "check the units of the loads, and the rod's length and flexural rigidity."
+"""How sentences end that are of loads too large or too small for the rod."""
 
 
 def suspicions(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[str, ...]:
@@ -79,7 +82,8 @@ def suspicions(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple
         if np.all(contact_sides(measured, cell) == -drive):
             found.append(
                 "The holding moment has the sign of contacts on the other side in every sweep (it is positive where "
-                "the drive turns counter-clockwise against the object): its sign is wrong, or the directions are."
+                "the drive turns counter-clockwise against the object): its sign is wrong, or the directions are, "
+                "that is the sense of the drive angle."
             )
     return tuple(found)
 
@@ -91,7 +95,7 @@ def _of_size(
     unit = rod_of(measured).force_unit
     largest = _largest(force)
     stated = f" (with EI/L² = {unit:.3g} N)" if measured.attrs["units"] == "SI" else ""
-    remedy = "check the units of the loads, and the rod's length and flexural rigidity."
+    remedy = CHECK_UNITS
     if largest > _STRONGEST:
         return [f"Forces reach {largest:.3g} EI/L²{stated}, more than such a rod can carry: {remedy}"]
     moment = np.abs(record.holding_moment.values)

@@ -239,8 +239,9 @@ def _told_beyond(beyond: Mapping[str, str]) -> list[str]:
     if not beyond:
         return []
     return [
-        f"The record wants what the prior hardly allows: {', '.join(beyond.values())}. Check what is stated of rod, "
-        "drive angle and tare, or give a wider prior."
+        f"The record wants what the prior hardly allows: {', '.join(beyond.values())}. Check what is stated of rod and "
+        "drive angle, take a zero off as its column is read (--column 'force_x=NAME+12.5'), or give a wider prior "
+        "(priors=)."
     ]
 
 

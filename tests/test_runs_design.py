@@ -1,0 +1,52 @@
+"""The words of a design."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from tactile_bayes.runs.design import design_in_words
+
+
+def found(places, widths, gaps):
+    """Of candidates in metres."""
+    x, y = np.transpose(places)
+    count, metres = len(places), {"units": "m"}
+    return xr.Dataset(
+        {
+            "base_x": ("candidate", x, metres),
+            "base_y": ("candidate", y, metres),
+            "drive_step": ("candidate", np.full(count, np.radians(2.0))),
+            "width": ("candidate", np.asarray(widths, dtype=float)),
+            "gap": ("candidate", np.asarray(gaps, dtype=float)),
+            "reached": ("candidate", np.ones(count)),
+            "nested_width": ("candidate", np.full(count, np.nan)),
+            "present_width": 5e-3,
+            "best": int(np.argmin(widths)),
+        },
+        attrs={"probability": 0.95},
+    )
+
+
+GRID = [(-0.1, 0.0), (0.0, 0.0), (0.1, 0.0), (-0.1, 0.02), (0.0, 0.02), (0.1, 0.02), (0.0, -0.02)]
+
+
+@pytest.mark.parametrize(
+    ("best", "outermost"),
+    [(1, None), (0, "leftmost"), (5, "rightmost and highest"), (6, "lowest")],
+)
+def test_the_outermost_candidate_is_said_to_be_so(best, outermost):
+    widths = np.full(len(GRID), 2e-3)
+    widths[best] = 1e-3
+    words = design_in_words(found(GRID, widths, np.full(len(GRID), 3e-3)))
+    said = [sentence for sentence in words if sentence.startswith("It is the ")]
+    if outermost is None:
+        assert said == []
+    else:
+        assert said == [f"It is the {outermost} of the candidates: beyond there may be a better one, try with more."]
+
+
+def test_a_gap_that_is_not_known_is_not_told():
+    first, *_ = design_in_words(found(GRID[:2], [1e-3, 2e-3], [np.nan, 3e-3]))
+    assert first.endswith("band is then to be expected 1 mm wide; now it is 5 mm.")
