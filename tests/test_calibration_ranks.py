@@ -36,7 +36,7 @@ def five_errors(probability, count):
 # ---- of uniform ranks
 
 
-@pytest.mark.parametrize(("count", "top"), [(100, 99), (37, 9)])
+@pytest.mark.parametrize(("count", "top"), [pytest.param(100, 99, marks=pytest.mark.slow), (37, 9)])
 def test_p_values_of_uniform_ranks_are_uniform(count, top):
     """False alarm 1e-6 for each share. Ties make p-values larger, but hardly."""
     found = p_values(uniform(400, count, top, seed=count), top)

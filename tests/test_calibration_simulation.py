@@ -118,7 +118,14 @@ def test_the_world_has_the_same_on_top():
     agree(made, scan, rigidity=1.1, zeros=np.array(world.bias) + np.array(world.drift) * way)
 
 
-@pytest.mark.parametrize(("told", "further"), [(0.0, 0.3), (0.1, 0.2), (0.3, 0.0)])
+@pytest.mark.parametrize(
+    ("told", "further"),
+    [
+        pytest.param(0.0, 0.3, marks=pytest.mark.slow),
+        (0.1, 0.2),
+        pytest.param(0.3, 0.0, marks=pytest.mark.slow),
+    ],
+)
 def test_friction(told, further):
     made = simulated(friction=told, world=World(friction=further))
     agree(made, scanned(made, friction=0.3))
@@ -186,7 +193,7 @@ def test_contours_of_another_family():
 # ---- events
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_events_are_those_of_a_scan(friction):
     made = simulated(world=World(friction=friction))
     scan = scanned(made, friction=friction)
@@ -240,7 +247,7 @@ def test_the_encoder_of_a_cell_that_is_told():
     assert abs(np.mean(errors**2) - 1.0) < 5.0 * np.sqrt(2.0 / errors.size)  # false alarm 1e-6
 
 
-@pytest.mark.parametrize("told", [0.0, 0.02])
+@pytest.mark.parametrize("told", [pytest.param(0.0, marks=pytest.mark.slow), 0.02])
 def test_the_encoder_of_a_cell_that_measures(told):
     """An offset of 0.05 rad where `told` is known is one of the world's besides."""
     cell = replace(QUIET, drive_angle_offset=told)
@@ -288,5 +295,5 @@ def test_friction_beyond_what_a_rod_slides_with_is_drawn_again():
         "priors": PRIORS | {"friction": stats.uniform(0.1, 0.3)},
         "world": World(friction=0.6),
     }
-    drawn = [simulated(seed, **options).truth["friction"] for seed in range(6)]
+    drawn = [simulated(seed, **options).truth["friction"] for seed in range(4)]
     assert all(0.1 <= friction <= np.tan(0.7) - 0.6 for friction in drawn)

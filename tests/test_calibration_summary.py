@@ -102,7 +102,7 @@ def most(sets):
 @pytest.mark.parametrize(
     ("sets", "count"),
     [
-        (40, 100),
+        pytest.param(40, 100, marks=pytest.mark.slow),
         pytest.param(200, 100, marks=pytest.mark.slow),
         (30, 20),
         pytest.param(300, 20, marks=pytest.mark.slow),

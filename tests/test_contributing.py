@@ -43,16 +43,39 @@ def applied(found: list[Block], clone: Path) -> list[Block]:
     return rest
 
 
-@pytest.fixture(scope="module")
-def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the source, to which one thing after the other is added."""
-    folder = tmp_path_factory.mktemp("clone")
+def copied(folder: Path) -> Path:
     hidden = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "src" / "tactile_bayes", folder / "src" / "tactile_bayes", ignore=hidden)
     return folder
 
 
-@pytest.mark.parametrize("title", ["A family of contours", "A flaw of a load cell", "An unknown of a rig"])
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the source, to which one thing after the other is added."""
+    return copied(tmp_path_factory.mktemp("clone"))
+
+
+TITLES = ("A family of contours", "A flaw of a load cell", "An unknown of a rig")
+
+
+def test_all_that_is_added_fits_the_source(tmp_path: Path) -> None:
+    """And leaves Python behind."""
+    copy = copied(tmp_path)
+    for title in TITLES:
+        example, _ = applied(blocks(PARTS[title]), copy)
+        compile(example.code, title, "exec")
+    for path in copy.rglob("*.py"):
+        compile(path.read_text(encoding="utf-8"), path, "exec", dont_inherit=True)
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        pytest.param("A family of contours", marks=pytest.mark.slow),
+        "A flaw of a load cell",
+        pytest.param("An unknown of a rig", marks=pytest.mark.slow),
+    ],
+)
 def test_what_is_added_works(title: str, clone: Path) -> None:
     example, stated = applied(blocks(PARTS[title]), clone)
     environment = os.environ | {"PYTHONPATH": str(clone / "src"), "PYTHONWARNINGS": "error"}

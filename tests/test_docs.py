@@ -34,7 +34,7 @@ def identify(path: Path) -> str:
 
 
 @pytest.fixture
-def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings_left_alone: None) -> Path:
+def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings_left_alone: None, coarse_pictures: None) -> Path:
     """A folder of its own, in which a page finds the data that come with the project."""
     (tmp_path / "data").symlink_to(ROOT / "data")
     monkeypatch.chdir(tmp_path)

@@ -132,17 +132,16 @@ def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(
 # --- Chance -----------------------------------------------------------------------------------------------------
 
 
-def test_the_same_seed_gives_the_same_draws_and_another_others(contacts):
-    again = infer(draws=2000, method="importance")
-    xr.testing.assert_identical(again["posterior"].to_dataset(), contacts["posterior"].to_dataset())
-    other = infer(draws=2000, method="importance", seed=2)
-    there = stats_of(contacts).engine.values > 0
-    same = other["posterior"].contact_x.values == contacts["posterior"].contact_x.values
+def test_the_same_seed_gives_the_same_draws_and_another_others():
+    one, again, other = (infer(which=[2, 21, 61], draws=400, method="importance", seed=seed) for seed in (1, 1, 2))
+    xr.testing.assert_identical(again["posterior"].to_dataset(), one["posterior"].to_dataset())
+    there = stats_of(one).engine.values > 0
+    same = other["posterior"].contact_x.values == one["posterior"].contact_x.values
     assert not same[:, :, there].any()
 
 
 def test_the_same_seed_gives_the_same_walk():
-    settings = SamplerSettings(walkers=16, min_ess=50.0, max_steps=60, max_r_hat=1.5)
+    settings = SamplerSettings(walkers=16, min_ess=50.0, max_steps=30, max_r_hat=1.5)
     one, other = (infer(which=[61], method="emcee", draws=100, settings=settings) for _ in range(2))
     xr.testing.assert_identical(one["posterior"].to_dataset(), other["posterior"].to_dataset())
 
@@ -355,7 +354,9 @@ def test_draws_have_the_phases_of_the_weights():
 def test_a_sample_that_no_contact_explains_leaves_the_others_alone(method):
     bad = some(which=[20, 21, 61])
     bad.force_y[1] = -50.0
-    tree = infer_contacts(bad, load_cell=CELL, seed=1, method=method, settings=SamplerSettings(max_steps=50))
+    tree = infer_contacts(
+        bad, load_cell=CELL, seed=1, method=method, settings=SamplerSettings(walkers=16, max_steps=20)
+    )
     assert stats_of(tree).converged.values[[0, 2]].all()
     assert stats_of(tree).converged[1] == 0
     assert np.isfinite(tree["posterior"].contact_x.values[..., [0, 2]]).all()

@@ -227,13 +227,13 @@ def test_polar_is_flat_over_distance(i):
 @pytest.mark.parametrize(("kind", "i"), [pytest.param("plain", 21, marks=pytest.mark.slow), ("SI", 102)])
 def test_a_prior_of_ones_own_is_in_the_record_s_units_and_axes(kind, i):
     record, cell = measured(kind), CELLS[kind]
-    about = posterior(Sample(record, i, cell))
+    about = posterior(Sample(record, i, cell), cells=16)
     middle = about.mean + about.sd
 
     def prior(x, y, slope):
         return stats.norm.logpdf(x, middle[0], about.sd[0]) + stats.norm.logpdf(slope, middle[2], 2.0 * about.sd[2])
 
-    exact = posterior(Sample(record, i, cell), log_prior=prior)
+    exact = posterior(Sample(record, i, cell), log_prior=prior, cells=16)
     (found,), weights = weighed_moments(density_of(record, cell, i, prior=prior))
     agree(found, weights, exact)
 

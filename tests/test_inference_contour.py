@@ -79,7 +79,7 @@ def test_moments_are_those_of_a_grid():
     likelihood = RecordLikelihood(record, CELL, order=FINE_ORDER)
     draws = np.stack([result["posterior"][name].values.ravel() for name in TRUTH], axis=-1)
     root = np.linalg.cholesky(np.cov(draws.T))
-    z = np.linspace(-4.5, 4.5, 15)
+    z = np.linspace(-4.5, 4.5, 11)
     whitened = np.stack(np.meshgrid(z, z, z, indexing="ij"), axis=-1).reshape(-1, 3)
     whitened = whitened[(whitened**2).sum(axis=1) < 25.0]
     points = draws.mean(axis=0) + whitened @ root.T
@@ -165,7 +165,7 @@ def test_events_are_those_of_the_drawn_contours():
 
 def coarse(contour=None, cell=CELL, seed=3, **options):
     """A small record."""
-    return cell.measure(swept(contour or Parabola(**TRUTH), step=np.radians(5.0), **options), seed=seed)
+    return cell.measure(swept(contour or Parabola(**TRUTH), step=np.radians(8.0), **options), seed=seed)
 
 
 @pytest.mark.slow
@@ -239,6 +239,7 @@ def test_missing_channels(missing):
     assert set(result["posterior_predictive"].data_vars) == set(CHANNELS) - set(missing)
 
 
+@pytest.mark.slow
 def test_moment_only_in_brief():
     result = infer_as_stated(without(coarse(), "force_x", "force_y"), seed=1, settings=BRIEF)
     assert list(result["posterior_predictive"].data_vars) == ["holding_moment"]
@@ -293,7 +294,7 @@ def test_priors_that_allow_the_impossible_are_cut_off():
         pytest.param("q", stats.uniform(0.52, 0.2), marks=pytest.mark.slow),
         pytest.param("a", stats.uniform(0.6, 1.0), marks=pytest.mark.slow),
         pytest.param("noise_scale", stats.uniform(2.0, 1.0), marks=pytest.mark.slow),
-        ("noise_scale", stats.uniform(0.1, 0.2)),
+        pytest.param("noise_scale", stats.uniform(0.1, 0.2), marks=pytest.mark.slow),
     ],
 )
 def test_priors_that_exclude_the_truth_are_obeyed(name, prior):
@@ -434,11 +435,11 @@ def test_flat_ellipses_mix_although_only_a_ratio_is_told(a, b, q):
 
 def test_a_prior_that_ends_before_what_the_record_wants_is_named():
     """Far beyond it that is a mistake, and near its end the posterior lies there."""
-    record, deviation = measured(), 1.5e-4  # by Fisher information
+    record, deviation = coarse(), 3e-4  # by Fisher information
     narrow = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.15)}
     with pytest.raises(InferenceError, match=r"the record wants q = 0\.\d+ \(prior: 0\.\d+ to 0\.\d+\): give a wider"):
         infer_contour(record, priors=narrow, nuisances=[], seed=1, settings=BRIEF)
     edged = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.2 - deviation)}
-    found = infer_contour(record, priors=edged, nuisances=[], seed=1, settings=MODEST)
+    found = infer_contour(record, priors=edged, nuisances=[], seed=1, settings=BRIEF)
     assert float(found["posterior"].q.max()) < TRUTH["q"] - deviation
     assert float(found["posterior"].q.mean()) == pytest.approx(TRUTH["q"] - deviation, abs=3.0 * deviation)

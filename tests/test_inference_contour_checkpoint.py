@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from helpers.contour_posteriors import CELL, infer_as_stated, measured
+from helpers.contour_posteriors import CELL, TRUTH, infer_as_stated, swept
+from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import SamplerSettings
 
-SHORT = SamplerSettings(ensembles=2, walkers=12, block_steps=20, max_steps=60, min_ess=1e9)
+SHORT = SamplerSettings(ensembles=2, walkers=12, block_steps=10, max_steps=30, min_ess=1e9)
+
+
+@cache
+def coarse():
+    """A record of few samples, that is not to be changed."""
+    return CELL.measure(swept(Parabola(**TRUTH), step=0.15), seed=5)
 
 
 def infer(checkpoint=None, **options):
     options = {"load_cell": CELL, "seed": 1, "settings": SHORT} | options
-    return infer_as_stated(measured(), checkpoint=checkpoint, **options)
+    return infer_as_stated(coarse(), checkpoint=checkpoint, **options)
 
 
 def test_a_run_that_goes_on_gives_the_draws_of_one_that_was_not_stopped(tmp_path):
     whole = infer()
-    infer(tmp_path / "run", settings=replace(SHORT, max_steps=20))
+    infer(tmp_path / "run", settings=replace(SHORT, max_steps=10))
     rest = infer(tmp_path / "run")
-    assert rest["sample_stats"].attrs["steps_run"] == 60
+    assert rest["sample_stats"].attrs["steps_run"] == 30
     for group in ("posterior", "posterior_predictive", "events"):
         for name, values in whole[group].data_vars.items():
             np.testing.assert_array_equal(rest[group][name].values, values.values)
@@ -42,7 +50,7 @@ def test_a_run_that_goes_on_gives_the_draws_of_one_that_was_not_stopped(tmp_path
     ],
 )
 def test_another_run_is_refused_and_told_what_differs(tmp_path, change, words):
-    infer(tmp_path, settings=replace(SHORT, max_steps=20))
+    infer(tmp_path, settings=replace(SHORT, max_steps=10))
     before = sorted(path.name for path in tmp_path.iterdir())
     with pytest.raises(InferenceError, match=words):
         infer(tmp_path, **change)

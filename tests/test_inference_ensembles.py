@@ -121,7 +121,7 @@ def test_ensembles_are_independent_of_each_other_and_of_numpys_global_state():
     assert not np.array_equal(draws.samples[0], draws.samples[1])
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8, 0.95])
+@pytest.mark.parametrize("rho", [0.5, 0.95, *(pytest.param(rho, marks=pytest.mark.slow) for rho in (0.0, 0.8))])
 def test_walker_major_layout_gives_the_right_effective_sample_size(rho):
     """Walkers with a known autocorrelation ρ^t: τ = (1 + ρ)/(1 − ρ), effective sample size N/τ.
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import cache
 from importlib.metadata import version
 from itertools import pairwise
 
@@ -51,6 +52,12 @@ def draw(folder=None, *, target=None, settings=SMALL, seed=3, names=("a", "b"), 
     )
 
 
+@cache
+def whole() -> Draws:
+    """Of a run that nothing stops; not to be changed."""
+    return draw()
+
+
 def assert_same(one: Draws, other: Draws) -> None:
     for name in ("samples", "log_probability", "r_hat", "ess_bulk", "ess_tail", "acceptance", "autocorrelation_time"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
@@ -74,7 +81,7 @@ def test_a_run_goes_on_bit_by_bit_wherever_it_was_killed(tmp_path, calls):
     made = 10 * len(list(tmp_path.glob("block-*")))
     assert made == max(0, calls - 3) // 2 // 10 * 10
     target = Counted()
-    assert_same(draw(tmp_path, target=target), draw())
+    assert_same(draw(tmp_path, target=target), whole())
     assert target.calls == 2 * (SMALL.max_steps - made) + (0 if made else 2)
 
 
@@ -89,9 +96,9 @@ def test_a_run_goes_on_to_convergence_after_many_kills(tmp_path):
         except Killed:
             kills += 1
     assert kills > 2
-    whole = draw(settings=STEADY)
-    assert whole.converged
-    assert_same(again, whole)
+    steady = draw(settings=STEADY)
+    assert steady.converged
+    assert_same(again, steady)
 
 
 @pytest.mark.parametrize("moment", ["before the file", "before the rename", "after the rename"])
@@ -114,7 +121,7 @@ def test_a_run_goes_on_when_killed_while_a_block_is_written(tmp_path, monkeypatc
         patched.setattr(checkpoint.Checkpoint, "write", write)
         with pytest.raises(Killed):
             draw(tmp_path)
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
     assert not list(tmp_path.glob(".*"))
 
 
@@ -152,6 +159,7 @@ def child(folder, pause, pauses_after):
 
 
 @no_signals
+@pytest.mark.slow
 def test_a_process_that_is_killed_leaves_whole_blocks(tmp_path):
     """SIGKILL amid the second block; as long as the process is there, no other run gets in."""
     folder = tmp_path / "run"
@@ -164,7 +172,7 @@ def test_a_process_that_is_killed_leaves_whole_blocks(tmp_path):
         process.kill()
     assert process.returncode == -signal.SIGKILL
     assert len(list(folder.glob("block-*"))) == 1
-    assert_same(draw(folder), draw())
+    assert_same(draw(folder), whole())
 
 
 @no_signals
@@ -177,7 +185,7 @@ def test_processes_that_are_killed_at_random_moments_end_as_one_that_is_not(tmp_
             process.kill()
         kills += process.returncode == -signal.SIGKILL
     assert kills
-    assert_same(draw(folder), draw())
+    assert_same(draw(folder), whole())
 
 
 @pytest.mark.slow
@@ -201,20 +209,21 @@ def test_a_run_out_of_steps_goes_on_with_more_of_them(tmp_path, steps):
     target = Counted()
     assert_same(draw(tmp_path, settings=few, target=target), draw(settings=few))
     assert target.calls == 0
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
     assert draw(tmp_path, settings=few).steps_run == SMALL.max_steps  # what is there is never dropped
 
 
 def test_a_run_out_of_time_goes_on_with_the_same_time_again(tmp_path):
-    hasty = replace(SMALL, max_seconds=1e-9)
+    few = replace(SMALL, max_steps=40)
+    hasty = replace(few, max_seconds=1e-9)
     steps, seconds = [], [0.0]
-    for _ in range(6):
+    for _ in range(4):
         part = draw(tmp_path, settings=hasty)
         steps.append(part.steps_run)
         seconds.append(part.seconds)
-    assert steps == [10, 20, 30, 40, 50, 60]
+    assert steps == [10, 20, 30, 40]
     assert all(later > earlier for earlier, later in pairwise(seconds))
-    np.testing.assert_array_equal(part.samples, draw().samples)
+    np.testing.assert_array_equal(part.samples, draw(settings=few).samples)
 
 
 def test_a_run_that_ended_between_two_looks_is_judged_there_again(tmp_path):
@@ -249,7 +258,7 @@ def test_an_interrupt_keeps_the_whole_blocks(tmp_path):
         "block-00000000-00000010.npz",
         "block-00000010-00000020.npz",
     ]
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
 
 
 def test_an_interrupt_before_the_next_block_gives_what_is_there(tmp_path):
@@ -268,14 +277,14 @@ def test_an_interrupt_while_a_block_is_written_gives_what_is_in_memory(tmp_path,
         draws = draw(tmp_path)
     assert "interrupted" in draws.message
     assert draws.steps_run == 10
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
 
 
 def test_memory_holds_what_a_run_without_checkpoint_would(tmp_path):
     """Going on reads the later half of the steps only: the first files may be gone bad."""
     draw(tmp_path)
     (tmp_path / "block-00000000-00000010.npz").write_bytes(b"")
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
 
 
 def test_the_states_are_those_of_emcee(tmp_path):
@@ -391,18 +400,19 @@ def test_a_gap_is_refused_and_its_remedy_works(tmp_path):
     refuse(tmp_path, "no block that begins with step 30, but block-00000040-00000050.npz")
     for path in [*tmp_path.glob("block-00000040-*"), *tmp_path.glob("block-00000050-*")]:
         path.unlink()
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
 
 
 def test_a_damaged_block_is_refused_or_as_it_was(tmp_path):
     """A byte flipped anywhere, or the file cut off anywhere: never other draws."""
     reference = draw(tmp_path, settings=replace(SMALL, max_steps=10))
     (path,) = tmp_path.glob("block-*")
-    whole = path.read_bytes()
+    content = path.read_bytes()
     rng = np.random.default_rng(1)
     refused = 0
-    for at in sorted({*range(40), *range(len(whole) - 60, len(whole)), *rng.integers(0, len(whole), 60).tolist()}):
-        for damaged in (whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :], whole[:at]):
+    size = len(content)
+    for at in sorted({*range(0, 40, 2), *range(size - 60, size, 3), *rng.integers(0, size, 30).tolist()}):
+        for damaged in (content[:at] + bytes([content[at] ^ 0x55]) + content[at + 1 :], content[:at]):
             path.write_bytes(damaged)
             try:
                 again = draw(tmp_path, settings=replace(SMALL, max_steps=10))
@@ -412,7 +422,7 @@ def test_a_damaged_block_is_refused_or_as_it_was(tmp_path):
             else:
                 assert_same(again, reference)
             assert path.read_bytes() == damaged
-    assert refused > 150
+    assert refused > 65
 
 
 def test_a_block_of_another_shape_is_refused(begun):
@@ -441,7 +451,7 @@ def test_where_there_are_no_locks_a_second_run_writes_over_nothing(tmp_path, mon
 
     with pytest.raises(InferenceError, match=r"another run .* block-00000010-00000020\.npz is there"):
         draw(tmp_path, progress=other)
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
 
 
 def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
@@ -454,7 +464,7 @@ def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
         patched.setattr(checkpoint, "write_atomically", full)
         with pytest.raises(OSError, match="No space left"):
             draw(tmp_path)
-    assert_same(draw(tmp_path), draw())
+    assert_same(draw(tmp_path), whole())
 
 
 def test_looks_do_not_depend_on_where_a_run_began():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -41,11 +42,15 @@ def posterior_of(**values):
     return tree
 
 
+@cache
+def swept(friction):
+    """Loads without any other fault, and where the rod really touches."""
+    return tb.scan(CONTOUR, base=[(0.0, 0.0), (0.25, 0.0)], drive_step=np.radians(8.0), friction=friction).record
+
+
 def read_with(faults, *, stated=None, frame="fixed"):
     """What the rig reads, without noise, and where the rod really touches."""
-    truth = tb.scan(
-        CONTOUR, base=[(0.0, 0.0), (0.25, 0.0)], drive_step=np.radians(4.0), friction=faults.get("friction", 0.0)
-    ).record
+    truth = swept(faults.get("friction", 0.0))
     loads = np.stack([truth[name].values for name in CHANNELS], axis=1) * faults.get("rigidity_scale", 1.0)
     slope = truth.drive_angle.values + faults.get("suspension_compliance", 0.0) * loads[:, 0]
     short = ("moment", "force_x", "force_y")
@@ -91,9 +96,26 @@ GROUPS = [[name] for name in FAULTS] + [
 ]
 
 
-@pytest.mark.parametrize("frame", ["fixed", "turning"])
+MATTERS = ("drive_angle_offset", "force_x_bias", "force_x_gain", "suspension_compliance")
+"""Faults that are another thing where the load cell turns with the drive."""
+
+
+def called(names):
+    return names[0] if len(names) == 1 else f"{len(names)} faults"
+
+
 @pytest.mark.parametrize(
-    "names", GROUPS, ids=lambda names: "+".join(names) if len(names) < 3 else f"{len(names)} faults"
+    ("names", "frame"),
+    [
+        pytest.param(
+            names,
+            frame,
+            id=f"{called(names)}-{frame}",
+            marks=[pytest.mark.slow] if frame == "turning" and len(names) == 1 and names[0] not in MATTERS else [],
+        )
+        for names in GROUPS
+        for frame in ("fixed", "turning")
+    ],
 )
 def test_contacts_are_true_if_the_faults_are_found(names, frame):
     """Without them they are not: each fault shows, in the contacts or in what is left over."""
@@ -139,7 +161,7 @@ def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
     """Its single samples agree with one another once its stiffness is known."""
     read, _ = read_with({"rigidity_scale": 1.05})
     measured = CELL.measure(read, seed=1)
-    settings = tb.SamplerSettings(ensembles=2, walkers=24, max_r_hat=1.05, min_ess=200.0, max_steps=400)
+    settings = tb.SamplerSettings(ensembles=2, walkers=20, max_r_hat=1.1, min_ess=100.0, max_steps=400)
     posterior = tb.infer_contour(measured, load_cell=CELL, seed=1, settings=settings)
     assert tb.reconstruct(measured, method="constrained", load_cell=CELL).attrs["misfit_probability"] < 1e-6
     contacts = contact_points(measured, CELL, posterior)

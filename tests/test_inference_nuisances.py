@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -93,8 +95,18 @@ def test_what_nuisances_cost_is_what_was_found_independently(nuisances, channels
             assert found == pytest.approx(quoted, rel=0.25)
 
 
-def scanned(**options):
-    return scan(Parabola(0.5, 0.5), drive_step=np.radians(2.0), **options).record
+FEW = SamplerSettings(ensembles=2, walkers=24, block_steps=10, max_steps=10)
+"""Enough for names and units."""
+
+
+def scanned(degrees=5.0, **options):
+    return scan(Parabola(0.5, 0.5), drive_step=np.radians(degrees), **options).record
+
+
+@cache
+def coarse():
+    """One that is not to be changed."""
+    return scanned()
 
 
 def stack(*names):
@@ -116,7 +128,7 @@ def test_an_offset_shifts_what_the_encoder_reads(order):
 def test_a_pivot_may_be_off_where_the_record_has_it(order):
     bases = [(0.0, 0.0), (0.25, 0.0), (-0.2, 0.05)]
     off = np.array([[0.0, 0.0], [0.01, -0.004], [0.0, 0.02]])
-    true = scanned(base=[tuple(base) for base in np.array(bases) + off])
+    true = scanned(2.0, base=[tuple(base) for base in np.array(bases) + off])
     stated = true.assign({name: true[name].copy() for name in ("base_x", "base_y")})
     for k, base in enumerate(bases):
         at = (true.base_x == base[0] + off[k, 0]).values
@@ -136,7 +148,7 @@ def test_a_pivot_may_be_off_where_the_record_has_it(order):
 @pytest.mark.slow
 def test_a_pivot_that_is_off_is_found():
     """By 2 % of a rod length, of which the prior says 1 %; within 4 standard deviations, and 10 times as sharp."""
-    true = scanned(base=[(0.0, 0.0), (0.27, -0.02)])
+    true = scanned(2.0, base=[(0.0, 0.0), (0.27, -0.02)])
     stated = true.assign(base_x=true.base_x.round(1) * 0.25 / 0.3, base_y=0.0 * true.base_y)
     result = infer_contour(CELL.measure(stated, seed=1), nuisances=["bias", "base"], seed=1)
     posterior = result["posterior"].to_dataset()
@@ -229,7 +241,7 @@ FLAWS = {
 
 def flawed(name, value):
     """A record of a rig with one flaw, measured."""
-    record = scanned(friction=value if name == "friction" else 0.0)
+    record = scanned(2.0, friction=value if name == "friction" else 0.0)
     if name == "suspension_compliance":
         record = record.assign(drive_angle=record.drive_angle + value * record.holding_moment)
         still = np.ones(record.sizes["sample"], dtype=bool)
@@ -265,10 +277,9 @@ def test_a_flaw_that_is_inferred_is_found_and_does_no_harm(name):
 
 
 def test_what_is_standard_is_inferred_and_has_units():
-    settings = SamplerSettings(ensembles=2, max_steps=20)
     unit = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
     measured = unit.measure(scan(Parabola(5.0, 0.05), rod=SI, drive_step=0.1).record, seed=1)
-    result = infer_contour(measured, load_cell=unit, seed=1, settings=settings)
+    result = infer_contour(measured, load_cell=unit, seed=1, settings=FEW)
     units = {name: draws.attrs["units"] for name, draws in result["posterior"].data_vars.items()}
     assert units == {
         "a": "1/m",
@@ -286,14 +297,13 @@ def test_what_is_standard_is_inferred_and_has_units():
 
 def test_a_prior_makes_a_nuisance_of_what_was_taken_as_stated():
     priors = {"suspension_compliance": stats.halfnorm(scale=0.1)}
-    settings = SamplerSettings(ensembles=2, max_steps=20)
-    result = infer_contour(CELL.measure(scanned(), seed=1), nuisances=[], priors=priors, seed=1, settings=settings)
+    result = infer_contour(CELL.measure(coarse(), seed=1), nuisances=[], priors=priors, seed=1, settings=FEW)
     assert list(result["posterior"].data_vars) == ["a", "q", "x_c", "suspension_compliance", "noise_scale"]
 
 
 def test_biases_that_the_cell_is_not_sure_of_are_integrated_out_and_not_inferred_again():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, bias_uncertainty=(0.01, 0.0, 0.0))
-    measured = scanned()
+    measured = coarse()
     assert "moment_bias" not in default_priors(measured, load_cell=cell)
     assert "force_x_bias" in default_priors(measured, load_cell=cell)
     with pytest.raises(ParameterError, match="moment_bias is in the load cell's bias_uncertainty already"):
@@ -314,11 +324,11 @@ def test_biases_that_the_cell_is_not_sure_of_are_integrated_out_and_not_inferred
 )
 def test_what_cannot_be_inferred_is_refused(nuisances, words):
     with pytest.raises(ParameterError, match=words):
-        infer_contour(CELL.measure(scanned(), seed=1), nuisances=nuisances, seed=1)
+        infer_contour(CELL.measure(coarse(), seed=1), nuisances=nuisances, seed=1)
 
 
 def test_a_missing_channel_has_no_bias():
-    measured = scanned().drop_vars(["force_x"]).assign(force_x=("sample", np.full(scanned().sizes["sample"], np.nan)))
+    measured = coarse().drop_vars(["force_x"]).assign(force_x=("sample", np.full(coarse().sizes["sample"], np.nan)))
     assert "force_x_bias" not in default_priors(measured)
     with pytest.raises(ParameterError, match="force_x_bias cannot be inferred: the record has no such channel"):
         default_priors(measured, nuisances=["force_x_bias"])
@@ -326,4 +336,4 @@ def test_a_missing_channel_has_no_bias():
 
 def test_friction_is_either_known_or_inferred():
     with pytest.raises(ParameterError, match=r"friction is 0.2 and to be inferred as well"):
-        infer_contour(CELL.measure(scanned(), seed=1), nuisances=["friction"], friction=0.2, seed=1)
+        infer_contour(CELL.measure(coarse(), seed=1), nuisances=["friction"], friction=0.2, seed=1)

@@ -119,6 +119,13 @@ def made_up():
     return infer_point_load(*made_up_readings(1), seed=2, settings=QUICK)
 
 
+@pytest.fixture(scope="module")
+def in_brief():
+    """Enough for the layout of a result."""
+    settings = SamplerSettings(ensembles=2, walkers=20, block_steps=20, max_steps=40)
+    return infer_point_load(*made_up_readings(1), seed=2, settings=settings)
+
+
 @pytest.mark.slow
 def test_a_made_up_rig_is_recovered(made_up):
     """Nine parameters within 4 posterior sd: false alarm below 1e-3."""
@@ -131,8 +138,8 @@ def test_a_made_up_rig_is_recovered(made_up):
     assert 0.001 < predictive_p_value(made_up) < 0.999
 
 
-def test_the_result_is_laid_out_for_arviz_and_survives_a_file(made_up, tmp_path):
-    assert set(made_up.children) == {
+def test_the_result_is_laid_out_for_arviz_and_survives_a_file(in_brief, tmp_path):
+    assert set(in_brief.children) == {
         "posterior",
         "posterior_predictive",
         "log_likelihood",
@@ -141,34 +148,34 @@ def test_the_result_is_laid_out_for_arviz_and_survives_a_file(made_up, tmp_path)
         "constant_data",
     }
     for group in ("posterior", "posterior_predictive", "log_likelihood"):
-        for variable in made_up[group].data_vars.values():
+        for variable in in_brief[group].data_vars.values():
             assert variable.dims[:2] == ("chain", "draw")
             assert np.all(np.isfinite(variable))
-    assert made_up.attrs["seed"] == "2"
-    assert len(made_up.attrs["data_sha256"]) == 64
-    summary = arviz_stats.summary(made_up, ci_prob=0.95, ci_kind="eti")
+    assert in_brief.attrs["seed"] == "2"
+    assert len(in_brief.attrs["data_sha256"]) == 64
+    summary = arviz_stats.summary(in_brief, ci_prob=0.95, ci_kind="eti")
     assert len(summary) == 9
-    assert made_up.log_likelihood.reading.sizes["point"] == 32
+    assert in_brief.log_likelihood.reading.sizes["point"] == 32
     path = tmp_path / "whisker.nc"
-    made_up.to_netcdf(path, engine="h5netcdf")
+    in_brief.to_netcdf(path, engine="h5netcdf")
     with xr.open_datatree(path, engine="h5netcdf") as back:
-        xr.testing.assert_identical(back.load().posterior.to_dataset(), made_up.posterior.to_dataset())
-        assert back.attrs["message"] == made_up.attrs["message"]
+        xr.testing.assert_identical(back.load().posterior.to_dataset(), in_brief.posterior.to_dataset())
+        assert back.attrs["message"] == in_brief.attrs["message"]
 
 
-def test_predictions_and_likelihood_belong_to_the_draws(made_up):
+def test_predictions_and_likelihood_belong_to_the_draws(in_brief):
     """Redo the model for a few draws from what the tree holds; the readings predicted scatter by the noise."""
-    axial, lateral = (made_up.constant_data[name].values for name in ("axial", "lateral"))
-    for draw in (0, 777):
-        one = made_up.posterior.to_dataset().isel(chain=1, draw=draw)
+    axial, lateral = (in_brief.constant_data[name].values for name in ("axial", "lateral"))
+    for draw in (0, 77):
+        one = in_brief.posterior.to_dataset().isel(chain=1, draw=draw)
         curvature = rig_curvature(axial, lateral, {name: float(one[name]) for name in RIG})
         expected = np.polynomial.polynomial.polyval(curvature, one.sensor_coefficient.values)
-        predictive = made_up.posterior_predictive.to_dataset().isel(chain=1, draw=draw)
+        predictive = in_brief.posterior_predictive.to_dataset().isel(chain=1, draw=draw)
         np.testing.assert_allclose(predictive.expected_reading, expected, rtol=1e-9)
-        likelihood = stats.norm(expected, float(one.noise_sd)).logpdf(made_up.observed_data.reading)
-        np.testing.assert_allclose(made_up.log_likelihood.reading.isel(chain=1, draw=draw), likelihood, rtol=1e-9)
-    predictive = made_up.posterior_predictive.to_dataset()
-    scatter = ((predictive.reading - predictive.expected_reading) / made_up.posterior.noise_sd).values
+        likelihood = stats.norm(expected, float(one.noise_sd)).logpdf(in_brief.observed_data.reading)
+        np.testing.assert_allclose(in_brief.log_likelihood.reading.isel(chain=1, draw=draw), likelihood, rtol=1e-9)
+    predictive = in_brief.posterior_predictive.to_dataset()
+    scatter = ((predictive.reading - predictive.expected_reading) / in_brief.posterior.noise_sd).values
     assert scatter.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * scatter.size))
     assert abs(scatter.mean()) < 4.0 / np.sqrt(scatter.size)
 
@@ -249,6 +256,12 @@ def whisker_posterior(whisker):
     return infer_point_load(*whisker, seed=1)
 
 
+@pytest.fixture(scope="module")
+def whisker_roughly(whisker):
+    settings = SamplerSettings(ensembles=2, walkers=32, min_ess=150, max_r_hat=1.05)
+    return infer_point_load(*whisker, seed=1, settings=settings)
+
+
 def rms_over_range(tree):
     reading = tree.observed_data.reading.values
     left = reading - tree.posterior_predictive.expected_reading.mean(("chain", "draw")).values
@@ -266,14 +279,14 @@ def test_a_real_whisker_is_a_large_deflection_rod(whisker_posterior):
     assert 0.001 < predictive_p_value(whisker_posterior) < 0.999
 
 
-def test_the_largest_residual_of_a_real_whisker_is_not_surprising(whisker_posterior):
+def test_the_largest_residual_of_a_real_whisker_is_not_surprising(whisker_roughly):
     """One side counts here: false alarm below 1 in 1000."""
-    assert predictive_p_value(whisker_posterior, lambda z: np.abs(z).max(axis=-1)) > 0.001
+    assert predictive_p_value(whisker_roughly, lambda z: np.abs(z).max(axis=-1)) > 0.001
 
 
-def test_the_suspension_of_a_real_whisker_is_soft(whisker_posterior):
+def test_the_suspension_of_a_real_whisker_is_soft(whisker_roughly):
     """More than four sd from rigid; with a rigid clamp the residual nearly doubles (next test)."""
-    compliance = whisker_posterior.posterior.compliance
+    compliance = whisker_roughly.posterior.compliance
     assert float(compliance.mean()) > 4.0 * float(compliance.std())
 
 

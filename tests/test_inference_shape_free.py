@@ -67,7 +67,7 @@ def model_of(nuisances=STANDARD, profile="II", rod=None, cell=CELL):
     contour = paper_profile(profile, q=0.5)
     if rod is not None:
         contour = Parabola(0.5 / rod.length, 0.5 * rod.length)
-    measured = cell.measure(scan(contour, rod=rod, drive_step=np.radians(2.0)).record, seed=1)
+    measured = cell.measure(scan(contour, rod=rod, drive_step=np.radians(5.0)).record, seed=1)
     noise = noise_of(measured, cell)
     rig = nuisances_of(measured, nuisances, {}, noise.cell, 0.0)
     priors = default_priors(measured, "shape-free", cell, nuisances)

@@ -196,7 +196,7 @@ def test_the_data_sheet_goes_with_the_record():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", ["csv", "nc"])
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(sheet=load_cells(), rod=rods)
 def test_files_keep_the_data_sheet(tmp_path_factory, ending, sheet, rod):
     measured = sheet.measure(ideal(20, rod=rod), seed=1)
@@ -219,7 +219,7 @@ def test_an_encoder_in_degrees_is_refused_where_it_measures(name, value):
 # --- Units ------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(load_cells(), rods, st.integers(0, 2**31))
 def test_what_it_does_is_the_same_in_all_units(sheet, rod, seed):
     record = ideal(20, rod=rod)
@@ -238,7 +238,7 @@ def entries_of(sheet):
     return {name: value for name, value in sheet.entries().items() if value != 0.0}
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(load_cells(frames=(None,)), rods, st.integers(0, 2**31))
 def test_the_likelihood_is_the_same_in_all_units_but_for_their_jacobian(sheet, rod, seed):
     loads = np.random.default_rng(seed).normal(size=(4, 6, 3))

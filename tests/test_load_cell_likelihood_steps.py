@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy import integrate, stats
+from scipy import integrate, special, stats
 from tests.helpers.load_cells import CELL, cell
 
 from tactile_bayes.load_cell import LoadCell
@@ -17,6 +17,15 @@ MOMENT_ALONE = np.array([1.0, np.nan, np.nan])
 
 def law(degrees_of_freedom, place, scale):
     return stats.norm(place, scale) if np.isinf(degrees_of_freedom) else stats.t(degrees_of_freedom, place, scale)
+
+
+def density_of(degrees_of_freedom, place, scale):
+    """The textbook's, of plain numbers: to be integrated."""
+    if np.isinf(degrees_of_freedom):
+        return lambda r: np.exp(-0.5 * ((r - place) / scale) ** 2) / (scale * np.sqrt(2.0 * np.pi))
+    nu = degrees_of_freedom
+    top = np.exp(special.gammaln((nu + 1.0) / 2.0) - special.gammaln(nu / 2.0)) / (scale * np.sqrt(nu * np.pi))
+    return lambda r: top * (1.0 + ((r - place) / scale) ** 2 / nu) ** (-(nu + 1.0) / 2.0)
 
 
 def of_moment(sheet, readings, loads, **options):
@@ -56,7 +65,7 @@ def test_a_step_has_the_integral_of_the_density_over_it(degrees_of_freedom, step
     sheet = cell(moment_resolution=step, degrees_of_freedom=degrees_of_freedom)
     readings = step * np.arange(-3, 4)
     for load in (0.0, 0.013, -0.1):
-        density = law(degrees_of_freedom, load, 0.02 * scale).pdf
+        density = density_of(degrees_of_freedom, load, 0.02 * scale)
         areas = [
             integrate.quad(density, r - step / 2, r + step / 2, epsabs=0, epsrel=1e-11, points=[load])[0]
             for r in readings
@@ -71,13 +80,13 @@ def test_a_reading_at_the_end_of_the_range_is_anything_beyond(degrees_of_freedom
     sheet = cell(moment_range=0.2, moment_resolution=step, degrees_of_freedom=degrees_of_freedom)
     last = 0.18 if step else 0.2
     for load in (-0.3, 0.0, 0.1, 0.17, 0.4):
-        density = law(degrees_of_freedom, load, 0.02)
+        density, beyond = density_of(degrees_of_freedom, load, 0.02), law(degrees_of_freedom, load, 0.02)
         for sign in (-1, 1):
             edge = sign * (last - step / 2)
             # In pieces: the peak, if it is beyond, and what is left of the tail.
             cuts = sorted({edge, max(sign * load, sign * edge) * sign, sign * 3.0}, key=lambda v: sign * v)
-            areas = [integrate.quad(density.pdf, *pair, epsabs=0, epsrel=1e-11)[0] for pair in pairwise(cuts)]
-            area = sign * sum(areas) + density.sf(3.0 + load - sign * load)
+            areas = [integrate.quad(density, *pair, epsabs=0, epsrel=1e-11)[0] for pair in pairwise(cuts)]
+            area = sign * sum(areas) + beyond.sf(3.0 + load - sign * load)
             result = of_moment(sheet, [sign * last], load)
             assert result == pytest.approx(np.log(area), rel=1e-8)
 
@@ -151,7 +160,7 @@ def test_channels_have_their_own_steps_and_ranges():
 
 def test_the_end_of_the_range_is_the_same_in_all_units():
     """2.5 steps, that may be 2.4999 or 2.5001 in another unit."""
-    for unit in np.random.default_rng(3).uniform(0.1, 10.0, 200):
+    for unit in np.random.default_rng(3).uniform(0.1, 10.0, 50):
         sheet = LoadCell(moment_noise=0.2 * unit, moment_range=1.0 * unit, moment_resolution=0.4 * unit)
         assert sheet.limit[0] == pytest.approx(0.8 * unit, rel=1e-12)
         whole = LoadCell(moment_range=1.2 * unit, moment_resolution=0.4 * unit)

@@ -24,8 +24,14 @@ def alarms(sheet, missing=()):
     return surprise > stats.chi2(3 - len(missing)).isf(FALSE_ALARM)
 
 
-@pytest.mark.parametrize("missing", [(), (1,)])
-@pytest.mark.parametrize("name", [*NORMAL, "outliers"])
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [
+        *((name, ()) for name in [*NORMAL, "outliers"]),
+        ("outliers", (1,)),
+        *(pytest.param(name, (1,), marks=pytest.mark.slow) for name in NORMAL),
+    ],
+)
 def test_one_unloaded_sample_in_a_thousand_looks_loaded(name, missing):
     """Counted sample by sample, because those of a record know of one another; fails for one seed in 100 000."""
     sheet = NORMAL.get(name, cell(degrees_of_freedom=3.0, bias=(0.1, 0.2, 0.3)))
@@ -38,10 +44,12 @@ def test_one_unloaded_sample_in_a_thousand_looks_loaded(name, missing):
     ("sheet", "least"),
     [
         (cell(force_resolution=0.1, moment_resolution=0.04), 1 / 3),
-        (cell(force_resolution=0.1, moment_resolution=0.04, bias=(0.02, 0.05, 0.05)), 1 / 4),
+        pytest.param(
+            cell(force_resolution=0.1, moment_resolution=0.04, bias=(0.02, 0.05, 0.05)), 1 / 4, marks=pytest.mark.slow
+        ),
         (cell(force_resolution=0.025, moment_resolution=0.01, correlation=SHARED), 0.8),
         (cell(degrees_of_freedom=3.0, bias_uncertainty=(0.02, 0.05, 0.05)), 1 / 5),
-        (cell(degrees_of_freedom=3.0, bias_uncertainty=(0.06, 0.15, 0.15)), 0.0),
+        pytest.param(cell(degrees_of_freedom=3.0, bias_uncertainty=(0.06, 0.15, 0.15)), 0.0, marks=pytest.mark.slow),
     ],
 )
 def test_steps_and_outliers_that_wander_are_rarer_by_what_is_stated(sheet, least):

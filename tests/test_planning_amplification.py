@@ -54,7 +54,7 @@ def in_the_middle(name):
     angles = []
     for sweep in plan.scan.sweeps:
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
-        every = first + (snap - first) * np.linspace(0.05, 0.95, 19)
+        every = first + (snap - first) * np.linspace(0.05, 0.95, 10)
         changes = np.array([change.drive_angle for change in sweep.transitions])
         angles.append(every[np.all(np.abs(every[:, None] - changes) > 0.02, axis=1)])
     plan = replace(plan, drive_angles=np.unique(np.concatenate(angles)))
@@ -99,7 +99,7 @@ def differences(plan, method, source):
     return (4.0 * found[0] - found[1]) / 3.0  # Richardson
 
 
-AT_ONCE = ("a thick rod in SI", "cross-talk", "all of it turning", "friction")
+AT_ONCE = ("cross-talk", "all of it turning", "friction")
 GAINS = [name if name in AT_ONCE else pytest.param(name, marks=pytest.mark.slow) for name in PLANS]
 
 
@@ -125,12 +125,12 @@ SLOWLY = [pytest.param(name, marks=pytest.mark.slow) for name in ("correlated no
 
 @pytest.mark.parametrize("name", ["all of it turning", *SLOWLY])
 def test_standard_deviations_are_those_of_noise_that_is_drawn(name):
-    """Within 4.5 standard errors: of some 50 numbers for each rig, false alarms in 1 of 3000 runs."""
-    draws = 1000
+    """Within 4.5 standard errors: of some 30 numbers for each rig, false alarms in 1 of 3000 runs."""
+    draws = 600
     plan, grown = in_the_middle(name)
     record, rng = loaded(plan), np.random.default_rng(1)
     count = record.sizes["sample"]
-    every = np.arange(0, count, 5)
+    every = np.arange(0, count, 3)
     record, grown = record.isel(sample=every), grown.isel(sample=every)
     cell = replace(plan.cell, bias=(0.0, 0.0, 0.0), gain=tb.LoadCell().gain)
     noise = cell.simulate(np.zeros((draws, every.size, 3)), seed=rng).reshape(-1, 3)

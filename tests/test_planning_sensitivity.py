@@ -21,16 +21,17 @@ from tactile_bayes.planning.sensitivity import PARTS, sensitivity
 
 ROD = tb.Rod(length=0.2, flexural_rigidity=2e-3)
 PROFILE = paper_profile("II", q=0.5)
+STEP = 0.1
 
 
 @cache
 def plain():
-    return tb.sensitivity(seed=1, samples=4)
+    return tb.sensitivity(seed=1, samples=4, drive_step=STEP)
 
 
 @cache
 def in_si():
-    return tb.sensitivity(seed=1, samples=4, rod=ROD)
+    return tb.sensitivity(seed=1, samples=4, drive_step=STEP, rod=ROD)
 
 
 def words(tree):
@@ -39,7 +40,7 @@ def words(tree):
 
 @pytest.mark.slow
 def test_the_groups_are_those_of_single_analyses():
-    tree, plan = plain(), Plan(PROFILE)
+    tree, plan = plain(), Plan(PROFILE, drive_step=STEP)
     assert set(tree.children) == set(PARTS)
     singly = {
         "amplification": amplification(plan),
@@ -148,7 +149,7 @@ def test_a_contour_out_of_reach_is_refused():
 
 
 def test_one_sweep_has_no_gap_to_speak_of():
-    tree = sensitivity(PROFILE, seed=1, parts=["information"], direction="backward")
+    tree = sensitivity(PROFILE, seed=1, drive_step=STEP, parts=["information"], direction="backward")
     (line,) = [line for line in words(tree) if "band of the contour" in line]
     assert "gap" not in line
 

@@ -61,7 +61,7 @@ def assert_statuses_tell_the_truth(contacts):
 
 
 @pytest.mark.parametrize(("base", "friction"), [((0.0, 0.0), 0.0), ((0.15, -0.05), 0.3)])
-@pytest.mark.parametrize("q", [0.1, 0.5, 0.8])
+@pytest.mark.parametrize("q", [0.5, *(pytest.param(q, marks=pytest.mark.slow) for q in (0.1, 0.8))])
 @pytest.mark.parametrize("profile", ["I", "II", "III", "IV"])
 def test_a_record_without_noise_gives_the_contour_back(profile, q, base, friction):
     contour = paper_profile(profile, q)

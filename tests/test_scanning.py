@@ -203,11 +203,13 @@ def rate(contour, alpha):
 @pytest.mark.parametrize(
     ("contour", "phases"),
     [
-        (paper_profile("II", 0.3), ["tangential", "fold"]),
+        pytest.param(paper_profile("II", 0.3), ["tangential", "fold"], marks=pytest.mark.slow),
         (paper_profile("II", 0.4), ["tip", "tip → tangential", "fold"]),
-        (paper_profile("III", 0.6), ["tip", "tip → tangential", "tangential → tip", "fold"]),
+        pytest.param(
+            paper_profile("III", 0.6), ["tip", "tip → tangential", "tangential → tip", "fold"], marks=pytest.mark.slow
+        ),
         (paper_profile("II", 0.7), ["tip", "fold"]),
-        (Circle(0.2, 0.3), ["tangential", "fold"]),
+        pytest.param(Circle(0.2, 0.3), ["tangential", "fold"], marks=pytest.mark.slow),
     ],
     ids=["II-0.3", "II-0.4", "III-0.6", "II-0.7", "small-circle"],
 )

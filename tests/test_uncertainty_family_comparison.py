@@ -11,12 +11,12 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.uncertainty.family_comparison import compare_families
 
-BRIEF = SamplerSettings(ensembles=2, min_ess=200, max_r_hat=1.1, max_steps=100)
+BRIEF = SamplerSettings(ensembles=2, walkers=20, min_ess=100, max_r_hat=1.1, max_steps=40)
 
 
 @pytest.fixture(scope="module")
 def circle():
-    return CELL.measure(swept(Circle(0.8, 0.5, 0.0), step=0.15), seed=1)
+    return CELL.measure(swept(Circle(0.8, 0.5, 0.0), step=0.1, direction="forward"), seed=1)
 
 
 @pytest.fixture(scope="module")

@@ -61,6 +61,12 @@ def implied() -> xr.DataTree:
     return implied_contacts(posterior(), draws=100)
 
 
+@cache
+def single() -> xr.Dataset:
+    """Contacts of the same record, each by itself."""
+    return reconstruct(measured(), method="constrained", load_cell=CELL)
+
+
 def parameters(contour):
     return {name: [getattr(contour, name)] * 3 for name in ("a", "r", "q", "x_c") if hasattr(contour, name)}
 
@@ -199,7 +205,7 @@ def test_a_sample_that_only_some_contours_touch_says_so():
 
 def test_the_contour_tightens_single_contacts():
     """Some 90 contacts determine three parameters: each contact is tighter than alone by about √(90/3), or more."""
-    tight, loose = contact_moments(implied()), reconstruct(measured(), method="constrained", load_cell=CELL)
+    tight, loose = contact_moments(implied()), single()
     shown = (loose.status == "ok").values & (tight.contact_probability == 1.0).values
     assert shown.sum() > 40
     for name in ("tangent_sd", "normal_sd"):
@@ -290,12 +296,13 @@ def ratios(ax):
 
 
 def test_the_figure_shows_both_and_their_ratio():
-    single = reconstruct(measured(), method="constrained", load_cell=CELL)
     axes = own_axes()
-    found = plotting.tightening(implied(), single, probability=0.5, truth=Parabola(0.5, 0.5), axes=axes)
+    found = plotting.tightening(implied(), single(), probability=0.5, truth=Parabola(0.5, 0.5), axes=axes)
     assert found.tolist() == axes.tolist()
     tight = contact_moments(implied())
-    expected = (single.tangent_sd / tight.tangent_sd).where(single.status == "ok").where(tight.contact_probability == 1)
+    expected = (
+        (single().tangent_sd / tight.tangent_sd).where(single().status == "ok").where(tight.contact_probability == 1)
+    )
     drawn = np.concatenate([line.get_ydata() for line in ratios(axes[4])[:2]])
     np.testing.assert_allclose(drawn, expected, rtol=1e-12)
     for ax in axes[1:4]:
@@ -307,26 +314,27 @@ def test_the_figure_shows_both_and_their_ratio():
 
 
 def test_the_figure_takes_posteriors_of_single_contacts_and_chosen_samples():
-    single = infer_contacts(measured(), load_cell=CELL, seed=1, draws=80, method="importance")
-    axes = plotting.tightening(implied(), single, samples=[40, 60, 120], axes=own_axes())
+    posteriors = infer_contacts(measured(), load_cell=CELL, seed=1, draws=40, method="importance")
+    axes = plotting.tightening(implied(), posteriors, samples=[40, 60, 120], axes=own_axes())
     x = contact_moments(implied()).contact_x.values[[40, 60, 120]]
     assert [text.xy[0] for text in axes[0].texts] == x.tolist()
 
 
 def test_the_figure_refuses_what_does_not_belong_together():
-    single = reconstruct(measured(), method="constrained", load_cell=CELL)
     with pytest.raises(ParameterError, match="not of one record"):
-        plotting.tightening(implied(), single.isel(sample=slice(100)), axes=own_axes())
+        plotting.tightening(implied(), single().isel(sample=slice(100)), axes=own_axes())
     with pytest.raises(ParameterError, match="axes are 2: give five"):
-        plotting.tightening(implied(), single, axes=own_axes(2))
+        plotting.tightening(implied(), single(), axes=own_axes(2))
     with pytest.raises(ParameterError, match=r"samples are .*: give three"):
-        plotting.tightening(implied(), single, samples=[0, 60], axes=own_axes())
+        plotting.tightening(implied(), single(), samples=[0, 60], axes=own_axes())
     with pytest.raises(ParameterError, match=r"probability is 1\.0"):
-        plotting.tightening(implied(), single, probability=1.0, axes=own_axes())
+        plotting.tightening(implied(), single(), probability=1.0, axes=own_axes())
     with pytest.raises(ParameterError, match="implied is no tree"):
-        plotting.tightening(implied()["posterior"].to_dataset(), single, axes=own_axes())
+        plotting.tightening(implied()["posterior"].to_dataset(), single(), axes=own_axes())
     with pytest.raises(ParameterError, match="not three contacts"):
-        plotting.tightening(implied(), single.assign(status=single.status.where(False, "nonlinear")), axes=own_axes())
+        plotting.tightening(
+            implied(), single().assign(status=single().status.where(False, "nonlinear")), axes=own_axes()
+        )
 
 
 def test_ellipses_of_moments_are_drawn():

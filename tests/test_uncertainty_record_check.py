@@ -129,7 +129,7 @@ def test_few_predictions_say_so_or_bound_the_false_alarms():
 
 @pytest.mark.parametrize(("profile", "passes"), [("II", True), ("IV", False)])
 def test_a_parabola_is_told_from_what_is_none(profile, passes):
-    measured = CELL.measure(scan(paper_profile(profile, q=0.5), drive_step=0.05).record, seed=1)
+    measured = CELL.measure(scan(paper_profile(profile, q=0.5), drive_step=0.1).record, seed=1)
     check = check_record(infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=SHORT))
     assert check.passed == passes
     assert check.attrs["false_alarm"] < 2e-3

@@ -63,8 +63,17 @@ def most(sweeps, false_alarm):
     return stats.binom.isf(1e-4, sweeps, false_alarm)
 
 
-@pytest.mark.parametrize("channels", [1, 3])
-@pytest.mark.parametrize(("samples", "sweeps"), [(3, 300), (5, 300), (20, 300), (200, 200), (2000, 60)])
+@pytest.mark.parametrize(
+    ("samples", "sweeps", "channels"),
+    [
+        (3, 300, 3),
+        (5, 300, 3),
+        (20, 300, 1),
+        (200, 200, 3),
+        *(pytest.param(*case, 1, marks=pytest.mark.slow) for case in ((3, 300), (5, 300), (200, 200), (2000, 60))),
+        *(pytest.param(*case, 3, marks=pytest.mark.slow) for case in ((20, 300), (2000, 60))),
+    ],
+)
 def test_contact_is_claimed_no_more_often_than_allowed(samples, sweeps, channels):
     assert alarms(samples, channels, sweeps, 0.1) <= most(sweeps, 0.1)
 
@@ -92,7 +101,7 @@ def test_correlated_channels_keep_the_rate():
 
 def test_sweeps_without_contact_are_unloaded():
     used = 0
-    for seed in range(60):
+    for seed in range(30):
         found = zero_load(record_of(noisy(np.zeros((60, 3)), seed)))
         assert not found.contact.item()
         assert found.unloaded.all() or not found.unloaded.any()
@@ -100,7 +109,7 @@ def test_sweeps_without_contact_are_unloaded():
         assert (found.onset == -1).all()
         assert (found.snap_off == -1).all()
         assert np.isnan(found.onset_drive_angle).all()
-    assert used >= stats.binom.ppf(1e-4, 60, 0.9)  # in doubt at two levels of 5 %
+    assert used >= stats.binom.ppf(1e-4, 30, 0.9)  # in doubt at two levels of 5 %
 
 
 # --- Contact that is there ----------------------------------------------------------------------------------------
@@ -117,7 +126,7 @@ CONTOURS = [
 
 
 @pytest.mark.parametrize("noise", [pytest.param(1e-4, marks=pytest.mark.slow), 1e-2, 0.2])
-@pytest.mark.parametrize("step", [pytest.param(0.4, marks=pytest.mark.slow), 1.0, 3.0])
+@pytest.mark.parametrize("step", [*(pytest.param(step, marks=pytest.mark.slow) for step in (0.4, 1.0)), 3.0])
 @pytest.mark.parametrize("contour", CONTOURS)
 def test_events_of_real_sweeps_are_bracketed(contour, step, noise):
     ideal = scan(contour, drive_step=np.radians(step)).record
@@ -142,7 +151,14 @@ def test_events_of_real_sweeps_are_bracketed(contour, step, noise):
 
 @pytest.mark.parametrize(
     ("before", "loaded", "after", "slope"),
-    [(15, 100, 15, 0.2), (15, 60, 15, 1.0), (15, 60, 15, 20.0), (40, 60, 0, 1.0), (0, 60, 15, 1.0), (3, 30, 3, 5.0)],
+    [
+        (15, 60, 15, 1.0),
+        (3, 30, 3, 5.0),
+        pytest.param(15, 100, 15, 0.2, marks=pytest.mark.slow),
+        pytest.param(15, 60, 15, 20.0, marks=pytest.mark.slow),
+        pytest.param(40, 60, 0, 1.0, marks=pytest.mark.slow),
+        pytest.param(0, 60, 15, 1.0, marks=pytest.mark.slow),
+    ],
 )
 def test_bias_over_its_uncertainty_is_students_t(before, loaded, after, slope):
     rng, pulls, freedoms = np.random.default_rng(8), [], []
@@ -164,7 +180,7 @@ def test_bias_over_its_uncertainty_is_students_t(before, loaded, after, slope):
 
 def test_noise_over_its_truth_is_chi_squared():
     total, freedom = 0.0, 0
-    for seed in range(60):
+    for seed in range(30):
         found = zero_load(record_of(noisy(ramp(15, 60, 15, 1.0), seed, 0.3)))
         of_each = int(found.unloaded.sum()) - 2
         total += of_each * float(((found.noise / 0.3) ** 2).sum())
@@ -172,7 +188,14 @@ def test_noise_over_its_truth_is_chi_squared():
     assert stats.chi2.ppf(1e-4, freedom) < total < stats.chi2.isf(1e-4, freedom)
 
 
-@pytest.mark.parametrize(("parts", "height"), [((15, 15, 15), 9.0), ((15, 100, 15), 5.5), ((100, 500, 100), 2.5)])
+@pytest.mark.parametrize(
+    ("parts", "height"),
+    [
+        ((15, 15, 15), 9.0),
+        ((15, 100, 15), 5.5),
+        pytest.param((100, 500, 100), 2.5, marks=pytest.mark.slow),
+    ],
+)
 def test_a_weak_load_on_one_channel_is_found(parts, height):
     before, loaded, after = parts
     loads = ramp(before, loaded, after, height / loaded) * [1.0, 0.0, 0.0]
@@ -212,7 +235,9 @@ def test_a_few_samples_tell_nothing(samples):
     assert not found.unloaded.any()
 
 
-@pytest.mark.parametrize("missing", [("holding_moment",), ("force_x", "force_y"), ("force_y",)])
+@pytest.mark.parametrize(
+    "missing", [("holding_moment",), ("force_x", "force_y"), pytest.param(("force_y",), marks=pytest.mark.slow)]
+)
 def test_missing_channels_stay_missing(missing):
     measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
     complete = zero_load(measured)
