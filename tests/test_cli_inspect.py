@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,8 @@ import tactile_bayes as tb
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.record import CHANNELS, write_record
 from test_cli import assert_misused, assert_refused, call
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 COLUMNS = ("drive_angle=90-Winkel[deg]", "holding_moment=Mz", "force_x=-Fx[mN]", "force_y=Fy")
 READING = [
@@ -41,8 +44,15 @@ def rig(tmp_path_factory):
     return path
 
 
+def test_the_rigs_file_that_comes_with_the_package_is_like_it(rig):
+    ours = Path(__file__).parents[1] / "data" / "synthetic" / "rig.csv"
+    stored, made = (pd.read_csv(path, sep=";", decimal=",") for path in (ours, rig))
+    assert list(stored.columns) == ["Angle", *made.columns[1:]]
+    np.testing.assert_allclose(stored, made, rtol=0.0, atol=1.5e-4)
+
+
 @pytest.fixture(scope="module")
-def inspected(rig, tmp_path_factory):
+def inspected(rig, tmp_path_factory, coarse_pictures):
     folder = tmp_path_factory.mktemp("inspected") / "inspection"
     return call("inspect", rig, *READING, "--out", folder), folder
 

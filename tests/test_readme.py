@@ -1,6 +1,7 @@
 """The README's blocks run as they stand."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,8 @@ from typer.testing import CliRunner
 import tactile_bayes as tb
 from tactile_bayes.cli import app
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:
@@ -42,3 +44,20 @@ def test_the_data_set_is_made_and_read(tmp_path: Path, monkeypatch: pytest.Monke
     exec(compile(of_data_set, "README.md", "exec"), names)
     assert names["snap_off"].shape == (8, 2)
     assert (names["contacts"].status == "ok").sum() > 100
+
+
+def test_a_rigs_file_says_what_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    section = README.split("## From a rig's file to a report\n")[1].split("\n## ")[0]
+    shown = [text for language, text in re.findall(r"```(\w*)\n(.*?)```", section, flags=re.DOTALL) if not language]
+    assert Path("data/synthetic/rig.csv").read_text(encoding="utf-8").startswith(shown[0])
+    (asked,) = re.findall(r"^tactile-bayes (inspect .*?)(?<!\\)\n", section, flags=re.DOTALL | re.MULTILINE)
+    words = [word.strip() for word in shlex.split(asked.replace("\\\n", " "))]
+    first, *_ = CliRunner().invoke(app, words).stdout.splitlines(keepends=True)
+    assert first == shown[1]
+    words = [word.replace("force_x=Fx", "force_x=-Fx") for word in words]
+    inspected = CliRunner().invoke(app, words).stdout
+    for part in shown[2].split("\n\n"):
+        assert part in inspected
+    found = CliRunner().invoke(app, ["reconstruct", *words[1:], "--out", str(tmp_path)]).stdout
+    assert found.startswith(shown[3])
