@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import signal
 
 import pytest
+import typer.testing
 from hypothesis import settings
 
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
@@ -29,6 +31,16 @@ def interruptible():
     """Processes that tests start hear interrupts, also where the tests run in the background and ignore them."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def commands_built_once():
+    """Typer's runner puts all commands together for each call, which takes longer than most calls."""
+    with pytest.MonkeyPatch.context() as patch:
+        build = getattr(typer.testing, "_get_command", None)
+        if build is not None:
+            patch.setattr(typer.testing, "_get_command", functools.cache(build))
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -59,6 +71,21 @@ def quick(monkeypatch):
 
     monkeypatch.setattr(run, "infer_contour", infer_quickly)
     monkeypatch.setattr(run, "_draw", lambda *arguments, **options: {})
+
+
+@pytest.fixture(scope="module")
+def coarse_pictures():
+    """Figures are written in few pixels, for tests that ask only whether they are there."""
+    from matplotlib.figure import Figure
+
+    write = Figure.savefig
+
+    def coarsely(figure, *arguments, dpi=None, **options):
+        write(figure, *arguments, dpi=25, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", coarsely)
+        yield
 
 
 @pytest.fixture

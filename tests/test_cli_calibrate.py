@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 
 import pytest
@@ -9,9 +10,12 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from tactile_bayes.calibration.ledger import REPLICATES
+from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.cli.app import app
 
-QUICK = ("--as-stated", "--drive-step", "4", "--workers", "1", "-q")
+QUICK = ("--as-stated", "--drive-step", "8", "--workers", "1", "-q")
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 
 def call(*words):
@@ -19,7 +23,7 @@ def call(*words):
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def done(tmp_path_factory, coarse_pictures):
     """Two replicates, and what was said of them."""
     out = tmp_path_factory.mktemp("calibration") / "run"
     result = call("--out", out, "--replicates", 2, *QUICK)
@@ -69,11 +73,19 @@ def test_another_experiment_is_refused(done):
     assert "holds replicates of another experiment: seed is 1 there and 2 here" in result.stderr
 
 
-def test_a_world_is_told_and_kept(tmp_path):
+def test_a_world_is_told_and_kept(tmp_path, monkeypatch):
+    made = []
+
+    def replicate(task):
+        made.append(task[0].world)
+        return Outcome({"a": 50}, {"seconds": 0.0, "converged": 1.0, "check_passed": 1.0}, "converged")
+
+    monkeypatch.setattr(importlib.import_module("tactile_bayes.calibration.calibrate"), "replicate", replicate)
     worlds = ("--world", "friction=0.3", "--world", "base_shift=0.01,-0.02")
     result = call("--out", tmp_path, "--replicates", 1, *worlds, *QUICK)
     assert result.exit_code == 0, result.output
     words = json.loads((tmp_path / REPLICATES.file).read_text(encoding="utf-8"))["experiment"]
+    assert [(world.friction, tuple(world.base_shift)) for world in made] == [(0.3, (0.01, -0.02))]
     assert (words["world_friction"], words["world_base_shift"]) == ("0.3", "(0.01, -0.02)")
 
 

@@ -17,6 +17,8 @@ from tactile_bayes.record import write_record
 from tactile_bayes.runs import comparison as comparison_run
 from test_cli import assert_misused, assert_refused, call
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 FILES = {"comparison.nc", "comparison.csv", "families.png"}
 
 
@@ -28,10 +30,10 @@ def record(measured, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def compared(record, tmp_path_factory):
+def compared(record, tmp_path_factory, coarse_pictures):
     folder = tmp_path_factory.mktemp("compared") / "made" / "on the way"
     two = ["--family", "parabola", "--family", "circle", "--as-stated"]
-    options = [*two, "--no-leave-one-out", "--max-seconds", 2, "--quiet"]
+    options = [*two, "--no-leave-one-out", "--max-seconds", 0.5, "--quiet"]
     return call("compare", record, "--out", folder, *options), folder
 
 
@@ -157,7 +159,8 @@ def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
     ],
 )
 def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
-    assert_refused(call("compare", record, "--out", tmp_path, *options), message)
+    assert_refused(call("compare", record, "--out", tmp_path / "shapes", *options), message)
+    assert not (tmp_path / "shapes").exists()
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,8 @@ from tactile_bayes.cli.app import app
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting import design as draw
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--draws", "2", "--as-stated"]
 
 
@@ -21,7 +23,7 @@ def run(*arguments):
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(tmp_path_factory, coarse_pictures):
     out = tmp_path_factory.mktemp("design")
     result = run("--out", out, "--quiet")
     assert result.exit_code == 0, result.output
@@ -54,6 +56,8 @@ def test_json_for_scripts(tmp_path):
         (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
         (["--family", "square"], "there is no family 'square'"),
         (["nowhere.nc"], "there is no file nowhere.nc"),
+        (["nowhere"], "there is no folder nowhere: give the folder that `tactile-bayes infer RECORD --out FOLDER` has"),
+        (["."], ". holds no posterior.nc"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):

@@ -39,24 +39,36 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_it_writes_the_page_into_the_run(folder):
-    result = call(folder)
+@pytest.fixture(scope="module")
+def written(folder):
+    return call(folder)
+
+
+def test_it_writes_the_page_into_the_run(folder, written):
+    result = written
     assert result.exit_code == 0, result.output
     path = folder / "report.html"
     assert result.stdout == f"{path} ({path.stat().st_size / 1e3:.0f} kB): open it in a browser; it needs no network.\n"
     assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
 
 
+@pytest.mark.usefixtures("written")
 def test_it_writes_where_it_is_told_and_the_same_page(folder, tmp_path):
     out = tmp_path / "page.html"
     result = call(folder, "--out", out, "--quiet")
     assert result.stdout == f"{out}\n"
-    call(folder)
     assert out.read_bytes() == (folder / "report.html").read_bytes()
 
 
-def test_json_for_scripts(folder, tmp_path):
+def test_json_for_scripts(folder, tmp_path, monkeypatch):
     out = tmp_path / "page.html"
+
+    def write(run, path, **options):
+        assert run == folder
+        path.write_text("a page", encoding="utf-8")
+        return path
+
+    monkeypatch.setattr("tactile_bayes.report.write_report", write)
     result = call(folder, "--out", out, "--json")
     assert json.loads(result.stdout) == {"report": str(out), "bytes": out.stat().st_size}
     assert get_type_hints(report_command.report, include_extras=True)["json"] == Json

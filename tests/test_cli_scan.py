@@ -79,12 +79,14 @@ def test_measured_points_are_scanned(tmp_path):
     lines = [f"{a:.6f};{b:.6f}".replace(".", ",") for a, b in zip(0.5 * x**2 + 0.5, x, strict=True)]
     points = tmp_path / "points.csv"
     points.write_text("\n".join(["# from a probe", "y [L];x [L]", *lines]), encoding="utf-8")
-    found = told("scan", "--points", points, "--direction", "forward", "--out", tmp_path / "r.csv")
-    exact = told("scan", "--profile", "II", "--direction", "forward", "--out", tmp_path / "e.csv")
+    forward = ["--direction", "forward", *COARSE]
+    found = told("scan", "--points", points, *forward, "--out", tmp_path / "r.csv")
+    exact = told("scan", "--profile", "II", *forward, "--out", tmp_path / "e.csv")
     one, other = (answer["sweeps"][0]["snap_off"]["drive_angle"] for answer in (found, exact))
     assert one == pytest.approx(other, abs=1e-4)
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 def test_a_scan_from_two_pivots_is_drawn(tmp_path):
     pivots = ["--base", "0,0", "--base", "0.2,0"]
     answer = told("scan", *pivots, *COARSE, "--out", tmp_path / "r.csv", "--figure", tmp_path / "scan.png")
@@ -109,7 +111,10 @@ def test_a_scan_from_two_pivots_is_drawn(tmp_path):
         (["--points", "{}/words.csv"], "words.csv: '1,b' is no point: give x and y, like 0.1,0.52"),
         (["--figure", "{}/scan.gif"], "scan.gif: a figure is a .png, .pdf or .svg file"),
         (["--out", "{}/r.txt"], "r.txt: a record is a .csv or .nc file"),
-        (["--out", "{}/no/r.csv"], "/no: No such file or directory"),
+        (
+            ["--out", "{}/words.csv/no/r.csv"],
+            "words.csv is a file, and no folder for r.csv: give a record another name",
+        ),
     ],
 )
 def test_what_cannot_be_scanned_is_refused_in_a_line(tmp_path, options, message):
@@ -118,6 +123,13 @@ def test_what_cannot_be_scanned_is_refused_in_a_line(tmp_path, options, message)
     options = [option.format(tmp_path) for option in options]
     assert_refused(call("scan", "--out", tmp_path / "r.csv", *options), message)
     assert not (tmp_path / "r.csv").exists()
+
+
+def test_folders_of_files_are_made(tmp_path):
+    out, figure, measured = tmp_path / "a" / "b" / "ideal.csv", tmp_path / "c" / "scan.png", tmp_path / "d" / "m.csv"
+    assert call("scan", "--profile", "II", *COARSE, "--out", out, "--figure", figure).exit_code == 0
+    assert call("measure", out, "--force-noise", 0.1, "--moment-noise", 0.1, "--out", measured).exit_code == 0
+    assert all(path.is_file() for path in (out, figure, measured))
 
 
 def test_a_profile_that_is_none(tmp_path):

@@ -21,6 +21,8 @@ from tactile_bayes.runs import sensitivity as sensitivity_run
 QUICK = ("--samples", "8", "--drive-step", "6", "-q")
 STUDY = ("--study", "--noise-factor", "0.3", "--noise-factor", "1", "--replicates", "1", "--workers", "1")
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 FIGURES = {"amplification.png", "information.png", "noise_shares.png", "required_noise.png"}
 
 
@@ -29,7 +31,7 @@ def call(*words):
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def done(tmp_path_factory, coarse_pictures):
     """An analysis with a study, and what was said of it."""
     out = tmp_path_factory.mktemp("sensitivity") / "run"
     result = call("--out", out, *STUDY, *QUICK)

@@ -52,7 +52,11 @@ FAMILIES = {
     "shape-free": shapes(),
 }
 FEW = settings(
-    max_examples=20, deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=settings.default.max_examples // 3,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 
 

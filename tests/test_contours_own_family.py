@@ -64,7 +64,9 @@ def test_a_vertex_that_is_almost_an_ordinary_one_is_right(n):
 
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 def test_every_family_is_right(family):
-    @settings(max_examples=15, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+    few = settings.default.max_examples // 4
+
+    @settings(max_examples=few, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
     @given(family)
     def right(contour):
         check(contour)

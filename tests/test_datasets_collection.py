@@ -76,9 +76,14 @@ INDEXERS = {
     "array": np.array([23, 0, 11]),
     "mask": np.arange(24) % 5 == 0,
 }
+OF_A_KIND = ("int", "slice", "list", "empty slice", "array")
+"""Others stand for these."""
 
 
-@pytest.mark.parametrize("key", [pytest.param(key, id=name) for name, key in INDEXERS.items()])
+@pytest.mark.parametrize(
+    "key",
+    [pytest.param(key, id=name, marks=pytest.mark.slow if name in OF_A_KIND else []) for name, key in INDEXERS.items()],
+)
 def test_records_are_chosen_as_from_memory(folder, whole, key):
     data = tb.datasets.open(folder)
     xr.testing.assert_identical(data.isel(record=key).load(), whole.isel(record=key))
@@ -88,16 +93,19 @@ def test_records_are_chosen_as_from_memory(folder, whole, key):
 @pytest.mark.parametrize(
     "chosen",
     [
-        {"record": 3, "sweep": 1, "sample": 7},
+        pytest.param({"record": 3, "sweep": 1, "sample": 7}, marks=pytest.mark.slow),
         {"record": [1, 20], "sample": [5, 3, 5]},
         {"record": slice(None, None, 4), "sweep": slice(None, None, -1), "sample": slice(2, 9, 3)},
         {"sample": -1},
-        {"sweep": [1]},
+        pytest.param({"sweep": [1]}, marks=pytest.mark.slow),
         {"record": [2, 9], "sweep": 0, "sample": np.arange(24) > 20},
     ],
 )
 def test_axes_are_chosen_together(folder, whole, chosen):
     xr.testing.assert_identical(tb.datasets.open(folder).isel(chosen).load(), whole.isel(chosen))
+
+
+def test_points_are_chosen(folder, whole):
     pointwise = {"record": xr.DataArray([1, 9, 23], dims="point"), "sample": xr.DataArray([0, 5, 2], dims="point")}
     xr.testing.assert_identical(tb.datasets.open(folder).isel(pointwise).load(), whole.isel(pointwise))
 

@@ -88,7 +88,7 @@ def test_order_does_not_change_a_byte(many, tmp_path, monkeypatch):
     assert hashes(tmp_path) == many[0]
 
 
-def test_manifest_states_everything(many, tmp_path):
+def test_manifest_states_everything(tmp_path):
     spec = changed(PLAIN, contours=[{"family": "circle", "r": 0.5, "q": {"uniform": [0.5, 1.2]}}])
     path = generate(spec, tmp_path, workers=1)
     stated = json.loads(path.read_text())
@@ -310,6 +310,22 @@ def test_another_data_set_is_left_alone(tmp_path):
         "law": (
             {"contours": [{**PLAIN["contours"][0], "q": 0.5}]},
             r"\), contours\[0\]\.q is \{'uniform': \[0\.3, 0\.7\]\} there and is 0\.5 here: choose",
+        ),
+        "other law": (
+            {"contours": [{**PLAIN["contours"][0], "q": {"normal": [0.5, 0.1]}}]},
+            r"\), contours\[0\]\.q is \{'uniform': \[0\.3, 0\.7\]\} there and is \{'normal': \[0\.5, 0\.1\]\} here: ch",
+        ),
+        "more contours": (
+            {"contours": [*PLAIN["contours"], {"family": "circle", "r": 1.0, "q": {"each": [0.3, 0.5]}}]},
+            r"\), contours\[1\] is left out there and is of family 'circle' here: choose",
+        ),
+        "other family": (
+            {"contours": [{"family": "circle", "r": 1.0, "q": 0.5}]},
+            r"family is 'parabola' there and is 'circle' here, .* 2 more: choose",
+        ),
+        "new table": (
+            {"rod": {"length": 0.2, "flexural_rigidity": 2.4e-3}, "scan__bases": [[0.1, 0.2]] * 9},
+            r"\), scan\.bases is left out there and is \[\[0\.1, .{52}… here, rod\.length is left out there and is",
         ),
         "table": ({"scan__friction": 0.1}, r"\), scan\.friction is left out there and is 0\.1 here: choose"),
         "many": ({"name": "n", "seed": 8, "records": 48, "precision": "single"}, r" here, 1 more: choose another"),

@@ -61,7 +61,7 @@ def test_it_goes_to_a_file_and_back(made, suffix, tmp_path):
     np.testing.assert_allclose(contour_of(back).point(angle), contour_of(one).point(angle), rtol=1e-12)
 
 
-@pytest.mark.parametrize("limit", [0.15, 0.7, 0.3])
+@pytest.mark.parametrize("limit", [0.15, 0.7, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_readings_at_the_end_of_the_range_are_there_also_from_32_bits(limit, tmp_path):
     """Which round 0.15 and 0.3 up, and 0.7 down."""
     spec = changed(PLAIN, load_cell__force_range=limit, load_cell__moment_range=limit)
@@ -103,10 +103,16 @@ def test_its_contour_is_the_one_that_was_touched():
         np.testing.assert_allclose(y, one.truth_contact_y.values[touched], rtol=0, atol=1e-9 * length)
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plain")
+    generate(PLAIN, folder, workers=1)
+    return folder
+
+
 @pytest.mark.parametrize("index", [-1, 24, 10**9, 1.0, "1", None])
-def test_a_number_that_there_is_not_is_refused(index, tmp_path):
-    generate(PLAIN, tmp_path, workers=1)
-    for source in (PLAIN, tmp_path):
+def test_a_number_that_there_is_not_is_refused(index, plain):
+    for source in (PLAIN, plain):
         with pytest.raises(ParameterError, match=r"there is no record .*: they are numbered from 0 to 23"):
             record(source, index)
 

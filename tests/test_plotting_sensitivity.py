@@ -29,14 +29,16 @@ def found():
 @pytest.fixture(scope="module")
 def in_si():
     cell = LoadCell(force_noise=2e-5, moment_noise=1e-6)
-    return sensitivity(seed=1, rod=ROD, load_cell=cell, drive_step=0.1, parts=["information", "required_noise"])
+    return sensitivity(
+        seed=1, rod=ROD, load_cell=cell, drive_step=0.2, nuisances=(), parts=["information", "required_noise"]
+    )
 
 
 @pytest.fixture(scope="module")
 def study():
     """Profile II at three distances, of which the last is out of reach."""
-    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "seed": 1, "workers": 1, "drive_step": 0.1}
-    return error_map(["II"], distances=[0.4, 0.8, 1.5], **options)
+    options = {"noise_factors": [1.0, 0.1], "replicates": 1, "seed": 1, "workers": 1, "drive_step": 0.2}
+    return error_map(["II"], distances=[0.4, 0.8, 1.5], nuisances=(), **options)
 
 
 def rods(status, width):

@@ -49,7 +49,7 @@ def test_a_force_along_the_rod_is_axial_and_one_to_its_left_is_transversal():
     np.testing.assert_allclose(in_frame(across, "turning")["force_y"], 2.0, rtol=4 * EPS)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(hnp.arrays(float, (4, 6), elements=moderate), st.floats(-1.0, 1.0), st.sampled_from(FRAMES))
 def test_there_and_back_is_the_same_record(forces, turn, frame):
     names = ("force_x", "force_y", "truth_force_x", "truth_force_y")

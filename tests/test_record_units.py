@@ -17,7 +17,7 @@ moderate = st.floats(-1e6, 1e6).filter(lambda value: value == 0 or abs(value) > 
 scales = st.floats(1e-3, 1e3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(hnp.arrays(float, (6, 5), elements=moderate), scales, scales, scales)
 def test_units_convert_there_and_back(values, length, rigidity, diameter):
     rod = Rod(length, rigidity, diameter)
