@@ -106,6 +106,28 @@ def test_what_is_no_full_grid_is_lines():
     assert "$y$ = −0.2 $L$" in labels(ax)
 
 
+@pytest.mark.parametrize(
+    ("xs", "ys"),
+    [
+        (np.linspace(-0.4, 0.4, 9), (-0.1, 0.0, 0.1)),
+        ((-0.1, 0.0, 0.1), np.linspace(-0.8, 0.1, 9)),
+        ((-0.1, 0.0, 0.1),) * 2,
+    ],
+    ids=["low", "high", "square"],
+)
+def test_the_figure_is_as_large_as_its_map(xs, ys):
+    figure = design(made_up(xs, ys)).figure
+    figure.draw_without_rendering()
+    left, bottom, right, top = figure.get_tightbbox().extents
+    wide, high = figure.get_size_inches()
+    assert min(left, bottom) >= 0.0
+    assert right <= wide
+    assert top <= high
+    assert (right - left) / wide > 0.95
+    assert (top - bottom) / high > 0.95
+    assert wide <= 7.0
+
+
 def test_the_map_looks_as_it_did(tmp_path):
     ax = design(made_up(XS, YS, pivots=[(0.1, -0.1)]), ax=mpl.figure.Figure(figsize=(5.0, 3.0)).subplots())
     assert difference(ax.figure, "design_map", tmp_path) is None

@@ -52,6 +52,8 @@ def test_widths_are_side_by_side():
     labels = texts(ax)
     width = float(found.triangle_width.sel(bound="median"))
     assert f"triangle of chord and tangents, {1e6 * width:.3g} µm wide" in labels
+    rim = 1e6 * float((found.triangle_upper - found.triangle_lower).max())
+    assert f"triangle with uncertain ends, 90 %, {rim:.3g} µm wide" in labels
     assert f"90 % band, {1e6 * float(found.band_width):.3g} µm wide" in labels
     assert f"90 % band without events, {1e6 * float(found.band_width_without_events):.3g} µm wide" in labels
     assert {"chord", "end tangents", "end contacts", "median", "true contour"} < set(labels)

@@ -36,6 +36,7 @@ from helpers.report_pages import (
     Page,
     analysed_quickly,
     coarse_record,
+    comparison,
     hostile_run,
 )
 from tactile_bayes.errors import InferenceError
@@ -50,6 +51,7 @@ from tactile_bayes.report.contour_figure import contour_figure
 from tactile_bayes.report.drawing import Plot, Scale
 from tactile_bayes.report.findings import findings_of
 from tactile_bayes.report.frames import motion_of
+from tactile_bayes.report.page import page_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import hindrances
 from tactile_bayes.report.trust import contacts_words
@@ -252,6 +254,50 @@ def test_the_verdicts_come_first_and_say_whether_to_trust(page, folder, text):
     assert text.index(first.split(",")[0]) < text.index("<svg")
 
 
+@pytest.fixture(scope="module")
+def told(findings):
+    """What the page says of the same run: as it is, without a complaint, and where the record rejects the contour."""
+    rejecting = findings.check.assign_attrs(passed=False)
+    passing = findings.check.assign_attrs(passed=True)
+    kinds = {
+        "as it is": dataclasses.replace(findings, check=passing),
+        "well": dataclasses.replace(findings, check=passing, verdicts=("All is well: the ensembles agree.",)),
+        "rejected": dataclasses.replace(findings, check=rejecting, verdicts=("The family does not describe it.",)),
+    }
+    return {kind: page_of(found, "run") for kind, found in kinds.items()}
+
+
+def test_a_contour_is_known_to_within_its_band_only_where_all_is_well(told):
+    well, doubtful, rejected = (told[kind]["answer"] for kind in ("well", "as it is", "rejected"))
+    assert "the contour is known to within a 90\u00a0% band whose median width is" in well
+    for words in (doubtful, rejected):
+        assert "known to within" not in words
+        assert "the posterior has a 90\u00a0% band whose median width is" in words
+    assert "What it is worth depends on what is said above" in doubtful
+    assert "That would hold if the contour were of this family and the rig as it was taken" in rejected
+
+
+def test_of_a_contour_that_is_rejected_nothing_is_said_but_with_an_if(told):
+    (gap, certificate), (only,) = told["well"]["gap"], told["rejected"]["gap"]
+    assert gap.startswith("The gap, which no sweep touches, is ")
+    assert "convexity alone" in certificate
+    assert only.startswith("On such a contour the gap, which no sweep touches, would be ")
+    assert re.findall(r"[\d.]+", only) == re.findall(r"[\d.]+", gap)
+    assert "which noise explains with probability" in told["well"]["contacts"][1]
+    explained = told["rejected"]["contacts"][1]
+    assert "which noise as large as it was found explains with probability" in explained
+    assert explained.endswith("what the contour does not explain, so that this speaks for nothing.")
+
+
+def test_the_place_along_x_looks_like_no_pivot(page):
+    marks = {attrs["id"]: tag for tag, attrs in page.elements if attrs.get("id") in ("band-mark", "contact")}
+    assert marks == {"band-mark": "g", "contact": "circle"}
+    pivots = [tag for tag, attrs in page.elements if attrs.get("class") == "pivot"]
+    assert set(pivots) == {"circle"}
+    assert "place along x, chosen below or beside" in page.texts["li"]
+    assert {"class": "js-only"} in page.all("li")  # as the mark is
+
+
 def test_where_it_came_from_is_said(page, folder, posterior):
     digests = dict(page.table("SHA-256")[1:])
     assert digests == {
@@ -270,6 +316,7 @@ def test_where_it_came_from_is_said(page, folder, posterior):
 
 def test_the_lines_that_it_gives_make_the_same_draws(page, folder, monkeypatch):
     monkeypatch.chdir(folder)
+    assert "tactile_bayes." not in page.texts["code"][1]  # its public face is enough
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
         exec(compile(page.texts["code"][1], "lines", "exec"), {})
@@ -435,21 +482,6 @@ def test_a_shape_free_contour_hides_its_directions_among_the_details(tmp_path):
     assert "length_scale" in names
     assert not any(name.startswith("z_") for name in names)
     assert "z_1" in [row[0] for row in page.table("All parameters")]
-
-
-def comparison(data_sha256=""):
-    shares = [0.9, 0.1, np.nan]
-    return xr.Dataset(
-        {
-            "probability": ("family", shares),
-            "log_evidence": ("family", [10.0, 8.0, np.nan]),
-            "p_value": ("family", [0.2, 0.3, np.nan]),
-            "fits": ("family", [True, True, False]),
-            "sampled": ("family", [True, True, False]),
-        },
-        coords={"family": ["ellipse", "parabola", "circle"]},
-        attrs={"verdict": "ellipse with probability 0.90", "data_sha256": data_sha256},
-    )
 
 
 def test_probabilities_of_shapes_are_told_where_there_are_some(folder, posterior, tmp_path):

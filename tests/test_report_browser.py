@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from helpers.report_pages import analysed_quickly, coarse_record, hostile_run
+from helpers.report_pages import analysed_quickly, coarse_record, comparison, hostile_run
 from tactile_bayes.report import write_report
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -43,7 +43,9 @@ def driver():
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browser")
-    analysed_quickly(coarse_record(), folder, nuisances=[])
+    run = analysed_quickly(coarse_record(), folder, nuisances=[])
+    shapes = comparison(run.posterior.attrs["data_sha256"], shares=(0.9995, 0.0005, 0.0))
+    shapes.to_netcdf(folder / "comparison.nc", engine="h5netcdf")
     return write_report(folder)
 
 
@@ -216,6 +218,30 @@ def test_it_fits_and_can_be_read(driver, path, width, scheme):
     paper = page.execute_script("return getComputedStyle(document.body).backgroundColor")
     assert (max(int(part) for part in re.findall(r"\d+", paper)) < 64) == (scheme == "dark")
     assert driver.get_log("browser") == []
+
+
+def test_the_numbers_of_a_sample_fit_beside_any_rod(page):
+    """Without scrolling, and whatever sample is shown they are as high."""
+    from selenium.webdriver.common.keys import Keys
+
+    for width in (400, 640, 959, 960, 1100, 1400):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        heights = set()
+        for key in (Keys.HOME, Keys.PAGE_UP, Keys.END):
+            press(page, "sample", key)
+            table = "document.getElementById('numbers')"
+            inside, outside, height = page.execute_script(
+                f"return [{table}.scrollWidth, {table}.parentElement.clientWidth, {table}.tBodies[0].offsetHeight]"
+            )
+            assert inside <= outside <= width
+            heights.add(height)
+        assert len(heights) == 1
+        lines = page.execute_script(
+            "return Array.from(document.querySelectorAll('.bars span:last-child'), (one) => one.getClientRects().length"
+            ")"
+        )
+        assert lines == [1, 1, 1]
 
 
 def test_who_wants_less_motion_gets_the_slider_alone(driver, path):

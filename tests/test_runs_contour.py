@@ -68,6 +68,19 @@ def test_the_summary_begins_with_the_verdicts(analysed):
     assert lines[-1] == run.posterior.attrs["message"]
 
 
+def test_where_no_contour_is_found_the_former_run_stays_whole(measured, tmp_path, monkeypatch):
+    from tactile_bayes.runs import contour as module
+
+    def infer_nothing(*arguments, **options):
+        raise InferenceError("no parabola was found.")
+
+    monkeypatch.setattr(module, "infer_contour", infer_nothing)
+    (tmp_path / "report.html").write_text("of the posterior beside it", encoding="utf-8")
+    with pytest.raises(InferenceError):
+        analyse(measured, tmp_path)
+    assert (tmp_path / "report.html").exists()
+
+
 def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path, monkeypatch):
     from tactile_bayes.runs import contour as module
 
@@ -136,7 +149,9 @@ def test_a_dimensionless_record_with_unknown_noise(tmp_path):
 def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
     (tmp_path / "band.csv").write_text("old", encoding="utf-8")
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    (tmp_path / "report.html").write_text("of another posterior", encoding="utf-8")
     analyse(measured, tmp_path)
+    assert not (tmp_path / "report.html").exists()
     assert (tmp_path / "band.csv").read_text(encoding="utf-8") != "old"
     assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
 

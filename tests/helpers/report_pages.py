@@ -42,6 +42,21 @@ def coarse_record(step: float = float(np.radians(6.0)), **options) -> xr.Dataset
     return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
 
 
+def comparison(data_sha256: str = "", shares: tuple[float, ...] = (0.9, 0.1, np.nan)) -> xr.Dataset:
+    """A comparison of three shapes, made up."""
+    return xr.Dataset(
+        {
+            "probability": ("family", list(shares)),
+            "log_evidence": ("family", [10.0, 8.0, np.nan]),
+            "p_value": ("family", [0.2, 0.3, np.nan]),
+            "fits": ("family", [True, True, False]),
+            "sampled": ("family", [True, True, False]),
+        },
+        coords={"family": ["ellipse", "parabola", "circle"]},
+        attrs={"verdict": "ellipse with probability 0.90", "data_sha256": data_sha256},
+    )
+
+
 def hostile_run(parent):
     """A run of a record whose every text is an attack on the page; its folder."""
     record = coarse_record()

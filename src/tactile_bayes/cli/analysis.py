@@ -239,7 +239,7 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
         words = "Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates)
         chance = run.contacts.attrs.get("misfit_probability")
         if chance is not None and chance == chance:
-            words += f"; noise explains their misfit with probability {chance:.2g}"
+            words += f"; noise of the size that was found explains their misfit with probability {chance:.2g}"
         console.print(words, highlight=False, soft_wrap=True)
     console.print()
     for what, path in {**files, **run.files}.items():

@@ -144,8 +144,10 @@ def design(
 
 def _posterior(run: Path) -> xr.DataTree:
     from tactile_bayes.inference.result import read_result
+    from tactile_bayes.runs.run_folder import posterior_in
 
-    return read_result(run / "posterior.nc" if run.is_dir() else run)
+    is_the_file = run.is_file() or (run.suffix == ".nc" and not run.exists())
+    return read_result(run if is_the_file else posterior_in(run))
 
 
 def _print_json(found: xr.Dataset, files: Any) -> None:

@@ -121,6 +121,7 @@ def measure(
     measured = cell.measure(ideal, seed=seed)
     if not keep_truth:
         measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_record(measured, out)
     files = {"record": out}
     if json:

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordFile", "refuse_other_suffix", "scan"]
 
-RecordFile = Annotated[Path, typer.Option(help="File for the record, .csv or .nc.", dir_okay=False)]
+RecordFile = Annotated[
+    Path,
+    typer.Option(help="File for the record, .csv or .nc; its folder is made if it is not there.", dir_okay=False),
+]
 
 
 def scan(
@@ -41,7 +44,9 @@ def scan(
     friction: Friction = 0.0,
     figure: Annotated[
         Path | None,
-        typer.Option(help="File for a picture of rod and loads along the sweeps, .png, .pdf or .svg.", dir_okay=False),
+        typer.Option(
+            help="File for a picture of rod and loads along the sweeps, .png, .pdf or .svg; likewise.", dir_okay=False
+        ),
     ] = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -65,9 +70,11 @@ def scan(
         rod=rod,
         friction=friction,
     )
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_record(made.record, out)
     files = {"record": out}
     if figure is not None:
+        figure.parent.mkdir(parents=True, exist_ok=True)
         _draw(made, figure)
         files["figure"] = figure
     if json:
@@ -80,25 +87,21 @@ def scan(
 
 
 def refuse_other_suffix(path: Path, known: tuple[str, ...] = (".csv", ".nc"), what: str = "a record") -> None:
-    """Refuse a file of another kind, or in a folder that is not there, before anything is computed.
+    """Refuse a file of another kind, or below another file, before anything is computed.
 
     Raises
     ------
     ParameterError
-        If the name ends otherwise.
-    FileNotFoundError
-        If there is no such folder.
+        If the name ends otherwise, or there is a file where its folder would be.
     """
-    import errno
-    import os
-
     from tactile_bayes.errors import ParameterError
 
     if path.suffix not in known:
         kinds = f"{', '.join(known[:-1])} or {known[-1]}"
         raise ParameterError(f"{path}: {what} is a {kinds} file, so give a name that ends so")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path.parent))
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    if not above.is_dir():
+        raise ParameterError(f"{above} is a file, and no folder for {path.name}: give {what} another name")
 
 
 def _headline(made: Scan, rod: Rod) -> str:

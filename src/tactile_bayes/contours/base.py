@@ -228,12 +228,12 @@ class Graph(Contour):
     Examples
     --------
     >>> from dataclasses import dataclass
-    >>> from tactile_bayes.contours import check
+    >>> import numpy as np
+    >>> from tactile_bayes.contours import Graph, check
     >>> @dataclass(frozen=True, eq=False)
     ... class Catenary(Graph):
     ...     size: float
     ...     q: float
-    ...
     ...     def derivatives(self, x):
     ...         u = x / self.size
     ...         return self.q + self.size * (np.cosh(u) - 1.0), np.sinh(u), np.cosh(u) / self.size

@@ -57,7 +57,6 @@ def check(contour: Contour) -> None:
     >>> @dataclass(frozen=True, eq=False)
     ... class Wrong(Graph):
     ...     a: float
-    ...
     ...     def derivatives(self, x):
     ...         return self.a * x**2, self.a * x, self.a + 0 * x
     >>> check(Wrong(0.5))

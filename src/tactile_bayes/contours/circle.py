@@ -34,6 +34,7 @@ class Circle(Oval):
 
     Examples
     --------
+    >>> from tactile_bayes.contours import Circle
     >>> Circle(1.0, q=0.3).radius_of_curvature([-0.5, 0.0, 0.5])
     array([1., 1., 1.])
     """

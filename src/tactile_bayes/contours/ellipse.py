@@ -36,6 +36,7 @@ class Ellipse(Oval):
 
     Examples
     --------
+    >>> from tactile_bayes.contours import Ellipse
     >>> Ellipse(2.0, 0.5, q=0.3).radius_of_curvature(0.0)  # a²/b
     np.float64(8.0)
     """

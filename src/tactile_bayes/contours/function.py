@@ -92,6 +92,8 @@ def from_function(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from tactile_bayes.contours import from_function
     >>> catenary = from_function(lambda x: 0.3 + np.cosh(x) - 1.0, (-2.0, 2.0))
     >>> catenary.radius_of_curvature([0.0, 0.5]).round(12)  # 1/cos²α
     array([1.        , 1.29844641])

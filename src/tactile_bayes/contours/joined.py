@@ -49,7 +49,7 @@ class Joined(Contour):
 
     Examples
     --------
-    >>> from tactile_bayes.contours import Parabola, PowerLaw
+    >>> from tactile_bayes.contours import Joined, Parabola, PowerLaw
     >>> iv = Joined(Parabola(0.5, q=0.3), PowerLaw(1.0, 4, q=0.3))
     >>> iv.height([-1.0, 0.0, 1.0])
     array([0.8, 0.3, 1.3])

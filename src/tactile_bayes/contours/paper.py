@@ -33,6 +33,7 @@ def paper_profile(name: Literal["I", "II", "III", "IV"], q: float) -> Contour:
 
     Examples
     --------
+    >>> from tactile_bayes.contours import paper_profile
     >>> paper_profile("II", q=0.5)
     Parabola(a=0.5, q=0.5, x_c=0.0)
     """

@@ -33,6 +33,8 @@ class Parabola(Contour):
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from tactile_bayes.contours import Parabola
     >>> x, y = Parabola(0.5, q=0.3).point(np.pi / 4)
     >>> x.round(12), y.round(12)
     (np.float64(1.0), np.float64(0.8))

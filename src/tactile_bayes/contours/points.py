@@ -109,6 +109,8 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from tactile_bayes.contours import from_points
     >>> x = np.linspace(-0.8, 0.8, 60)
     >>> measured = 0.3 + 0.5 * x**2 + 0.002 * np.random.default_rng(1).standard_normal(60)
     >>> contour = from_points(x, measured)

@@ -39,6 +39,7 @@ class PowerLaw(Contour):
 
     Examples
     --------
+    >>> from tactile_bayes.contours import PowerLaw
     >>> PowerLaw(1.0, 4, q=0.3).height([0.0, 0.5])
     array([0.3   , 0.3625])
     >>> PowerLaw(1.0, 1.5, q=0.3).radius_of_curvature(0.0)

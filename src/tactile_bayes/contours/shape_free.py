@@ -58,6 +58,8 @@ class ShapeFree(Tabled):
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from tactile_bayes.contours import ShapeFree
     >>> circle = ShapeFree(np.linspace(-1.5, 1.5, 7), np.zeros(7), x=0.0, y=0.3)
     >>> circle.point(1.0)[0].round(12), np.sin(1.0).round(12)
     (np.float64(0.841470984808), np.float64(0.841470984808))

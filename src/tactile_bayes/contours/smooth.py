@@ -61,6 +61,8 @@ class Smooth(Tabled):
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from tactile_bayes.contours import Smooth
     >>> circle = Smooth(np.zeros(8), q=0.3)
     >>> circle.point(1.0)[0].round(12), np.sin(1.0).round(12)
     (np.float64(0.841470984808), np.float64(0.841470984808))

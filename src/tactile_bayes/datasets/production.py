@@ -30,6 +30,9 @@ _NOTING = 0.05
 _MOST_TOLD = 3
 """Differences between two specifications that a refusal names."""
 
+_LONGEST_TOLD = 60
+"""Characters of a value in it."""
+
 
 class Production(NamedTuple):
     """How far a data set has come."""
@@ -201,5 +204,8 @@ def _other(manifest: Manifest, spec: Specification, folder: Path) -> Specificati
 def _said(value: Any) -> str:
     if value is None:
         return "is left out"
+    if isinstance(value, dict) and "family" in value:
+        return f"is of family {value['family']!r}"
     is_whole = isinstance(value, float) and value.is_integer()
-    return f"is {int(value) if is_whole else reprlib.repr(value)}"
+    text = str(int(value)) if is_whole else reprlib.repr(value)
+    return f"is {text if len(text) <= _LONGEST_TOLD else text[: _LONGEST_TOLD - 1] + '…'}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -38,15 +39,21 @@ def without(defaults: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, A
 
 
 def differences(one: Any, other: Any, key: str = "") -> list[tuple[str, Any, Any]]:
-    """Where two canonical values differ: the key, and both values, None where there is none."""
-    if isinstance(one, dict) and isinstance(other, dict):
+    """Where two canonical specifications differ: the key, and both values, None where there is none.
+
+    A law is one value, and so is a whole table of contours that the other does not have.
+    """
+    if key == "contours":
+        tables = zip_longest(one or [], other or [])
+        return [d for k, (a, b) in enumerate(tables) for d in differences(a, b, f"{key}[{k}]")]
+    is_table = "." not in key and (isinstance(one, dict) or isinstance(other, dict))
+    if is_table and not (key.startswith("contours") and None in (one, other)):
+        one, other = one or {}, other or {}
         return [
             difference
             for name in dict.fromkeys([*one, *other])
             for difference in differences(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))
         ]
-    if key == "contours" and isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-        return [d for k, (a, b) in enumerate(zip(one, other, strict=True)) for d in differences(a, b, f"{key}[{k}]")]
     return [] if one == other else [(key, one, other)]
 
 

@@ -12,17 +12,22 @@ from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
 from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, legend_entry, set_unit
 from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, events_by_label, load_of, phase_runs, with_events
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.scanning import scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from tactile_bayes.scanning import Scan
+    from tactile_bayes.sweep_events import SweepEvents
 
 __all__ = ["draw_observable_curves"]
 
 _LINES = {"forward": "-", "backward": (0, (3.0, 1.2))}
 _WIDTHS = {"tip": 0.8, "tangential": 1.7}
+_BETWEEN = 48
+"""Points of a line between two events, beside those of the drive's steps."""
+
 _SHRUNK = 0.75
 """Of the markers of events, of which there are many."""
 
@@ -30,7 +35,8 @@ _SHRUNK = 0.75
 def draw_observable_curves(profile: Profile, direction: Direction, choice: Choice) -> Figure:
     """Moment and forces over the drive angle: a colour for each distance, thin in tip contact, thick in tangential.
 
-    Lines run from first contact to snap-off, and both are on them.
+    Lines run from first contact to snap-off, and both are on them; toward events, where loads may change as the root of
+    the angle that is left, their points are denser than the drive's steps.
     """
     from matplotlib import colormaps
     from matplotlib.figure import Figure
@@ -42,8 +48,10 @@ def draw_observable_curves(profile: Profile, direction: Direction, choice: Choic
     directions: set[str] = set()
     for distance, colour in zip(choice.distances, shades, strict=True):
         made = choice.scan(profile, distance, direction)
-        for ax, channel in zip(panels, CHANNELS, strict=True):
-            _draw_scan(ax, made, channel, tuple(colour))
+        for number, events in enumerate(made.sweeps):
+            sweep = _finer(made, number)
+            for ax, channel in zip(panels, CHANNELS, strict=True):
+                _draw_sweep(ax, sweep, events, channel, tuple(colour))
         legend_entry(panels[0], _distance_in_words(distance), color=colour, linewidth=1.7)
         directions |= {sweep.direction for sweep in made.sweeps}
     for way in sorted(directions, reverse=True) if len(directions) > 1 else ():
@@ -70,32 +78,38 @@ def _distance_in_words(distance: float) -> str:
     return f"$q$ = {distance:g} $L$"
 
 
-def _draw_scan(ax: Axes, made: Scan, channel: str, colour: Any) -> None:
-    for number, events in enumerate(made.sweeps):
-        sweep: xr.Dataset = made.record.isel(sample=np.flatnonzero(made.record["sweep"].values == number))
-        phase = sweep["truth_contact_phase"].values.astype(object)
-        touching = phase != "none"
-        angle, value, phase = with_events(
-            sweep["drive_angle"].values[touching],
-            sweep[channel].values[touching],
-            phase[touching],
-            events,
-            channel,
-            "fixed",
+def _finer(made: Scan, number: int) -> xr.Dataset:
+    """Samples of a sweep in contact, at the drive's steps and between events, denser toward these."""
+    events = made.sweeps[number]
+    marked = [events.first_contact, *events.transitions, events.snap_off]
+    ends = np.array([event.drive_angle for event in marked])
+    share = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, _BETWEEN) / _BETWEEN))
+    between = ends[:-1, None] + np.diff(ends)[:, None] * share
+    steps = made.record["drive_angle"].values[made.record["sweep"].values == number]
+    angles = np.append(steps[(steps > ends.min()) & (steps < ends.max())], between)
+    way: Direction = "forward" if events.direction == "forward" else "backward"
+    sweep = scan(made.contour, direction=way, drive_angles=angles).record
+    return sweep.isel(sample=np.flatnonzero(sweep["truth_contact_phase"].values != "none"))
+
+
+def _draw_sweep(ax: Axes, sweep: xr.Dataset, events: SweepEvents, channel: str, colour: Any) -> None:
+    phase = sweep["truth_contact_phase"].values.astype(object)
+    angle, value, phase = with_events(
+        sweep["drive_angle"].values, sweep[channel].values, phase, events, channel, "fixed"
+    )
+    line: dict[str, Any] = {"color": colour, "linestyle": _LINES[events.direction], "zorder": 2.5}
+    for run in phase_runs(phase):
+        ax.plot(np.degrees(angle[run]), value[run], linewidth=_WIDTHS[str(phase[run.start])], **line)
+    for label, marked in events_by_label(events).items():
+        style = dict(EVENT_MARKERS[label])
+        style["markersize"] *= _SHRUNK
+        ax.plot(
+            np.degrees([event.drive_angle for event in marked]),
+            [load_of(event, channel, "fixed") for event in marked],
+            color=PALETTE["change"],
+            linestyle="none",
+            markeredgewidth=0.7,
+            zorder=4,
+            label=label,
+            **style,
         )
-        line: dict[str, Any] = {"color": colour, "linestyle": _LINES[events.direction], "zorder": 2.5}
-        for run in phase_runs(phase):
-            ax.plot(np.degrees(angle[run]), value[run], linewidth=_WIDTHS[str(phase[run.start])], **line)
-        for label, marked in events_by_label(events).items():
-            style = dict(EVENT_MARKERS[label])
-            style["markersize"] *= _SHRUNK
-            ax.plot(
-                np.degrees([event.drive_angle for event in marked]),
-                [load_of(event, channel, "fixed") for event in marked],
-                color=PALETTE["change"],
-                linestyle="none",
-                markeredgewidth=0.7,
-                zorder=4,
-                label=label,
-                **style,
-            )

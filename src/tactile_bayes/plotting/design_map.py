@@ -21,6 +21,9 @@ __all__ = ["design"]
 _HEIGHTS_OF_A_MAP = 3
 """From which on a grid of places is drawn as a map, and not as lines."""
 
+_HIGHEST, _ROOM = 7.0, 0.1
+"""Of the figure of a map, and what is left free in it [inches]."""
+
 
 def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """The criterion over the place of the pivot, the best place of all, and the pivots so far.
@@ -59,12 +62,14 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     if not (isinstance(found, xr.Dataset) and {"base_x", "drive_step", "best", "present_base_x"} <= set(found)):
         raise ParameterError("this is no design: give what tactile_bayes.design has returned")
     pivots = np.stack([found["present_base_x"].values, found["present_base_y"].values], axis=-1)
-    ax = single_axes() if ax is None else ax
+    own, ax = ax is None, single_axes() if ax is None else ax
     grid = _grid_of(found)
     if grid is None:
         draw_design_lines(ax, found, pivots)
     else:
         _draw_map(ax, found, grid, pivots)
+        if own:
+            _fit_figure(ax)
     return ax
 
 
@@ -143,3 +148,14 @@ def _draw_scale(ax: Axes, mesh: Any, label: str, power: int) -> None:
     bar.formatter = FuncFormatter(lambda value, _: number(value, power))
     bar.update_ticks()
     bar.set_label(label)
+
+
+def _fit_figure(ax: Axes) -> None:
+    """Make the figure as high as the map is at its full width, or narrower where it would be too high."""
+    figure: Any = ax.figure
+    wide, _ = figure.get_size_inches()
+    figure.set_size_inches(wide, _HIGHEST)
+    for _ in range(2):  # the room for the scale of colours goes with the height
+        figure.draw_without_rendering()
+        taken = figure.get_tightbbox()
+        figure.set_size_inches(min(wide, taken.width + _ROOM), min(_HIGHEST, taken.height + _ROOM))

@@ -72,20 +72,25 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
 
     x = found["x"].values
     margin = _MARGIN * float(np.diff(ends)[0])
-    probability = f"{100.0 * found.attrs['probability']:.6g} % band"
+    share = f"{100.0 * found.attrs['probability']:.6g} %"
+    probability = f"{share} band"
 
     def widest(name: str) -> str:
-        value = middle[name] if name in middle else float(found[name])
+        return words_of(middle[name] if name in middle else float(found[name]))
+
+    def words_of(value: float) -> str:
         power, unit = shown_unit("contact_x", attrs, np.array([value]))
         return f"{number(value, power, digits=3)} {unit} wide"
 
     least, most = (above_chord(x, found[f"triangle_{edge}"].values) for edge in ("lower", "upper"))
     style: dict[str, Any] = {"linewidth": 0.0}
-    ax.fill_between(x, least, most, color=PALETTE["gap"], alpha=0.22, zorder=0.5, **style)
     corners_x = np.array([ends[0], middle["apex_x"], ends[1]])
     corners_y = above_chord(corners_x, np.array([heights[0], middle["apex_y"], heights[1]]))
     label = f"triangle of chord and tangents, {widest('triangle_width')}"
     ax.fill(corners_x, corners_y, color=PALETTE["gap"], alpha=0.45, zorder=0.6, label=label, **style)
+    if np.isfinite(most - least).any():
+        label = f"triangle with uncertain ends, {share}, {words_of(float(np.nanmax(most - least)))}"
+        ax.fill_between(x, least, most, color=PALETTE["gap"], alpha=0.22, zorder=0.5, label=label, **style)
     outside = np.concatenate([ends[:1] - margin, ends, ends[1:] + margin])
     ax.plot(outside, np.zeros(4), color="0.45", linewidth=0.8, linestyle=(0, (6.0, 3.0)), zorder=1.0, label="chord")
     for side, beyond in ((0, -margin), (1, margin)):

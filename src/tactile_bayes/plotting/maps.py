@@ -24,6 +24,7 @@ __all__ = [
     "fit_height",
     "limits_of",
     "outline",
+    "set_below",
     "write_on_top",
 ]
 
@@ -61,6 +62,18 @@ def fit_height(ax: Axes) -> None:
     figure: Any = ax.figure
     wide, high = figure.get_size_inches()
     figure.set_size_inches(wide, min(high, max(1.8, 0.88 * wide * (top - bottom) / (right - left) + 1.0)))
+
+
+def set_below(upper: Axes, lower: Axes) -> None:
+    """Make a panel as wide as the map above it, whose equal scales may leave it narrower, so that their x line up."""
+    from matplotlib.transforms import Bbox
+
+    def place(_: Any, renderer: Any) -> Bbox:
+        upper.apply_aspect()
+        above, own = upper.get_position(), lower.get_position(original=True)
+        return Bbox.from_extents(above.x0, own.y0, above.x1, own.y1)
+
+    lower.set_axes_locator(place)
 
 
 def outline(contour: Contour, low: float, high: float) -> tuple[Floats, Floats]:

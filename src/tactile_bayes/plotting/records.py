@@ -33,6 +33,13 @@ __all__ = ["observables", "predictive"]
 
 _LINES = {"forward": "-", "backward": "--"}
 _SAMPLES = {"forward": "o", "backward": "^"}
+_SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
+"""Colours of residuals, after Okabe and Ito, of which two sweeps lie over one another."""
+
+_ENDS = ("lower", "upper")
+_FARTHEST = 8.0
+"""Residual up to which a panel reaches at most: else one far off would flatten all others."""
+
 _TURNING_LABELS = {
     **LABELS,
     "force_x": r"axial force $f_{\mathrm{A}\parallel}$",
@@ -87,9 +94,18 @@ def observables(
 
 
 def predictive(
-    record: xr.Dataset, predicted: xr.Dataset, *, axes: Sequence[Axes] | None = None, label: str = "predicted"
+    record: xr.Dataset,
+    predicted: xr.Dataset,
+    *,
+    axes: Sequence[Axes] | None = None,
+    residuals: Sequence[Axes] | None = None,
+    label: str = "predicted",
 ) -> AxesArray:
-    """Measured observables over their posterior predictive interval.
+    """Measured observables over their posterior predictive interval, and how far off it they are.
+
+    A residual is a reading less the middle of its interval, over half the interval's width: within ±1 it lies in the
+    interval. Readings that such a contour does not explain make their own noise large, and hide in an interval that
+    holds it; their residuals do not scatter, but wander.
 
     Parameters
     ----------
@@ -100,20 +116,23 @@ def predictive(
         units and the frame of the record. Channels without an interval are drawn without.
     axes : sequence of 3 Axes, optional
         One for each of holding_moment, force_x and force_y.
+    residuals : sequence of 3 Axes, optional
+        Likewise, for the residuals of each; with `axes` alone these are not drawn.
     label : str
         What the interval is called in the legend.
 
     Returns
     -------
     ndarray of Axes, shape (3,)
-        Drive angles are in degrees.
+        Of the channels; drive angles are in degrees. A figure that is made here has residuals below each.
 
     Raises
     ------
     RecordError
         If `record` is no record.
     ParameterError
-        If there are not three axes, or `predicted` has not the samples of the record, or states another frame.
+        If there are not three axes, or residuals have some and channels none, or `predicted` has not the samples of the
+        record, or states another frame.
 
     Examples
     --------
@@ -138,23 +157,64 @@ def predictive(
             f"forces are predicted in the {frame} frame, and those of the record are in the {frame_of(record)} one: "
             f"give in_frame(record, {frame!r})"
         )
-    panels, own = channel_panels(axes)
+    if axes is None and residuals is not None:
+        raise ParameterError("axes are given for the residuals only: give three for the channels, too")
+    panels, below, own = _panels_with_residuals(axes, residuals)
     _draw_observables(panels, record, None, with_truth=False)
-    for panel, channel in zip(panels, CHANNELS, strict=True):
+    for channel, panel, ax in zip(CHANNELS, panels, below, strict=True):
         if f"{channel}_lower" not in predicted or np.isnan(record[channel].values).all():
+            if ax is not None:
+                ax.set_yticks([])
             continue
-        for number in np.unique(record["sweep"].values):
-            of_sweep = record["sweep"].values == number
-            angle = _degrees(record["drive_angle"].values[of_sweep])
-            order = np.argsort(angle, kind="stable")
-            lower, upper = (predicted[f"{channel}_{end}"].values[of_sweep][order] for end in ("lower", "upper"))
+        for sweep in _sweeps(record.assign({end: predicted[f"{channel}_{end}"] for end in _ENDS})):
+            sweep = sweep.sortby("drive_angle")
+            angle = _degrees(sweep["drive_angle"].values)
             style = {"color": PALETTE["band"], "linewidth": 0.5, "zorder": 0.5, "label": label}
-            panel.fill_between(angle[order], lower, upper, **style)
-    _finish_panels(panels, own)
+            panel.fill_between(angle, *(sweep[end].values for end in _ENDS), **style)
+            if ax is not None:
+                _draw_residuals(ax, sweep, channel)
+        if ax is not None:
+            _finish_residuals(ax)
+    drawn = [ax for pair in zip(panels, below, strict=True) for ax in pair if ax is not None]
+    _finish_panels(np.array(drawn, dtype=object), own, columns=4 if below[0] is None else 3)
     return panels
 
 
-def _finish_panels(panels: AxesArray, own: bool) -> None:
+def _panels_with_residuals(
+    axes: Sequence[Axes] | None, residuals: Sequence[Axes] | None
+) -> tuple[AxesArray, AxesArray, bool]:
+    """Panels of channels, those of their residuals or None for each, and whether they are of a figure of their own."""
+    if axes is not None:
+        panels, below = channel_panels(axes)[0], np.full(3, None)
+        return panels, below if residuals is None else channel_panels(residuals)[0], False
+    from matplotlib import pyplot as plt
+
+    ratios = {"height_ratios": 3 * (2.0, 1.0)}
+    _, both = plt.subplots(6, 1, sharex=True, figsize=(7.0, 8.4), layout="constrained", gridspec_kw=ratios)
+    return both[::2], both[1::2], True
+
+
+def _draw_residuals(ax: Axes, sweep: xr.Dataset, channel: str) -> None:
+    lower, upper = (sweep[end].values for end in _ENDS)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = (sweep[channel].values - 0.5 * (lower + upper)) / (0.5 * (upper - lower))
+    direction = str(sweep["direction"].values[0])
+    style: dict[str, Any] = {"color": _SWEEPS[direction], "marker": _SAMPLES[direction], "markersize": 2.2}
+    style |= {"markeredgewidth": 0.0, "linestyle": _LINES[direction], "linewidth": 0.5}
+    style |= {"label": f"residual {direction}"}
+    ax.plot(_degrees(sweep["drive_angle"].values), np.where(np.isfinite(off), off, np.nan), **style)
+
+
+def _finish_residuals(ax: Axes) -> None:
+    ax.axhspan(-1.0, 1.0, color=PALETTE["band"], linewidth=0.0, zorder=0.5)
+    ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0, zorder=0.6)
+    values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.lines])
+    most = float(np.clip(np.max(np.abs(values), initial=1.0, where=np.isfinite(values)), 1.5, _FARTHEST))
+    ax.set_ylim(-1.1 * most, 1.1 * most)
+    ax.set_ylabel("residual\n[½ interval]")
+
+
+def _finish_panels(panels: AxesArray, own: bool, columns: int = 4) -> None:
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 
     bottom = panels[-1]
@@ -177,7 +237,7 @@ def _finish_panels(panels: AxesArray, own: bool) -> None:
             list(labelled),
             loc="lower center",
             bbox_to_anchor=(0.5, 1.0),
-            ncols=min(4, len(labelled)),
+            ncols=min(columns, len(labelled)),
             fontsize="small",
             frameon=False,
         )

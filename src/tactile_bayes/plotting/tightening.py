@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import LABELS, PALETTE, AxesArray, Floats, legend_entry, set_unit
+from tactile_bayes.plotting.axes import LABELS, PALETTE, AxesArray, Floats, legend_entry, number, set_unit
 from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, radius_of, refuse_probability
-from tactile_bayes.plotting.maps import outline
+from tactile_bayes.plotting.maps import limits_of, outline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +24,11 @@ _DETAILS = "abc"
 _ON_MAP = 18
 _ALONG, _ACROSS = "#009E73", "#CC79A7"
 _IMPLIED = "#000000"
+_HIGHEST = 0.9
+"""Height of the map over that of each row below it, at most."""
+
+_PANEL = 0.25
+"""Height of such a row over the width of the figure."""
 _STYLES = {"forward": "-", "backward": "--"}
 
 
@@ -95,6 +100,8 @@ def tightening(
     legend_entry(panels[0], "implied by the contour", **dots | {"markersize": 6.0})
     on_map = _on_the_map(shown, chosen)
     contact_ellipses(loose, probability=probability, truth=truth, samples=on_map, ax=panels[0])
+    if axes is None:
+        _fit_map(panels[0])
     panels[0].legend(fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     radius = radius_of(probability)
     for letter, ax, i in zip(_DETAILS, panels[1:4], chosen.tolist(), strict=True):
@@ -129,7 +136,7 @@ def _panels(axes: Any) -> AxesArray:
         from matplotlib import pyplot as plt
 
         figure = plt.figure(figsize=(7.0, 7.6), layout="constrained")
-        grid = figure.add_gridspec(3, 3, height_ratios=(0.9, 1.0, 1.0))
+        grid = figure.add_gridspec(3, 3, height_ratios=(_HIGHEST, 1.0, 1.0))
         whole, bottom = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[2, :])
         panels = [whole, *(figure.add_subplot(grid[1, i]) for i in range(3)), bottom]
     else:
@@ -137,6 +144,18 @@ def _panels(axes: Any) -> AxesArray:
     if len(panels) != 5:
         raise ParameterError(f"axes are {len(panels)}: give five, for the map, three details, and the ratios")
     return np.array(panels, dtype=object)
+
+
+def _fit_map(ax: Axes) -> None:
+    """Give a low map no more height than it takes, and the figure as much less."""
+    left, right, bottom, top = limits_of(ax)
+    figure: Any = ax.figure
+    wide, high = figure.get_size_inches()
+    grid: Any = ax.get_gridspec()
+    of_row = _PANEL * wide
+    share = min(_HIGHEST, 0.86 * wide * (top - bottom) / (right - left) / of_row)
+    grid.set_height_ratios((share, 1.0, 1.0))
+    figure.set_size_inches(wide, high - (_HIGHEST - share) * of_row)
 
 
 def _enlarged(shown: Any, implied: xr.DataTree, samples: Sequence[int] | None) -> Any:
@@ -186,6 +205,8 @@ def _draw_detail(
     ax.set_ylim(-reach, reach)
     ax.locator_params(nbins=3)
     ax.tick_params(labelsize="small")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter(lambda value, _: number(value))
     limits = np.array([-reach, reach])
     set_unit(ax.xaxis, LABELS["contact_x"] + " − implied ", "contact_x", tight["contact_x"].attrs, limits)
     set_unit(ax.yaxis, LABELS["contact_y"] + " − implied ", "contact_y", tight["contact_y"].attrs, limits)
@@ -198,8 +219,8 @@ def _draw_ratios(ax: Axes, implied: xr.DataTree, tight: xr.Dataset, loose: xr.Da
     for name, colour in (("tangent_sd", _ALONG), ("normal_sd", _ACROSS)):
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio: Floats = np.where(shown, loose[name].values / tight[name].values, np.nan)
-        for number in np.unique(record["sweep"].values):
-            of_sweep = record["sweep"].values == number
+        for sweep in np.unique(record["sweep"].values):
+            of_sweep = record["sweep"].values == sweep
             style = _STYLES[str(directions[of_sweep][0])]
             ax.plot(angle[of_sweep], ratio[of_sweep], color=colour, linestyle=style, linewidth=1.3)
     for words, colour in (("along the contour", _ALONG), ("across it", _ACROSS)):

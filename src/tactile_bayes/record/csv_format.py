@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
-from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -13,9 +12,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.record.csv_header import FORMAT, KINDS, Header, column_line, column_names, header_line, read_header
+from tactile_bayes.record.csv_header import (
+    FORMAT,
+    KINDS,
+    Header,
+    cells_in,
+    column_line,
+    header_line,
+    lines_below,
+    read_header,
+)
 from tactile_bayes.record.csv_rows import Layout, read_rows
-from tactile_bayes.record.encoding import refuse_other_kinds
+from tactile_bayes.record.csv_units import units_below
+from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, meant_kinds, origins_of
 from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
@@ -24,9 +33,6 @@ __all__ = ["read_csv", "write_csv"]
 
 _ROWS = 20_000
 """Samples that are written at once."""
-
-_SEARCHED, _LONGEST = 50, 10_000
-"""Lines, and bytes of each, that are looked through for the column names, where they are not in the first one."""
 
 
 def write_csv(record: xr.Dataset, path: Path) -> None:
@@ -72,12 +78,17 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
     source = Source(str(path))
     with open(path, "rb") as file:
         refuse_other_kinds(file.peek(8), source)
-        text = _with_usual_line_ends(file)
+        text = in_utf8(_with_usual_line_ends(file))
         header = read_header(text, source)
         source = Source(str(path), heads=header.heads)
         names = [name for name in header.names if name]
         _refuse_title(text, header, names, columns, source)
         origins = origins_of(columns, names, source)
+        meant = meant_kinds(origins, names)
+        units, last = units_below(text, header, meant, source), header.line
+        if units:
+            last += 1
+            source = Source(str(path), heads={**header.heads, **dict.fromkeys(units, last)})
         described = {
             name: cast(Kind, header.descriptions[name]["kind"]) for name in names if name in header.descriptions
         }
@@ -86,17 +97,19 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
         unnamed = {name: place for place, name in enumerate(places, start=1) if name not in names}
         for name in unnamed:
             described[name] = "text"
-        layout = Layout(places, header.delimiter, header.line, meant_kinds(origins, names), described)
+        layout = Layout(places, header.delimiter, last, meant, described)
         values, lines = read_rows(text, layout, Source(str(path)))
     for name, place in unnamed.items():
         _refuse_content(values.pop(name), place, lines, header.line, source)
     attrs = {
         name: {key: word for key, word in header.descriptions.get(name, {}).items() if key != "kind"} for name in values
     }
+    for name, unit in units.items():
+        attrs[name]["units"] = unit
     return Table(
         {name: (array, attrs[name]) for name, array in values.items()},
         header.attrs,
-        Source(str(path), lines, header.heads, names=names, stated=header.stated),
+        Source(str(path), lines, source.heads, names=names, stated=header.stated),
     )
 
 
@@ -104,16 +117,17 @@ def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Map
     """Refuse a line that was taken for the column names, but means nothing, where a line below looks more like them."""
     if any_meant(columns, names):
         return
-    begin = file.tell()
-    below = [column_names(line[:_LONGEST].decode("utf-8", "replace"))[0] for line in islice(file, _SEARCHED)]
-    file.seek(begin)
+    below = lines_below(file)
     what = f"this line was taken for the column names ({', '.join(names)}), "
-    for number, others in enumerate(below, start=header.line + 1):
-        if any_meant(columns, others):
+    for number, line in enumerate(below, start=header.line + 1):
+        if any_meant(columns, cells_in(line)):
             raise source.line_error(
                 header.line, f"{what}but they are in line {number}: put # before the lines above that"
             )
-    if max(map(len, below), default=0) > len(header.names):
+    widths = [len(cells_in(line, header.delimiter)) for line in below]
+    if len(header.names) == 1 or len(header.names) not in widths:  # what separates names does not separate cells there
+        widths = [len(cells_in(line)) for line in below]
+    if max(widths, default=0) > len(header.names):
         raise source.line_error(
             header.line,
             f"{what}but there are more cells in lines below: if the names are further down, put # before the lines "

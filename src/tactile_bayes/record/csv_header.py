@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, BinaryIO
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
@@ -15,11 +16,14 @@ from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
 from tactile_bayes.record.table import Source
 
-__all__ = ["FORMAT", "KINDS", "Header", "column_line", "column_names", "header_line", "read_header"]
+__all__ = ["FORMAT", "KINDS", "Header", "cells_in", "column_line", "header_line", "lines_below", "read_header"]
 
 FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
 _DELIMITERS = ",;\t"
+_SEARCHED, _LONGEST = 50, 10_000
+"""Lines, and bytes of each, that are looked at ahead of what is read."""
+
 _NAME = r"[\w.\-]+"
 _QUOTED = r'"(?:[^"\\]|\\.)*"'
 _UNIT = r'(?!\s)[^\]"]*(?<!\s)'
@@ -111,7 +115,8 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             continue
         if not line.startswith("#"):
             if line.strip(_DELIMITERS + " \r\n"):
-                names, delimiter = column_names(line, delimiter)
+                delimiter = delimiter or _delimiter_of(line, lines_below(file))
+                names = cells_in(line, delimiter)
                 _refuse_equal(names, number, source)
                 heads = dict.fromkeys(names, number) | heads
                 lines = {name: line for name, (line, _) in stated.items()}
@@ -200,11 +205,36 @@ def _unquoted(text: str) -> str:
         return text
 
 
-def column_names(line: str, delimiter: str | None = None) -> tuple[list[str], str]:
-    """The names in a line, and what separates them: what makes the most columns, if it is not said."""
-    cells = {sign: next(csv.reader([line], delimiter=sign)) for sign in delimiter or _DELIMITERS}
-    delimiter = max(cells, key=lambda sign: len(cells[sign]))
-    return [name.strip() for name in cells[delimiter]], delimiter
+def lines_below(file: BinaryIO) -> list[str]:
+    """The next lines of a file, as far as is looked ahead; it is left where it stands."""
+    begin = file.tell()
+    lines = [line[:_LONGEST].decode("utf-8", "replace") for line in islice(file, _SEARCHED)]
+    file.seek(begin)
+    return lines
+
+
+def cells_in(line: str, delimiter: str | None = None) -> list[str]:
+    """The cells of a line, without blanks around them; with what makes the most of them, if no delimiter is given."""
+    cells = (_parted(line, sign) for sign in delimiter or _DELIMITERS)
+    return [cell.strip() for cell in max(cells, key=len)]
+
+
+def _parted(line: str, delimiter: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:  # where it is among the rows, it is refused with them
+        return line.split(delimiter)
+
+
+def _delimiter_of(line: str, below: Sequence[str]) -> str:
+    """What separates the names in a line: tabs or semicolons, if they part the next line alike, as commas may stand in
+    names and in decimals; else what makes the most columns. Tabs may also be blanks behind commas."""
+    first = next((other for other in below if any(cells_in(other))), "")
+    for sign in "\t;":
+        names = cells_in(line, sign)
+        if 1 < len(names) == len(cells_in(first, sign)) and not names[0].endswith(","):
+            return sign
+    return max(_DELIMITERS, key=lambda sign: len(cells_in(line, sign)))
 
 
 def _refuse_equal(names: list[str], number: int, source: Source) -> None:

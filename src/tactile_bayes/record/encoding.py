@@ -1,14 +1,19 @@
-"""The encoding of a CSV file: what a file is that is no text in UTF-8."""
+"""The encoding of a CSV file: UTF-8, or Windows-1252; and what a file is that is neither."""
 
 from __future__ import annotations
 
 import codecs
+import io
+import re
+from typing import BinaryIO
 
 from tactile_bayes.record.table import Source
 
-__all__ = ["not_utf8", "refuse_other_kinds"]
+__all__ = ["in_utf8", "not_utf8", "refuse_other_kinds"]
 
+_CHUNK = 1 << 21
 _SAVE = "save it as CSV in UTF-8"
+_BEYOND_ASCII = re.compile("[^\0-\x7f]")
 _BINARY = {
     b"\x89HDF\r\n\x1a\n": "a NetCDF (HDF5) file: rename it to end in .nc",
     **dict.fromkeys(
@@ -37,8 +42,41 @@ def refuse_other_kinds(start: bytes, source: Source) -> None:
         raise source.error(f"the file is no UTF-8 text, but looks like UTF-16: {_SAVE}")
 
 
+def in_utf8(file: BinaryIO) -> BinaryIO:
+    """The file; or a copy in UTF-8, if it is text in Windows-1252, as programs on Windows write it.
+
+    A file in UTF-8 in which some bytes are damaged stays as it is, to be refused where the first one is.
+    """
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    try:
+        for block in iter(lambda: file.read(_CHUNK), b""):
+            decoder.decode(block)
+        decoder.decode(b"", final=True)
+    except UnicodeDecodeError:
+        file.seek(0)
+        copy = _from_windows(file.read())
+        if copy is not None:
+            return io.BytesIO(copy)
+    file.seek(0)
+    return file
+
+
+def _from_windows(content: bytes) -> bytes | None:
+    """The content in UTF-8, if it can be Windows-1252; where most signs beyond ASCII are UTF-8, it is that, damaged."""
+    if b"\0" in content or content.startswith(codecs.BOM_UTF8):
+        return None
+    beyond = _BEYOND_ASCII.findall(content.decode("utf-8", "surrogateescape"))
+    damaged = sum("\ud800" <= sign <= "\udfff" for sign in beyond)
+    if 2 * damaged < len(beyond):
+        return None
+    try:
+        return content.decode("cp1252").encode()
+    except UnicodeDecodeError:
+        return None
+
+
 def not_utf8(error: UnicodeDecodeError) -> str:
-    """Why bytes are no text in UTF-8, and what to do."""
+    """Why bytes are no text in UTF-8, nor all in Windows-1252, and what to do."""
     byte = error.object[error.start : error.start + 1]
     character = byte.decode("cp1252", "ignore")
     reading = f", {character!r} in Windows-1252" if character else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -40,12 +41,13 @@ def read_record(
     A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
     sample; `write_record` shows the form. The header may be absent: then the numbers are dimensionless, or SI if
     `rod` is given or a column states a unit. A load cell that turns with the drive is stated by
-    `# load_cell_frame: turning`. Semicolons or tabs may stand between columns, and then commas in decimals. In a NetCDF
-    file every variable lies along one dimension, "sample" or any other.
+    `# load_cell_frame: turning`. Semicolons or tabs may stand between columns, and then commas in decimals; text is in
+    UTF-8 or Windows-1252. In a NetCDF file every variable lies along one dimension, "sample" or any other.
 
     Units are those of the record (SI, or those of the rod; angles in radians), or others that are stated: by
-    `columns`, in the name of a column ("force_x [mN]"), in a line of the header (`# column force_x: number [mN]`,
-    `# rod_length: 200 [mm]`), or in the attribute `units` of a NetCDF variable. They are converted.
+    `columns`, in the name of a column ("force_x [mN]"), in a row of units below the names, in a line of the header
+    (`# column force_x: number [mN]`, `# rod_length: 200 [mm]`), or in the attribute `units` of a NetCDF variable. They
+    are converted.
 
     Parameters
     ----------
@@ -81,8 +83,10 @@ def read_record(
         If the content is not a record, see `validate` (the message names line and column); if the file is SI
         and no rod is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if a
         column is in a unit of another quantity, or what stands for it in `columns` is not there; if there are sweeps
-        already where they are to be split, or the drive angle jumps by about a turn there; if the suffix is another
-        one.
+        already where they are to be split, or the drive angle jumps by about a turn there; if the path is a folder,
+        or its suffix another one.
+    FileNotFoundError
+        If there is no such file.
     ParameterError
         If `columns` names no column of a record, or what stands for it cannot be.
 
@@ -114,6 +118,10 @@ def read_record(
     'SI'
     """
     path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+    if path.is_dir():
+        raise RecordError(f"{path} is a folder: give the record itself, a .csv or a .nc file")
     columns = columns or {}
     table = renamed(_READERS[_suffix(path)](path, columns), columns)
     table = in_units_of_record(table, rod)

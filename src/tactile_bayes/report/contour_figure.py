@@ -66,7 +66,9 @@ def contour_figure(findings: Findings) -> ContourFigure:
     for place in bases:
         overview.put(element("circle", cx=overview.x.at(place[0]), cy=overview.y.at(place[1]), r=5, class_="pivot"))
     entries.append(("key-pivot", "pivot" if len(bases) == 1 else "pivots"))
-    overview.put(element("circle", id="band-mark", r=5, class_="mark js-only", cx=-20, cy=-20))
+    diamond = element("path", d="M-7 0L0 -7L7 0L0 7Z")
+    overview.put(element("g", diamond, id="band-mark", class_="place js-only", transform="translate(-20 -20)"))
+    entries.append(("key-place js-only", "place along x, chosen below or beside"))
 
     off = np.stack([lower - median, upper - median])
     fine = shown_as("contact_x", attrs, off)

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 WIDTH = 640
 """Of every drawing, in its own units, of which a letter has 13 in height."""
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 84, 24, 12, 46
+_LEFT, _RIGHT, _TOP, _BOTTOM = 96, 24, 12, 46
 """Room beside a plot's frame."""
 
 _TALLEST, _LOWEST = 460.0, 140.0
@@ -180,7 +180,7 @@ class Plot:
             axes.append(element("line", x1=left, x2=right, y1=at, y2=at, class_="grid"))
             axes.append(element("text", number(value, self.y_power), x=left - 6, y=at + 4, class_="tick end"))
         middle = 0.5 * (top + bottom)
-        turned = f"translate(20 {middle:.1f}) rotate(-90)"
+        turned = f"translate(16 {middle:.1f}) rotate(-90)"
         axes += [
             element("text", self.x_label, x=0.5 * (left + right), y=bottom + 39, class_="label middle"),
             element("text", self.y_label, x=0, y=0, transform=turned, class_="label middle"),
@@ -221,8 +221,14 @@ def dots(x: Sequence[float] | Floats, y: Sequence[float] | Floats, half: float, 
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> Markup:
-    """What marks and lines mean, as a list of HTML that wraps: pairs of a class and a text."""
-    items = [
-        element("li", element("span", class_=f"key {class_}", aria_hidden="true"), text) for class_, text in entries
-    ]
+    """What marks and lines mean, as a list of HTML that wraps: pairs of a class and a text.
+
+    What stands behind a blank in a class is one of the whole entry.
+    """
+    items = []
+    for class_, text in entries:
+        key, _, shown = class_.partition(" ")
+        items.append(
+            element("li", element("span", class_=f"key {key}", aria_hidden="true"), text, class_=shown or None)
+        )
     return element("ul", *items, class_="legend")

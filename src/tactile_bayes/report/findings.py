@@ -15,6 +15,7 @@ from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.record import record_hash
 from tactile_bayes.runs.contour import contact_points, reach, summary
+from tactile_bayes.runs.run_folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.gap import gap
 from tactile_bayes.uncertainty.predictive import predictive_interval
@@ -81,6 +82,11 @@ class Findings:
     record_sha256: str
     probability: float
 
+    @property
+    def is_rejected(self) -> bool:
+        """Whether the record does not look like what the posterior predicts, so that its contour is not to be used."""
+        return self.check is not None and not self.check.attrs["passed"]
+
 
 def findings_of(
     run: Path, compare: Path | None = None, progress: Callable[[int], object] = lambda done: None
@@ -104,7 +110,7 @@ def findings_of(
     InferenceError
         If one of them is something else.
     """
-    path = _posterior_in(run)
+    path = posterior_in(run)
     content = path.read_bytes()
     posterior = _contour_posterior(path)
     record = record_of(posterior)
@@ -140,24 +146,6 @@ def findings_of(
     )
     progress(FINDING_STEPS)
     return found
-
-
-def _posterior_in(run: Path) -> Path:
-    remedy = "give the folder that `tactile-bayes infer RECORD --out FOLDER` has written"
-    if not run.exists():
-        raise InferenceError(f"there is no folder {run}: {remedy}")
-    if not run.is_dir():
-        raise InferenceError(f"{run} is a file: {remedy}")
-    path = run / "posterior.nc"
-    if not path.is_file():
-        kinds = {
-            "comparison.nc": "a comparison of shapes",
-            "design.nc": "a design",
-            "manifest.json": "a data set",
-        }
-        found = next((f", but {kind}" for name, kind in kinds.items() if (run / name).exists()), "")
-        raise InferenceError(f"{run} holds no posterior.nc{found}: {remedy}")
-    return path
 
 
 def _contour_posterior(path: Path) -> xr.DataTree:

@@ -59,7 +59,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "gap": _gap_words(findings),
         "shapes": _shapes(findings.comparison),
         "parameters": _parameters(findings, mute=True),
-        "is_well": findings.verdicts[0].startswith(_WELL),
+        "is_well": _is_well(findings),
         "verdicts": findings.verdicts,
         "convergence": convergence(findings),
         "check_words": check_words(findings),
@@ -89,7 +89,12 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
     }
 
 
+def _is_well(findings: Findings) -> bool:
+    return findings.verdicts[0].startswith(_WELL)
+
+
 def _answer(findings: Findings) -> str:
+    """How wide the band is, and what that is worth."""
     band = findings.band
     width = band["upper"].values - band["lower"].values
     unit = shown_as("contact_x", band["x"].attrs, band["x"].values)
@@ -97,12 +102,20 @@ def _answer(findings: Findings) -> str:
     if not np.isfinite(width).any():
         return "No contour of the posterior reaches all of what was touched: there is no band."
     at = float(band["x"].values[np.nanargmax(width)])
-    return (
-        f"From x = {unit.text(float(band['x'].values[0]))} to {unit.full(float(band['x'].values[-1]))} the contour is "
-        f"known to within a {percent(findings.probability)} band whose median width is "
-        f"{fine.full(float(np.nanmedian(width)), 3)}; it is widest at x = {unit.full(at, 3)}, "
+    reach = f"From x = {unit.text(float(band['x'].values[0]))} to {unit.full(float(band['x'].values[-1]))}"
+    share = percent(findings.probability)
+    widths = (
+        f"whose median width is {fine.full(float(np.nanmedian(width)), 3)}; it is widest at x = {unit.full(at, 3)}, "
         f"{fine.full(float(np.nanmax(width)), 3)}."
     )
+    if findings.is_rejected:
+        return (
+            f"{reach} the posterior has a {share} band {widths} That would hold if the contour were of this family and "
+            "the rig as it was taken, and the record says that they are not: how far off the band is, is not known."
+        )
+    if not _is_well(findings):
+        return f"{reach} the posterior has a {share} band {widths} What it is worth depends on what is said above."
+    return f"{reach} the contour is known to within a {share} band {widths}"
 
 
 def _gap_words(findings: Findings) -> list[str]:
@@ -115,14 +128,17 @@ def _gap_words(findings: Findings) -> list[str]:
     values = [float(width.sel(bound=bound)) / scale for bound in ("median", "lower", "upper")]
     middle, low, high = spread(values, values[2] - values[1])
     share = percent(findings.probability)
+    would_be = "would be" if findings.is_rejected else "is"
+    of_such = "On such a contour" if findings.is_rejected else ""
     if gap_ends(findings) is None:
-        said = [f"No gap is left: the sweeps overlap by {middle.removeprefix('−')} {unit.name}".rstrip() + "."]
+        overlap = f"{middle.removeprefix('−')} {unit.name}".rstrip()
+        said = [_sentence(f"{of_such} no gap {would_be} left: the sweeps overlap by {overlap}.")]
     else:
+        wide, range_ = f"{middle} {unit.name}".rstrip(), f"{low} to {high} {unit.name}".rstrip()
         said = [
-            f"The gap, which no sweep touches, is {middle} {unit.name} wide".rstrip()
-            + f" ({share} from {low} to {high} {unit.name}".rstrip()
-            + ")."
+            _sentence(f"{of_such} the gap, which no sweep touches, {would_be} {wide} wide ({share} from {range_}).")
         ]
+    if gap_ends(findings) is not None and not findings.is_rejected:
         certificate = float(np.max(edges["triangle_upper"].values - edges["triangle_lower"].values))
         band = float(edges["band_width"])
         if np.isfinite(certificate) and np.isfinite(band):
@@ -137,6 +153,11 @@ def _gap_words(findings: Findings) -> list[str]:
     if edges.attrs["gaps"] > 1:
         said.append(f"There are {edges.attrs['gaps']} gaps; this is the widest.")
     return said
+
+
+def _sentence(words: str) -> str:
+    words = words.strip()
+    return words[0].upper() + words[1:]
 
 
 def _shapes(comparison: xr.Dataset | None) -> dict[str, Any] | None:

@@ -10,8 +10,7 @@
     place.value = index;
     rule.setAttribute("x1", band.x[index]);
     rule.setAttribute("x2", band.x[index]);
-    dot.setAttribute("cx", band.mapX[index]);
-    dot.setAttribute("cy", band.mapY[index]);
+    dot.setAttribute("transform", "translate(" + band.mapX[index] + " " + band.mapY[index] + ")");
     by("band-said").textContent = band.said[index];
     place.setAttribute("aria-valuetext", band.said[index]);
   }

@@ -28,11 +28,13 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     >>> said = {"family": "circle", "friction": 0.0, "nuisances": "[]", "seed": "1", "settings": '{"ensembles": 2}'}
     >>> print(python_lines(said))
     import tactile_bayes as tb
-    from tactile_bayes.inference.result import record_of
+    import xarray as xr
     <BLANKLINE>
     stored = tb.read_result("posterior.nc")
+    columns = [stored[group].to_dataset() for group in ("constant_data", "observed_data")]
+    record = xr.merge(columns).assign_attrs(stored.attrs)
     again = tb.infer_contour(
-        record_of(stored),
+        record,
         family="circle",
         friction=0.0,
         nuisances=[],
@@ -57,11 +59,13 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
     lines = [
         *(["import numpy as np"] if not seed.isdigit() else []),
         "import tactile_bayes as tb",
-        "from tactile_bayes.inference.result import record_of",
+        "import xarray as xr",
         "",
         'stored = tb.read_result("posterior.nc")',
+        'columns = [stored[group].to_dataset() for group in ("constant_data", "observed_data")]',
+        "record = xr.merge(columns).assign_attrs(stored.attrs)",
         "again = tb.infer_contour(",
-        "    record_of(stored),",
+        "    record,",
         *(f"    {option}" if option.endswith(("(", ",")) else f"    {option}," for option in options),
         ")",
         'print(again["posterior"].equals(stored["posterior"]))',

@@ -94,9 +94,14 @@ def contacts_words(findings: Findings) -> list[str]:
     attrs = contacts.attrs
     probability, score = (float(attrs.get(key, np.nan)) for key in ("misfit_probability", "axial_score"))
     if np.isfinite(probability):
+        noise, but = "noise", ""
+        if findings.is_rejected:
+            noise = "noise as large as it was found"
+            but = ": in that noise is what the contour does not explain, so that this speaks for nothing"
         said.append(
             f"Four numbers determine three of a contact; what is left over sums to {float(attrs['misfit_sum']):.4g} "
-            f"over {int(attrs['misfit_samples'])} samples, which noise explains with probability {chance(probability)}."
+            f"over {int(attrs['misfit_samples'])} samples, which {noise} explains with probability "
+            f"{chance(probability)}{but}."
         )
     if np.isfinite(score):
         known = "found" if "friction" in json.loads(findings.posterior.attrs["nuisances"]) else "stated"

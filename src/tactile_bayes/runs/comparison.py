@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import xarray as xr
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.files import write_atomically
+from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.runs.picture import write_picture
 from tactile_bayes.uncertainty.family_comparison import compare_families
@@ -39,7 +41,12 @@ class ComparisonRun:
 
 
 def compare_into(
-    measured: xr.Dataset, out: str | os.PathLike[str], *, load_cell: LoadCell | None = None, **options: Any
+    measured: xr.Dataset,
+    out: str | os.PathLike[str],
+    *,
+    load_cell: LoadCell | None = None,
+    progress: Callable[[str, Progress], object] = lambda name, progress: None,
+    **options: Any,
 ) -> ComparisonRun:
     """Compare families of contours, and write what comes out to a folder.
 
@@ -48,9 +55,9 @@ def compare_into(
     measured : xr.Dataset
         A record.
     out : path-like
-        Folder for comparison.nc, comparison.csv and families.png; made if it is not there. Files of these names in it
-        are replaced.
-    load_cell, options
+        Folder for comparison.nc, comparison.csv and families.png; made if it is not there, once sampling goes on. Files
+        of these names in it are replaced.
+    load_cell, progress, options
         As `compare_families` takes them.
 
     Returns
@@ -61,13 +68,23 @@ def compare_into(
     ------
     RecordError, ParameterError, InferenceError
         As `compare_families`; where no contour is found, with what speaks for a wrong unit or sign.
+    OSError
+        If the folder cannot be made.
     """
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)  # now: a refusal after hours of sampling would be late
+    above = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not above.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
+
+    def note(name: str, done: Progress) -> None:
+        folder.mkdir(parents=True, exist_ok=True)  # now: all options are checked, and hours of sampling lie ahead
+        progress(name, done)
+
     try:
-        comparison = compare_families(measured, load_cell=load_cell, **options)
+        comparison = compare_families(measured, load_cell=load_cell, progress=note, **options)
     except InferenceError as error:
         raise type(error)(" ".join((str(error), *suspicions(measured, load_cell)))) from error
+    folder.mkdir(parents=True, exist_ok=True)
     return ComparisonRun(comparison, write_comparison(comparison, folder))
 
 

@@ -89,7 +89,8 @@ def analyse(
         A record.
     out : path-like
         Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
-        the figures; made if it is not there. Files of these names in it are replaced.
+        the figures; made if it is not there. Files of these names in it are replaced, and a report.html, which would
+        be of the posterior that was there, is removed.
     family, load_cell, rod, friction, nuisances, seed, settings, checkpoint, progress
         As `infer_contour` takes them.
     probability : float
@@ -132,6 +133,7 @@ def analyse(
         raise type(error)(" ".join((str(error), *suspicions(measured, load_cell)))) from error
     result.attrs |= origin
     files = {"posterior": folder / "posterior.nc"}
+    (folder / "report.html").unlink(missing_ok=True)  # before, so that it is never beside another posterior
     write_result(result, files["posterior"])
 
     contacts = contact_points(measured, load_cell, result)
@@ -262,6 +264,7 @@ def _draw(
     from matplotlib.figure import Figure
 
     from tactile_bayes import plotting
+    from tactile_bayes.plotting.maps import set_below
 
     files: dict[str, Path] = {}
 
@@ -291,19 +294,23 @@ def _draw(
     figure, axes = panels(3, 1, 7.0, 5.4, sharex=True)
     plotting.observables(measured, events=fitted.events, axes=axes[:, 0])
     save("observables", figure)
-    figure, axes = panels(3, 1, 7.0, 5.4, sharex=True)
+    figure, axes = panels(6, 1, 7.0, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))
     probability = band.attrs["probability"]
     interval = predictive_interval(result, probability)
-    plotting.predictive(measured, interval, axes=axes[:, 0], label=f"{100 * probability:.6g} % predictive")
+    label = f"{100 * probability:.6g} % predictive"
+    plotting.predictive(measured, interval, axes=axes[::2, 0], residuals=axes[1::2, 0], label=label)
+    figure.align_ylabels(axes[:, 0])
     save("predictive", figure)
     figure, axes = panels(len(directions), 1, 7.0, 4.0 * len(directions))
     for direction, ax in zip(directions, axes[:, 0], strict=True):
         plotting.rods(fitted, direction=direction, ax=ax)
     save("rods", figure)
     edges = gap(result) if len(directions) == 2 else None
-    figure, axes = panels(2, 1, 7.0, 5.6, height_ratios=(2.2, 1.0))
+    figure, axes = panels(2, 1, 7.0, 6.0, sharex=True, height_ratios=(2.6, 1.0))
     plotting.contour(band.x.values, truth=truth, contacts=contacts, band=band, gap=edges, base=base, ax=axes[0, 0])
     plotting.band_detail(band, truth=truth, gap=edges, ax=axes[1, 0])
+    axes[0, 0].set_xlabel("")
+    set_below(*axes[:, 0])
     save("contour", figure)
     if edges is not None:
         figure, axes = panels(1, 1, 7.0, 3.6)

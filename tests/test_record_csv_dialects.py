@@ -1,0 +1,175 @@
+"""CSV files as rigs write them: rows of units, Windows-1252, decimal commas below any names."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from helpers.record_tables import WIRE, refused
+from tactile_bayes.cli import app
+from tactile_bayes.record import read_record, record_hash
+
+NAMES = "Winkel;Mz;Fx;Fy"
+ROWS = ("60,0;0,1;1;2", "61,0;0,25;-1,5;40")
+COLUMNS = {"drive_angle": "Winkel", "holding_moment": "Mz", "force_x": "Fx", "force_y": "Fy"}
+STATED = {"drive_angle": "Winkel[deg]", "holding_moment": "Mz[N mm]", "force_x": "Fx[mN]", "force_y": "Fy[mN]"}
+
+
+def read(tmp_path, *lines, columns=COLUMNS, encoding="utf-8", end="\n", rod=WIRE):
+    path = tmp_path / "rig.csv"
+    path.write_bytes((end.join(lines) + end).encode(encoding))
+    return read_record(path, columns=columns, split_sweeps=True, rod=rod)
+
+
+@pytest.fixture
+def plain(tmp_path):
+    """The record, with its units given beside it."""
+    return read(tmp_path, NAMES, *ROWS, columns=STATED)
+
+
+# --- Separators and decimals ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sign", [";", "\t"])
+def test_decimal_commas_need_no_known_names_to_be_told_from_separators(tmp_path, sign):
+    path = tmp_path / "rig.csv"
+    lines = ["Zeit;Winkel_grad;Mz_mNm;Fx_mN;Fy_mN", "0,00;74,0000;0,1864;-6,4649;-1,0087"]
+    path.write_text("\n".join(lines).replace(";", sign), encoding="utf-8")
+    result = CliRunner().invoke(app, ["inspect", str(path)])
+    message = "there is no column 'sweep' (columns: Zeit, Winkel_grad, Mz_mNm, Fx_mN, Fy_mN): add it, or say what"
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert message in result.stderr
+    assert "on the command line --column sweep=NAME" in result.stderr
+
+
+def test_commas_in_names_part_no_columns_where_semicolons_do(tmp_path, plain):
+    columns = {target: f"{name}, {STATED[target].partition('[')[2][:-1]}" for target, name in COLUMNS.items()}
+    given = {target: f"{columns[target]}[{STATED[target].partition('[')[2]}" for target in COLUMNS}
+    assert read(tmp_path, ";".join(columns.values()), *ROWS, columns=given).equals(plain)
+    with refused("(columns: Winkel, deg, Mz, N mm, Fx, mN, Fy, mN)"):
+        read(tmp_path, ";".join(columns.values()), *ROWS, columns={})
+
+
+def test_tabs_behind_commas_are_blanks(tmp_path):
+    lines = ["sweep,\tdirection,\tdrive_angle,\tholding_moment,\tforce_x,\tforce_y", "3,\tforward,\t1.2,\t0.1,\t1,\t2"]
+    assert read_record_of(tmp_path, *lines)["force_y"].values.tolist() == [2.0]
+
+
+@pytest.mark.parametrize("names", ["Messung 4", "Messung 1,5 mm", "Messung;4"])
+def test_lines_before_the_names_are_refused_whatever_signs_are_in_them(tmp_path, names):
+    with refused("line 1: this line was taken for the column names (Messung"):
+        read(tmp_path, names, NAMES, "60;0;1;2", columns={})
+    with refused("but they are in line 2: put # before the lines above that"):
+        read(tmp_path, names, NAMES, "60;0;1;2")
+
+
+# --- Rows of units --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("units", ["°;mN m;mN;mN", "[deg];[N mm];(mN);[ mN ]", " ° ; mN·m ; mN ; mN "])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_row_of_units_is_what_units_in_names_are(tmp_path, plain, units, end):
+    assert read(tmp_path, NAMES, units, *ROWS, end=end).equals(plain)
+    in_names = "Winkel [°];Mz [mN m];Fx [mN];Fy [mN]"
+    assert read(tmp_path, in_names, *ROWS).equals(plain)
+
+
+def test_a_unit_that_is_not_known_is_kept_of_a_column_that_is_not_measured(tmp_path, plain):
+    record = read(tmp_path, NAMES + ";T", "°;mN m;mN;mN;°C", *(row + ";21,5" for row in ROWS))
+    assert record["T"].values.tolist() == [21.5] * len(ROWS)
+    assert record["T"].attrs["units"] == "°C"
+    assert record.drop_vars("T").equals(plain)
+
+
+def test_a_row_of_units_also_tells_those_of_names_that_a_record_has(tmp_path):
+    lines = ["sweep,direction,drive_angle,holding_moment,force_x,force_y,time", "-,,°,mN m,mN,mN,s"]
+    record = read_record_of(tmp_path, *lines, "3,forward,60,0.1,1,2,0.5")
+    assert record["force_y"].values.tolist() == [0.002]
+    assert record["force_y"].attrs["units"] == "N"
+    np.testing.assert_allclose(record["drive_angle"], np.radians(60.0), rtol=1e-15)
+    assert (record["sweep"].item(), record["time"].attrs["units"]) == (3, "s")
+
+
+def read_record_of(tmp_path, *lines):
+    (tmp_path / "rig.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return read_record(tmp_path / "rig.csv", rod=WIRE)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (
+            [NAMES + ";T", "°;mN m;mX;mN;°C", ROWS[0] + ";20"],
+            "line 2: this looks like a row of units, but 'mX' below 'Fx' is none that is known here: empty that cell",
+        ),
+        ([NAMES, "°;mN m;s;mN", *ROWS], "line 2, column 'force_x' ('Fx' in the file) is in [s], but takes N, kN, mN"),
+        ([NAMES, ROWS[0], "°;mN m;mN;mN"], "line 3, column 'Winkel': '°' is not a number"),
+        ([NAMES, "°;mN m;mN;mN", *ROWS, "62;x;1;1"], "line 5, column 'Mz': 'x' is not a number"),
+        ([NAMES, "°;mN m;mN", *ROWS], "line 2: there are 3 cells in 4 columns"),
+        ([NAMES, "60,0;mN;1;2", *ROWS], "line 2, column 'Mz': 'mN' is not a number"),
+        ([NAMES, "1;1;-;-", *ROWS], "line 2, column 'Fx': '-' is not a number"),
+        ([NAMES + ";", "°;mN m;mN;mN;s", ROWS[0] + ";"], "line 1: column 5 has no name: name it, or remove it"),
+        (
+            ["# column Fx: number [N]", NAMES, "°;mN m;mN;mN", *ROWS],
+            "line 3: column 'Fx' is in [mN] here, and in [N] in line 1: leave out the one that is wrong",
+        ),
+        (["Fx;4", NAMES.replace("Fx", "Kraft"), "°;mN m;mN;mN", *ROWS], "there is no column 'Winkel'"),
+    ],
+)
+def test_what_is_wrong_in_or_below_a_row_of_units_has_its_line(tmp_path, lines, message):
+    with refused(message):
+        read(tmp_path, *lines)
+
+
+def test_a_unit_that_is_given_beside_another_in_the_row_is_refused(tmp_path):
+    with refused("line 2, column 'force_x' ('Fx' in the file) is in [mN], but [N] is given for it: leave out the one"):
+        read(tmp_path, NAMES, "°;mN m;mN;mN", *ROWS, columns={**COLUMNS, "force_x": "Fx[N]"})
+
+
+def test_a_first_sample_of_ones_is_no_row_of_units(tmp_path):
+    """1 is a unit too, and N may be a remark."""
+    record = read(tmp_path, NAMES + ";note", "1;1;1;1;N", "1,5;1;1;1;N", rod=None)
+    assert record.sizes["sample"] == 2
+    assert record["note"].values.tolist() == ["N", "N"]
+
+
+# --- Windows-1252 ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_windows_1252_is_read_as_such(tmp_path, plain, end):
+    lines = ["# Prüfer: Jörg", "# Gerät: „Maß“", NAMES + ";Wärme", "°;µN m;µN;µN;", *(f"{row};1" for row in ROWS)]
+    record = read(tmp_path, *lines, encoding="cp1252", end=end)
+    assert record.identical(read(tmp_path, *lines, end=end))
+    assert (record.attrs["Prüfer"], record.attrs["Gerät"]) == ("Jörg", "„Maß“")
+    assert record["Wärme"].values.tolist() == [1, 1]
+    same = read(tmp_path, NAMES, "°;mN m;mN;mN", *ROWS, encoding="cp1252")
+    assert record_hash(same) == record_hash(plain)
+
+
+def test_windows_1252_far_below_keeps_the_lines_of_errors(tmp_path):
+    lines = [NAMES + ";note", *[f"{ROWS[0]};a"] * 5000, "60,0;x;1;2;größer"]
+    with refused("line 5002, column 'Mz': 'x' is not a number"):
+        read(tmp_path, *lines, encoding="cp1252")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"Winkel;Mz;Fx;Fy\n60;1;1;\x81\n", "line 2: the file is not UTF-8 text (byte 0x81): save it as CSV in UTF-8"),
+        (
+            b"Winkel;Mz;Fx;Fy\n60;1;1;1\n60;1;1;\0\xb0\n",
+            "line 3: the file is not UTF-8 text (byte 0xb0, '°' in Windows-1252): save it as CSV in UTF-8",
+        ),
+        ("# °ä\nWinkel;Mz;Fx;Fy\n60;1;1;".encode() + b"\xb0\n", "line 3: the file is not UTF-8 text (byte 0xb0"),
+        (b"\xef\xbb\xbf# \xb0\nWinkel;Mz;Fx;Fy\n60;1;1;1\n", "line 1: the file is not UTF-8 text (byte 0xb0"),
+    ],
+    ids=["no sign of it", "NUL", "damaged UTF-8", "byte-order mark"],
+)
+def test_what_is_neither_utf8_nor_windows_1252_is_refused(tmp_path, content, message):
+    (tmp_path / "rig.csv").write_bytes(content)
+    with refused(re.sub(r"^", f"{tmp_path / 'rig.csv'}: ", message)):
+        read_record(tmp_path / "rig.csv", columns=COLUMNS, split_sweeps=True)
