@@ -197,7 +197,7 @@ def counted_otherwise(record, sense, turns, moment=1):
         pytest.param(-1, 1, 1, "90-NAME').", marks=pytest.mark.slow),
         pytest.param(-1, 0, -1, "-NAME'), and holding_moment had the other sign.", marks=pytest.mark.slow),
         pytest.param(-1, 2, 1, "180-NAME').", marks=pytest.mark.slow),
-        (1, -1, 1, "NAME+90')."),
+        pytest.param(1, -1, 1, "NAME+90').", marks=pytest.mark.slow),
         pytest.param(1, 1, 1, "NAME-90').", marks=pytest.mark.slow),
         pytest.param(1, 2, 1, "NAME+180').", marks=pytest.mark.slow),
     ],
