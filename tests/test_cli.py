@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -62,7 +63,12 @@ def assert_misused(result, message):
     *usage, reason = result.stderr.splitlines()
     assert usage[0].startswith("Usage: ")
     assert reason.startswith("Error: ")
-    assert message in reason
+    assert plain(message) in plain(reason)
+
+
+def plain(message):
+    """Words alone: versions of Typer write the same with other signs and capitals."""
+    return re.sub(r"[':]", "", message).lower()
 
 
 @pytest.fixture(scope="session")
@@ -352,7 +358,7 @@ def test_refusals_of_the_command_itself(tmp_path):
 
 def test_misuse_of_the_command_itself():
     _, errors = start("infer", "nowhere.csv", "--famly", "circle", code=2)
-    assert "No such option: --famly" in errors
+    assert plain("No such option: --famly") in plain(errors)
 
 
 def test_a_refusal_shows_where_it_comes_from_if_asked(tmp_path):

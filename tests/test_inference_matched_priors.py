@@ -19,7 +19,7 @@ def test_flanks_are_expected_to_be_equally_bent(name, length):
     family, rng, count = family_named(name), np.random.default_rng(3), 1000
     priors = matched_priors(name, length)
     values = {n: prior.rvs(count, random_state=rng) for n, prior in priors.items()}
-    values = {n: np.clip(v, *family.bounds.get(n, (None, None))) for n, v in values.items()}
+    values = {n: np.clip(v, *family.bounds.get(n, (-np.inf, np.inf))) for n, v in values.items()}
     contours = family.build(*(values.get(n, np.zeros(count)) for n in family.parameters))
     logs = mean_log_radius(contours) - np.log(length)
     low, median, high = np.quantile(logs, stats.norm.cdf([-1.0, 0.0, 1.0]))

@@ -115,7 +115,7 @@ def _matching(name: str) -> tuple[float, float]:
 def _built(family: Family, values: Mapping[str, Floats]) -> Contour:
     """With the vertex at the origin; what no contour has is brought to the nearest that one has."""
     zeros = np.zeros(_DRAWS)
-    inside = {name: np.clip(value, *family.bounds.get(name, (None, None))) for name, value in values.items()}
+    inside = {name: np.clip(value, *family.bounds.get(name, (-np.inf, np.inf))) for name, value in values.items()}
     return family.build(*(inside.get(name, zeros) for name in family.parameters))
 
 
