@@ -66,6 +66,16 @@ def test_an_inspection_shows_its_steps(tmp_path, monkeypatch):
     assert steps == [(done, 3) for done in range(1, 4)]
 
 
+def test_a_scan_its_measurement_and_its_contacts_show_their_steps(tmp_path, monkeypatch):
+    ideal, measured = str(tmp_path / "ideal.csv"), str(tmp_path / "measured.csv")
+    coarse = ["--drive-step", "8", "--figure", str(tmp_path / "sweep.png")]
+    assert _steps_shown(monkeypatch, "scanning", ["scan", "--out", ideal, *coarse]) == [(1, 3), (2, 3)]
+    noise = ["--force-noise", "0.05", "--moment-noise", "0.02"]
+    assert _steps_shown(monkeypatch, "measurement", ["measure", ideal, *noise, "--out", measured]) == [(1, 2)]
+    found = ["reconstruct", measured, "--out", str(tmp_path / "contacts")]
+    assert _steps_shown(monkeypatch, "reconstruction", found) == [(1, 2)]
+
+
 def _steps_shown(monkeypatch, module, words):
     steps = []
     monkeypatch.setattr(

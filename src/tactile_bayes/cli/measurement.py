@@ -12,6 +12,7 @@ from tactile_bayes.cli.answer import Json, print_files, print_json, print_senten
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.record_options import Quiet, Seed
 from tactile_bayes.cli.scanning import RecordFile, refuse_other_suffix
+from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -112,17 +113,19 @@ def measure(
             "this load cell is ideal, and changes nothing: give at least one flaw, like --force-noise 0.05 "
             "--moment-noise 0.02"
         )
-    ideal = read_record(record)
-    if LoadCell.from_record(ideal) is not None:
-        raise ParameterError(
-            f"{record} has been measured already (its header states a load cell), and noise would be there twice: give "
-            "the ideal record, as scan writes it"
-        )
-    measured = cell.measure(ideal, seed=seed)
-    if not keep_truth:
-        measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
-    out.parent.mkdir(parents=True, exist_ok=True)
-    write_record(measured, out)
+    with step_bar(quiet or json) as show:
+        ideal = read_record(record)
+        if LoadCell.from_record(ideal) is not None:
+            raise ParameterError(
+                f"{record} has been measured already (its header states a load cell), and noise would be there twice: "
+                "give the ideal record, as scan writes it"
+            )
+        show(1, 2)
+        measured = cell.measure(ideal, seed=seed)
+        if not keep_truth:
+            measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_record(measured, out)
     files = {"record": out}
     if json:
         told = {"samples": measured.sizes["sample"], "units": measured.attrs["units"], "seed": seed}

@@ -24,6 +24,7 @@ from tactile_bayes.cli.record_options import (
     SplitSweeps,
     read_measurement,
 )
+from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
     from tactile_bayes.runs.reconstruction import ReconstructionRun
@@ -66,23 +67,25 @@ def reconstruct(
 
     What noise is not stated is taken from the samples before first contact and after snap-off.
     """
-    from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_in_words
+    with step_bar(quiet or json) as show:
+        from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_in_words
 
-    measured, cell, _ = read_measurement(
-        record,
-        column=column,
-        split_sweeps=split_sweeps,
-        length=length,
-        flexural_rigidity=flexural_rigidity,
-        diameter=diameter,
-        force_noise=force_noise,
-        moment_noise=moment_noise,
-        missing=missing,
-        load_cell_frame=load_cell_frame,
-        nuisance=None,
-        as_stated=False,
-    )
-    run = reconstruct_into(measured, out, method=method, load_cell=cell, friction=friction)
+        measured, cell, _ = read_measurement(
+            record,
+            column=column,
+            split_sweeps=split_sweeps,
+            length=length,
+            flexural_rigidity=flexural_rigidity,
+            diameter=diameter,
+            force_noise=force_noise,
+            moment_noise=moment_noise,
+            missing=missing,
+            load_cell_frame=load_cell_frame,
+            nuisance=None,
+            as_stated=False,
+        )
+        show(1, 2)
+        run = reconstruct_into(measured, out, method=method, load_cell=cell, friction=friction)
     words = reconstruction_in_words(run.contacts)
     if json:
         _print_json(run, words)

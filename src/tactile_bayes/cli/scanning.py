@@ -12,6 +12,7 @@ from tactile_bayes.cli.contour_options import Distance, Family, Parameters, Poin
 from tactile_bayes.cli.numbers import numbers_asked
 from tactile_bayes.cli.record_options import Friction, Quiet, rod_asked
 from tactile_bayes.cli.simulated_rig_options import Bases, Diameter, FlexuralRigidity, Length
+from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
     from tactile_bayes.rod import Rod
@@ -55,28 +56,31 @@ def scan(
     refuse_other_suffix(out)
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
-    import numpy as np
+    with step_bar(quiet or json) as show:
+        import numpy as np
 
-    from tactile_bayes.record import write_record
-    from tactile_bayes.rod import Rod
-    from tactile_bayes.scanning import scan as sweep
+        from tactile_bayes.record import write_record
+        from tactile_bayes.rod import Rod
+        from tactile_bayes.scanning import scan as sweep
 
-    rod = rod_asked(length, flexural_rigidity, diameter) or Rod()
-    made = sweep(
-        contour_asked(profile, distance, family, parameter, points, rod_length=rod.length),
-        direction=direction,
-        base=[numbers_asked(pivot, "--base", 2) for pivot in base or ["0,0"]],  # type: ignore[misc]
-        drive_step=float(np.radians(drive_step)),
-        rod=rod,
-        friction=friction,
-    )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    write_record(made.record, out)
-    files = {"record": out}
-    if figure is not None:
-        figure.parent.mkdir(parents=True, exist_ok=True)
-        _draw(made, figure)
-        files["figure"] = figure
+        rod = rod_asked(length, flexural_rigidity, diameter) or Rod()
+        made = sweep(
+            contour_asked(profile, distance, family, parameter, points, rod_length=rod.length),
+            direction=direction,
+            base=[numbers_asked(pivot, "--base", 2) for pivot in base or ["0,0"]],  # type: ignore[misc]
+            drive_step=float(np.radians(drive_step)),
+            rod=rod,
+            friction=friction,
+        )
+        show(1, 3 if figure else 2)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_record(made.record, out)
+        files = {"record": out}
+        if figure is not None:
+            show(2, 3)
+            figure.parent.mkdir(parents=True, exist_ok=True)
+            _draw(made, figure)
+            files["figure"] = figure
     if json:
         print_json(_numbers(made, rod, files))
         return
