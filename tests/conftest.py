@@ -17,7 +17,7 @@ QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
 """Enough for files and messages, not for numbers."""
 
 
-settings.register_profile("few", max_examples=30)
+settings.register_profile("few", max_examples=15)
 
 
 def pytest_configure(config):
