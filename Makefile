@@ -16,10 +16,10 @@ export MPLBACKEND ?= Agg
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
 
-# Notebooks first, as they take longest; each process takes one core.
+# Notebooks in the middle: they take long, and need what the examples in docstrings compile. Each process takes one core.
 test: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
-	$(BIN)/python -m pytest -n auto --nbmake --doctest-modules notebooks src tests
+	$(BIN)/python -m pytest -n auto --nbmake --doctest-modules src notebooks tests
 
 # With the lowest versions of the dependencies; what those say of one another is not the project's affair.
 test-lowest: $(READY)
