@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,13 +10,11 @@ import typer
 from tactile_bayes.cli.answer import Json, print_json
 from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.record_options import Quiet
-from tactile_bayes.cli.task_bar import counted, task_bar
+from tactile_bayes.cli.task_bar import counted, step_bar, task_bar
 from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from tactile_bayes.datasets import Production, Verification
+    from tactile_bayes.datasets import Production
     from tactile_bayes.datasets.manifest import Manifest
 
 __all__ = ["dataset"]
@@ -95,8 +92,8 @@ def verify(
     """
     from tactile_bayes import datasets
 
-    with _verification_progress(quiet or json) as show:
-        manifest = datasets.verify(folder, regenerate=regenerate, progress=show)
+    with step_bar(quiet or json, "file", at_first="files to be read") as show:
+        manifest = datasets.verify(folder, regenerate=regenerate, progress=lambda verified: show(*verified))
     count = len(manifest.shards)
     if json:
         print_json({**_numbers(folder, manifest), "verified": True, "made_again": min(regenerate, count)})
@@ -127,27 +124,6 @@ def record(
         print_json({"index": index, "samples": found.sizes["sample"], "units": found.attrs["units"], "files": files})
         return
     typer.echo(f"record {index} of {source}, {found.sizes['sample']} samples: {out}")
-
-
-@contextmanager
-def _verification_progress(quiet: bool) -> Iterator[Callable[[Verification], object]]:
-    """A bar that fills with files; none where nobody sees it move."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield lambda verification: None
-        return
-    words = (TextColumn("{task.description}"), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
-    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
-        task = bar.add_task("files to be read", total=None, left="")
-
-        def show(verification: Verification) -> None:
-            done, wanted = verification
-            bar.update(task, total=wanted, completed=done, description=f"{done:,} of {_files(wanted)}", left="left")
-
-        yield show
 
 
 def _numbers(folder: Path, manifest: Manifest) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from tactile_bayes.cli.record_options import (
     Quiet,
     Record,
     SplitSweeps,
+    origins_asked,
     read_measurement,
 )
 from tactile_bayes.cli.task_bar import step_bar
@@ -129,7 +130,7 @@ def _contents(found: Inspection, column: Sequence[str] | None) -> list[str]:
     from tactile_bayes.inspection.words import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
-    origins = {name.strip(): origin.strip() for name, origin in (part.split("=", 1) for part in column or [])}
+    origins = origins_asked(column or [])
     record, rod = found.record, rod_of(found.record)
     sweeps = found.sweeps.sizes["sweep"]
     if record.attrs["units"] == "SI":

@@ -34,6 +34,7 @@ __all__ = [
     "Seed",
     "SplitSweeps",
     "nuisances_asked",
+    "origins_asked",
     "read_measurement",
     "rod_asked",
 ]
@@ -123,7 +124,7 @@ def read_measurement(
     rod = rod_asked(length, flexural_rigidity, diameter)
     record = read_record(
         path,
-        columns=_origins(column or []),
+        columns=origins_asked(column or []),
         split_sweeps=split_sweeps,
         rod=rod,
         missing=missing or (),
@@ -173,7 +174,7 @@ def rod_asked(length: float | None, flexural_rigidity: float | None, diameter: f
     return None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
 
 
-def _origins(options: Sequence[str]) -> dict[str, str]:
+def origins_asked(options: Sequence[str]) -> dict[str, str]:
     """The values of --column by the columns that they are for."""
     from tactile_bayes.errors import ParameterError
 

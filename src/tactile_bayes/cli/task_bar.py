@@ -41,8 +41,8 @@ def task_bar(total: int, noun: str, quiet: bool) -> Iterator[Callable[[int], obj
 
 
 @contextmanager
-def step_bar(quiet: bool) -> Iterator[Callable[[int, int], object]]:
-    """A bar that is told how many of how many steps are done, and that moves before the first of them is."""
+def step_bar(quiet: bool, noun: str = "step", *, at_first: str = "beginning") -> Iterator[Callable[[int, int], object]]:
+    """A bar that is told how many of how many are done, and that moves before the first of them is."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
@@ -52,10 +52,10 @@ def step_bar(quiet: bool) -> Iterator[Callable[[int, int], object]]:
         return
     words = (TextColumn("{task.description}"), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
     with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
-        task = bar.add_task("beginning", total=None, left="")
+        task = bar.add_task(at_first, total=None, left="")
 
         def show(done: int, count: int) -> None:
-            description = f"{done} of {counted(count, 'step')}"
+            description = f"{done:,} of {counted(count, noun)}"
             bar.update(task, total=count, completed=done, description=description, left="left")
 
         yield show

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple
 
@@ -10,9 +11,12 @@ import xarray as xr
 
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["Remedy", "as_it_is", "remedies_for"]
+__all__ = ["OTHER_ANGLE", "Remedy", "as_it_is", "remedies_for"]
 
 Mend = Callable[[xr.Dataset], xr.Dataset]
+
+OTHER_ANGLE = "the drive angle were counted otherwise"
+"""How the words of remedies begin that change the drive angle, and with it perhaps the directions."""
 
 _FRICTIONS = (0.1, 0.2, 0.3, 0.5)
 
@@ -69,18 +73,21 @@ def _exchanged(record: xr.Dataset) -> xr.Dataset:
     return record.assign({x.name: (x.dims, y.values, x.attrs), y.name: (y.dims, x.values, y.attrs)})
 
 
-def _counted(sense: int, turns: float, *, moment: int = 1) -> Mend:
+def _in_turn(*mends: Mend) -> Mend:
+    return lambda record: functools.reduce(lambda given, mend: mend(given), mends, record)
+
+
+def _counted(sense: int, turns: float) -> Mend:
     """With a drive angle that is counted in this sense from a line that lies so many quarter turns off."""
 
     def counted_anew(record: xr.Dataset) -> xr.Dataset:
-        drive, load, way = record["drive_angle"], record["holding_moment"], record["direction"]
+        drive, way = record["drive_angle"], record["direction"]
         others = np.where(way.values == "forward", "backward", "forward")
         angles = 0.5 * np.pi * turns + sense * drive.values
         angles -= 2.0 * np.pi * np.round(0.25 * (angles.min() + angles.max()) / np.pi)
         counted = record.assign(
             drive_angle=(drive.dims, angles, drive.attrs),
             direction=(way.dims, way.values if sense > 0 else others, way.attrs),
-            holding_moment=(load.dims, moment * load.values, load.attrs),
         )
         return counted.isel(sample=np.abs(angles) < 2.0 * np.pi)  # no record has more, and these carry no load
 
@@ -88,6 +95,7 @@ def _counted(sense: int, turns: float, *, moment: int = 1) -> Mend:
 
 
 def _angles() -> Iterator[tuple[str, Mend, int]]:
+    other_moment = _with_sign("holding_moment")
     for written, sense, turns in (
         ("90-NAME", -1, 1),
         ("-NAME", -1, 0),
@@ -96,14 +104,10 @@ def _angles() -> Iterator[tuple[str, Mend, int]]:
         ("NAME-90", 1, -1),
         ("NAME+180", 1, 2),
     ):
-        words = f"the drive angle were counted otherwise (in degrees: --column 'drive_angle={written}')"
-        yield words, _counted(sense, turns), 1
+        words, counted = f"{OTHER_ANGLE} (in degrees: --column 'drive_angle={written}')", _counted(sense, turns)
+        yield words, counted, 1
         if sense < 0:
-            yield f"{words}, and holding_moment had the other sign", _counted(sense, turns, moment=-1), 2
-    mirrored = _counted(-1, 1, moment=-1)
-    words = "the drive angle were counted otherwise (in degrees: --column 'drive_angle=90-NAME')"
-    yield (
-        f"{words}, holding_moment had the other sign, and force_x and force_y were exchanged",
-        lambda record: _exchanged(mirrored(record)),
-        3,
-    )
+            yield f"{words}, and holding_moment had the other sign", _in_turn(counted, other_moment), 2
+        if (sense, turns) == (-1, 1):  # mirrored in the diagonal
+            words += ", holding_moment had the other sign, and force_x and force_y were exchanged"
+            yield words, _in_turn(counted, other_moment, _exchanged), 3

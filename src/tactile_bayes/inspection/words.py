@@ -11,6 +11,7 @@ from scipy.special import ndtri
 
 from tactile_bayes.inference.nuisances import BIAS
 from tactile_bayes.inspection.fit import Fit
+from tactile_bayes.inspection.remedies import OTHER_ANGLE
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 from tactile_bayes.uncertainty.suspicions import CHECK_UNITS
@@ -100,19 +101,17 @@ def _of_loads(suspected: Sequence[str], fit: Fit) -> list[str]:
     told = list(suspected)
     if not max(fit.share, fit.below) > UNFIT:
         return told
-    if fit.remedy:
-        would = f"nearly all would if {fit.remedy}"
-    else:
-        would = "check the rod, the units, signs and axes of the loads, the zero of the drive angle, and the friction"
     if told and (not fit.remedy or told[0].endswith(CHECK_UNITS)):  # the first sentence says it all
         return told
-    if fit.share > UNFIT:
-        against = f"The loads of {fit.share:.0%} of the {fit.loaded} loaded samples fit no contact of such a rod"
-    else:
+    against = f"The loads of {fit.share:.0%} of the {fit.loaded} loaded samples fit no contact of such a rod"
+    would = "would"
+    if not fit.share > UNFIT:
         against = f"Of the {fit.loaded} loaded samples {fit.below:.0%} touch something below the pivot, not above"
-        would = would.replace("all would", "all would touch something above")
-    of_angle = fit.remedy.startswith("the drive angle")  # as then the directions may be wrong, too
-    told.insert(0 if of_angle else len(told), f"{against}: {would}.")
+        would = "would touch something above"
+    remedy = "check the rod, the units, signs and axes of the loads, the zero of the drive angle, and the friction"
+    if fit.remedy:
+        remedy = f"nearly all {would} if {fit.remedy}"
+    told.insert(0 if fit.remedy.startswith(OTHER_ANGLE) else len(told), f"{against}: {remedy}.")
     return told
 
 

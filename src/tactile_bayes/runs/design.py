@@ -13,6 +13,7 @@ import xarray as xr
 
 from tactile_bayes.files import write_atomically
 from tactile_bayes.planning.design import design
+from tactile_bayes.runs.outermost import outermost
 from tactile_bayes.runs.picture import write_picture
 
 __all__ = ["DesignRun", "design_in_words", "design_into"]
@@ -96,9 +97,10 @@ def design_in_words(found: xr.Dataset) -> tuple[str, ...]:
     ]
     if np.isfinite(float(best.gap)):
         sentences[0] += f" Of the contour between the outermost contacts {length(float(best.gap))} stay untouched."
-    outermost = _outermost(found)
-    if outermost:
-        sentences.append(f"It is the {outermost} of the candidates: beyond there may be a better one, try with more.")
+    sides = (("base_x", "leftmost", "rightmost"), ("base_y", "lowest", "highest"))
+    end = outermost((found[name].values, float(best[name]), least, most) for name, least, most in sides)
+    if end:
+        sentences.append(f"It is the {end} of the candidates: beyond there may be a better one, try with more.")
     worst = found.isel(candidate=int(np.nanargmax(found.width.values)))
     if found.sizes["candidate"] > 1:
         ratio = float(worst.width / best.width)
@@ -114,16 +116,6 @@ def design_in_words(found: xr.Dataset) -> tuple[str, ...]:
             f"there, Laplace's approximation {length(float(best.width))}."
         )
     return tuple(sentences)
-
-
-def _outermost(found: xr.Dataset) -> str:
-    """In which directions nothing beyond the best candidate was tried, in words; "" if in none."""
-    best, sides = found.isel(candidate=int(found.best)), []
-    for name, least, most in (("base_x", "leftmost", "rightmost"), ("base_y", "lowest", "highest")):
-        tried = found[name].values
-        if np.ptp(tried) > 0.0:
-            sides += [least] * bool(best[name] == tried.min()) + [most] * bool(best[name] == tried.max())
-    return " and ".join(sides)
 
 
 def _draw(found: xr.Dataset, path: Path) -> None:

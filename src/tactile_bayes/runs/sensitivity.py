@@ -19,6 +19,7 @@ from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
+from tactile_bayes.runs.outermost import outermost
 from tactile_bayes.runs.picture import write_picture
 
 if TYPE_CHECKING:
@@ -155,13 +156,10 @@ def rod_in_words(rods: xr.Dataset) -> str:
         f"Of {count} rods of this material{left_out} the load cell wants one {long} long and {thick} thick: its mean "
         f"band is {wide} wide."
     )
-    ends = []
-    for name, least, most in (("length", "shortest", "longest"), ("diameter", "thinnest", "thickest")):
-        tried, best = rods[name].values, float(rods[f"best_{name}"])
-        if tried.size > 1:
-            ends += [least] * bool(best == tried.min()) + [most] * bool(best == tried.max())
-    if ends:
-        words += f" It is the {' and '.join(ends)} that was tried: begin with a rod like it, and look further."
+    sides = (("length", "shortest", "longest"), ("diameter", "thinnest", "thickest"))
+    end = outermost((rods[name].values, float(rods[f"best_{name}"]), least, most) for name, least, most in sides)
+    if end:
+        words += f" It is the {end} that was tried: begin with a rod like it, and look further."
     return words
 
 

@@ -1,0 +1,31 @@
+"""Whether a choice is the outermost of those that were tried."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["outermost"]
+
+
+def outermost(choices: Iterable[tuple[NDArray[np.float64], float, str, str]]) -> str:
+    """In which ways nothing beyond the best was tried, in words; "" if in none.
+
+    Parameters
+    ----------
+    choices : iterable of tuple
+        Values that were tried, the best of them, and words for the least and for the most.
+
+    Examples
+    --------
+    >>> lengths, widths = np.array([1.0, 2.0, 3.0]), np.array([0.5])
+    >>> outermost([(lengths, 3.0, "shortest", "longest"), (widths, 0.5, "thinnest", "thickest")])
+    'longest'
+    """
+    words: list[str] = []
+    for tried, best, least, most in choices:
+        if np.ptp(tried) > 0.0:
+            words += [least] * bool(best == tried.min()) + [most] * bool(best == tried.max())
+    return " and ".join(words)
