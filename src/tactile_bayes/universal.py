@@ -22,7 +22,7 @@ __all__ = [
     "TangentialNumbers",
     "TipArcs",
     "TipNumbers",
-    "rough_tables",
+    "number_tables",
     "tangential_arcs",
     "tangential_numbers",
     "tip_arcs",
@@ -45,6 +45,9 @@ _TILT_MAX = 0.5 * np.pi + 0.02
 
 _ROUGH = 16
 """Number of coefficients in each direction of the rough tables."""
+
+_FINE = 28, 22
+"""Those over the angle, and over the share of the greatest radius, of the others."""
 
 
 class TangentialArcs(NamedTuple):
@@ -100,7 +103,7 @@ def tip_numbers(lack: Floats, tilt: Floats, *, roughly: bool = False) -> TipNumb
 
     To 1e-9, or roughly, to 3e-6, from a third of the table.
     """
-    radius, table = _tip_numbers_table(*((_ROUGH, _ROUGH) if roughly else (28, 22)))
+    _, radius, table = number_tables(roughly=roughly)
     _, radii, angles = table.shape
     angle = np.arctan2(lack, tilt)
     by_angle = chebyshev.basis(angles, angle / (0.5 * np.pi))
@@ -110,10 +113,11 @@ def tip_numbers(lack: Floats, tilt: Floats, *, roughly: bool = False) -> TipNumb
     return TipNumbers(force * angle, turn * angle, tilt1 * share)
 
 
-def rough_tables() -> tuple[Floats, Floats, Floats]:
-    """The rough tables themselves: `TangentialNumbers` (3, angles), the greatest radius (angles,), and `TipNumbers`
+def number_tables(*, roughly: bool) -> tuple[Floats, Floats, Floats]:
+    """The tables themselves: `TangentialNumbers` (3, angles), the greatest radius (angles,), and `TipNumbers`
     (3, radii, angles), without what makes them vanish."""
-    return _tangential_numbers_table()[:, :_ROUGH], *_tip_numbers_table(_ROUGH, _ROUGH)
+    tangential = _tangential_numbers_table()[:, : _ROUGH if roughly else None]
+    return tangential, *_tip_numbers_table(*((_ROUGH, _ROUGH) if roughly else _FINE))
 
 
 def tangential_arcs(angle: Floats, m: Floats) -> TangentialArcs:

@@ -39,7 +39,14 @@ class Strokes(NamedTuple):
 
 
 def loads_of(
-    halves: Halves, strokes: Strokes, rod: tuple[float, float], rig: Floats, shifts: Floats, *, is_always_clear: bool
+    halves: Halves,
+    strokes: Strokes,
+    rod: tuple[float, float],
+    rig: Floats,
+    shifts: Floats,
+    tolerance: Floats,
+    *,
+    is_always_clear: bool,
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Loads in EI/L and EI/L², zero out of contact, shape (n, samples, 3), and which contours are usable, shape (n,).
 
@@ -55,21 +62,35 @@ def loads_of(
         What the encoder reads too much [rad], and the suspension's compliance [rad/(EI/L)].
     shifts : ndarray, shape (n, strokes, 2)
         By how much the pivot of every stroke is off.
+    tolerance : ndarray, shape (3,)
+        By how much loads may miss, of moment and forces [EI/L and EI/L²].
     """
     known, on = _constants()
     columns = (*halves.left[1:], *halves.right[1:], halves.x, halves.y)
     contours = np.stack([np.broadcast_to(column, halves.x.shape) for column in columns], axis=1)
     out = np.zeros((halves.x.size, strokes.samples.size, 3))
     usable = np.ones(halves.x.size, dtype=bool)
-    kinds, room = (halves.left.kind, halves.right.kind), work(int(np.diff(strokes.first).max()))
+    kinds, room = (halves.left.kind, halves.right.kind), work(int(np.diff(strokes.first).max()), known)
     both = contours, None if halves.tables is None else halves.tables / rod[0]
-    _fill(kinds, both, halves.has_knot, strokes, rod, rig, shifts, is_always_clear, known, on, room, out, usable)
+    _fill(
+        kinds,
+        both,
+        halves.has_knot,
+        strokes,
+        rod,
+        (rig, shifts, tolerance),
+        is_always_clear,
+        (known, on),
+        room,
+        out,
+        usable,
+    )
     return out, usable
 
 
 @functools.cache
-def _constants() -> tuple[Tables, Nodes]:
-    return tables(), nodes()
+def _constants() -> tuple[tuple[Tables, Tables], Nodes]:
+    return (tables(roughly=True), tables(roughly=False)), nodes()
 
 
 @compiled
@@ -95,11 +116,9 @@ def _fill(
     has_knot: bool,
     strokes: Strokes,
     rod: tuple[float, float],
-    rig: Floats,
-    shifts: Floats,
+    rigs: tuple[Floats, Floats, Floats],
     is_always_clear: bool,
-    known: Tables,
-    on: Nodes,
+    constants: tuple[tuple[Tables, Tables], Nodes],
     room: Work,
     out: Floats,
     usable: NDArray[np.bool_],
@@ -107,6 +126,8 @@ def _fill(
     left, right = kinds
     contours, tables = both
     length, standoff = rod
+    rig, shifts, tolerance = rigs
+    known, on = constants
     for i in range(contours.shape[0]):
         l_size, l_shape = _in_rod_lengths(left, contours[i, 0], contours[i, 1], length)
         r_size, r_shape = _in_rod_lengths(right, contours[i, 2], contours[i, 3], length)
@@ -120,7 +141,9 @@ def _fill(
                 lane, sign = mirrored(lane), -1.0
             of_stroke = slice(strokes.first[k], strokes.first[k + 1])
             angles, samples = strokes.angles[of_stroke], strokes.samples[of_stroke]
-            reach, snap = follow(lane, has_knot, angles, samples, sign, rig[i, 0], rig[i, 1], known, on, room, out[i])
+            reach, snap = follow(
+                lane, has_knot, angles, samples, sign, rig[i, 0], rig[i, 1], tolerance, known, on, room, out[i]
+            )
             if reach != _TOUCHES:
                 usable[i] = False
             elif not is_always_clear:

@@ -1,4 +1,10 @@
-"""The path of one lane, and the loads on it at drive angles: `tactile_bayes.path` without friction, roughly."""
+"""The path of one lane, and the loads on it at drive angles: `tactile_bayes.path` without friction, as well as noise
+asks.
+
+Each stretch of a path is halved until the interpolated loads miss by less than a tolerance, that of every channel, which
+the noise sets: near pivots loads are far above it. Where the small tables of states miss by more, the large ones serve,
+and where loads are no polynomials of the drive angle, every sample is looked for by itself.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +18,7 @@ from tactile_bayes import chebyshev
 from tactile_bayes.compiled.compiler import compiled, inlined
 from tactile_bayes.compiled.lane import Lane, bearing
 from tactile_bayes.compiled.limits import limits
-from tactile_bayes.compiled.states import Tables, combine, excess, series, state
+from tactile_bayes.compiled.states import SMALL_FORCE, SMALL_TURN, Room, Tables, combine, excess, room_for, series, state
 from tactile_bayes.reach import Reach
 from tactile_bayes.segments import BRIEF
 
@@ -24,9 +30,14 @@ _ORDER = 16
 _CELLS = 16
 """Of each piece, in which a change of the phase is looked for."""
 
-_RESOLVED, _HALVINGS, _BRIEF = 1e-3, 8, BRIEF
+_RESOLVED, _HALVINGS, _BRIEF = 1e-3, 12, BRIEF
+_SHARP = 1e-6
+"""Error of the drive angle that a snap-off may have [rad]."""
 _LAST_STEP, _CHANGE = 1e-4, 1e-7
 _TOUCHES, _RUNS_OUT = int(Reach.TOUCHES), int(Reach.RUNS_OUT)
+_NEAR = 1e-3
+"""Error of the interpolated way, as a share of the stretch, from which two steps of Newton's method leave nothing."""
+
 _MOST = 64
 """Stretches that may wait for being followed."""
 
@@ -53,19 +64,20 @@ class Work(NamedTuple):
     slope: Floats
     bend: Floats
     values: Floats
-    loads: Floats
-    """Coefficients of the loads over the drive angle."""
-    by_angle: Floats
-    by_share: Floats
-    row: Floats
+    over_angle: Floats
+    """Those of the way and of the loads over the drive angle."""
+    tables: tuple[Room, Room]
+    """For the small and the large tables."""
     on_grid: Floats
     there: NDArray[np.intp]
     """Samples on the stretch."""
+    wanted: Floats
     twice: Floats
+    rate: Floats
     now: Floats
     before: Floats
     waiting: Floats
-    """Stretches still to be followed, the next one last: begin, end, tip, rooted, halvings."""
+    """Stretches still to be followed, the next one last: begin, end, tip, rooted, halvings, large tables."""
 
 
 def nodes() -> Nodes:
@@ -79,24 +91,21 @@ def nodes() -> Nodes:
     )
 
 
-def work(samples: int) -> Work:
-    """For strokes of so many samples at most."""
+def work(samples: int, known: tuple[Tables, Tables]) -> Work:
+    """For strokes of so many samples at most, and for tables."""
+    small, large = known
     row, of_samples = np.empty(_ORDER), np.empty(samples)
     return Work(
         np.empty((4, _ORDER)),
         row.copy(),
         row.copy(),
         np.empty((4, _ORDER)),
-        np.empty((3, _ORDER)),
-        row.copy(),
-        row.copy(),
-        row,
+        np.empty((4, _ORDER)),
+        (room_for(small), room_for(large)),
         np.empty(2 * _ORDER + 1),
         np.empty(samples, dtype=np.intp),
-        of_samples.copy(),
-        of_samples.copy(),
-        of_samples,
-        np.empty((_MOST, 5)),
+        *(of_samples.copy() for _ in range(5)),
+        np.empty((_MOST, 6)),
     )
 
 
@@ -145,30 +154,52 @@ def _cut(lane: Lane, begin: float, end: float, has_knot: bool, tip_first: bool, 
         count += 1
     for k in range(count):
         out[k, 3] = k == 0 and tip_first and out[k, 2] > 0.0
-        out[k, 4] = 0.0
+        out[k, 4] = out[k, 5] = 0.0
     return count
 
 
 @compiled
-def _sample(lane: Lane, stretch: Floats, compliance: float, known: Tables, on: Nodes, room: Work) -> None:
+def _sample(
+    lane: Lane, stretch: Floats, compliance: float, known: tuple[Tables, Tables], on: Nodes, room: Work
+) -> None:
     """Series along the way of drive angle and loads."""
     span = stretch[1] - stretch[0]
     for k in range(_ORDER):
         way = on.nodes[k]
         p = stretch[0] + span * (way * way if stretch[3] else way)
-        at = state(lane, p, stretch[2] > 0.0, known, room.by_angle, room.by_share, room.row)
+        at = state(lane, p, stretch[2] > 0.0, known, room.tables, stretch[5] > 0.0)
         room.values[0, k], room.values[1, k], room.values[2, k], room.values[3, k] = at
         room.values[0, k] += compliance * room.values[1, k]
     for c in range(4):
         combine(on.fit, room.values[c], room.series[c])
 
 
-@compiled
-def _is_rough(angle: Floats) -> bool:
+@inlined
+def _tail(series_of: Floats) -> float:
+    """About how far a series is from what it interpolates."""
+    return max(abs(series_of[_ORDER - 1]), abs(series_of[_ORDER - 2]))
+
+
+@inlined
+def _change_of(series_of: Floats) -> float:
     largest = 0.0
-    for k in range(1, angle.size):
-        largest = max(largest, abs(angle[k]))
-    return max(abs(angle[angle.size - 1]), abs(angle[angle.size - 2])) > _RESOLVED * largest
+    for k in range(1, _ORDER):
+        largest = max(largest, abs(series_of[k]))
+    return largest
+
+
+@compiled
+def _misses(tolerance: Floats, room: Work) -> tuple[bool, bool]:
+    """Whether small tables, and whether series along a stretch, miss loads by more than a tolerance."""
+    angle, change = _tail(room.series[0]), _change_of(room.series[0])
+    small, rough = False, angle > _RESOLVED * change or angle > _SHARP
+    for c in range(3):
+        loads = room.series[c + 1]
+        moved = _change_of(loads)
+        steepness = moved / change
+        small |= SMALL_FORCE * (abs(loads[0]) + moved) + SMALL_TURN * steepness > tolerance[c]
+        rough |= _tail(loads) + angle * steepness > tolerance[c]
+    return small, rough
 
 
 @compiled
@@ -224,17 +255,72 @@ def _root_of(function: Floats, slope: Floats, value: float, left: float, right: 
 
 @compiled
 def _over_drive_angle(stop: float, begin: float, end: float, steadiness: float, on: Nodes, room: Work) -> None:
-    """Coefficients of the loads over the stretched drive angle."""
+    """Coefficients of the way and of the loads over the stretched drive angle."""
     angle, moment, force_x, force_y = room.series[0], room.series[1], room.series[2], room.series[3]
     slope, values = room.slope, room.values
     for k in range(_ORDER):
         ahead = 1.0 - on.nodes[k]
         wanted = end - (end - begin) * ahead * (steadiness + (1.0 - steadiness) * ahead)
         way = _root_of(angle, slope, wanted, stop, 0.0, stop * on.nodes[k])
-        values[0, k], values[1, k] = _both(moment, force_x, way)
-        values[2, k] = series(force_y, way)
-    for c in range(3):
-        combine(on.fit, room.values[c], room.loads[c])
+        values[0, k] = way
+        values[1, k], values[2, k] = _both(moment, force_x, way)
+        values[3, k] = series(force_y, way)
+    for c in range(4):
+        combine(on.fit, room.values[c], room.over_angle[c])
+
+
+@compiled
+def _on_stretch(
+    angles: Floats, rows: NDArray[np.intp], offset: float, span: tuple[float, float], steadiness: float, room: Work
+) -> int:
+    """How many samples lie on a stretch; in the room their rows, drive angles and stretched ones z, as 4z − 2."""
+    begin, end = span
+    there, wanted, twice, count = room.there, room.wanted, room.twice, 0
+    for j in range(angles.size):
+        angle = angles[j] - offset
+        if begin <= angle <= end:
+            left = min(max((end - angle) / (end - begin), 0.0), 1.0)
+            root = math.sqrt(steadiness * steadiness + 4.0 * (1.0 - steadiness) * left)
+            ahead = 2.0 * left / (steadiness + root) if left > 0.0 else 0.0
+            there[count], wanted[count], twice[count] = rows[j], angle, 2.0 - 4.0 * ahead
+            count += 1
+    return count
+
+
+@compiled
+def _at_all(series_of: Floats, twice: Floats, count: int, now: Floats, before: Floats) -> None:
+    """A series at many places, side by side in the inner loop; the values are in `now`."""
+    for j in range(count):
+        now[j], before[j] = 0.0, 0.0
+    for k in range(_ORDER - 1, 0, -1):
+        for j in range(count):
+            new = series_of[k] + twice[j] * now[j] - before[j]
+            before[j] = now[j]
+            now[j] = new
+    for j in range(count):
+        now[j] = series_of[0] + 0.5 * twice[j] * now[j] - before[j]
+
+
+@compiled
+def _look_for(stop: float, count: int, room: Work) -> None:
+    """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: from what interpolation says by
+    Newton's method, if that is near, or each by itself."""
+    wanted, twice, rate = room.wanted, room.twice, room.rate
+    if _tail(room.over_angle[0]) > _NEAR * stop:
+        for j in range(count):
+            twice[j] = 4.0 * _root_of(room.series[0], room.slope, wanted[j], stop, 0.0, 0.5 * stop) - 2.0
+        return
+    _at_all(room.over_angle[0], twice, count, room.now, room.before)
+    for j in range(count):
+        twice[j] = 4.0 * min(max(room.now[j], 0.0), stop) - 2.0
+    for _ in range(2):
+        _at_all(room.slope, twice, count, rate, room.before)
+        _at_all(room.series[0], twice, count, room.now, room.before)
+        for j in range(count):
+            way = 0.25 * (twice[j] + 2.0)
+            most = 0.5 * (stop - way) + _NEAR * _NEAR * stop
+            step = (room.now[j] - wanted[j]) / rate[j] if rate[j] > 0.0 else 0.0
+            twice[j] = 4.0 * min(max(way - min(max(step, -most), most), 0.0), stop) - 2.0
 
 
 @compiled
@@ -245,33 +331,25 @@ def _write(
     offset: float,
     span: tuple[float, float],
     steadiness: float,
+    stop: float,
+    tolerance: Floats,
     room: Work,
     out: Floats,
 ) -> None:
-    """Loads of the samples on a stretch, side by side in the inner loop."""
-    begin, end = span
-    there, twice, count = room.there, room.twice, 0
-    for j in range(angles.size):
-        angle = angles[j] - sign * offset
-        if begin <= angle <= end:
-            left = min(max((end - angle) / (end - begin), 0.0), 1.0)
-            root = math.sqrt(steadiness * steadiness + 4.0 * (1.0 - steadiness) * left)
-            ahead = 2.0 * left / (steadiness + root) if left > 0.0 else 0.0
-            there[count], twice[count] = rows[j], 2.0 - 4.0 * ahead
-            count += 1
-    now, before = room.now, room.before
+    """Loads of the samples on a stretch: over the drive angle if they are smooth functions of it, else over the way."""
+    count = _on_stretch(angles, rows, sign * offset, span, steadiness, room)
+    smooth = True
     for c in range(3):
-        series_of = room.loads[c]
-        for j in range(count):
-            now[j], before[j] = 0.0, 0.0
-        for k in range(_ORDER - 1, 0, -1):
-            for j in range(count):
-                new = series_of[k] + twice[j] * now[j] - before[j]
-                before[j] = now[j]
-                now[j] = new
+        smooth &= _tail(room.over_angle[c + 1]) <= tolerance[c]
+    loads = room.over_angle
+    if not smooth:
+        _look_for(stop, count, room)
+        loads = room.series
+    for c in range(3):
+        _at_all(loads[c + 1], room.twice, count, room.now, room.before)
         factor = 1.0 if c == 2 else sign
         for j in range(count):
-            out[there[j], c] = factor * (series_of[0] + 0.5 * twice[j] * now[j] - before[j])
+            out[room.there[j], c] = factor * room.now[j]
 
 
 @compiled
@@ -283,7 +361,8 @@ def follow(
     sign: float,
     offset: float,
     compliance: float,
-    known: Tables,
+    tolerance: Floats,
+    known: tuple[Tables, Tables],
     on: Nodes,
     room: Work,
     out: Floats,
@@ -291,14 +370,15 @@ def follow(
     """`Reach` and snap-off's drive angle of a lane; loads at drive angles go into rows of `out`, zero beforehand.
 
     The sign is −1 in backward sweeps; the offset is what the encoder reads too much, the compliance the suspension's.
+    Loads may miss by about the tolerance, of moment and forces.
     """
     reach, begin, end, tip_first, runs_out = limits(lane)
     if reach != _TOUCHES:
         return reach, math.nan
     waiting = room.waiting
-    count = _cut(lane, begin, end, has_knot, tip_first, known.stretch, waiting)
+    count = _cut(lane, begin, end, has_knot, tip_first, known[0].stretch, waiting)
     for k in range(count // 2):  # the first one is to be the last, where a stack ends
-        for c in range(5):
+        for c in range(6):
             waiting[k, c], waiting[count - 1 - k, c] = waiting[count - 1 - k, c], waiting[k, c]
     whole = begin - end
     at_begin, is_first = bearing(lane, begin), True
@@ -306,16 +386,16 @@ def follow(
     while count:
         stretch = waiting[count - 1]
         _sample(lane, stretch, compliance, known, on, room)
-        if (
-            stretch[4] < _HALVINGS
-            and count < _MOST
-            and stretch[0] - stretch[1] > _BRIEF * whole
-            and _is_rough(room.series[0])
-        ):
+        small, rough = _misses(tolerance, room)
+        if small and not stretch[5]:
+            stretch[5] = 1.0
+            continue
+        if rough and stretch[4] < _HALVINGS and count < _MOST and stretch[0] - stretch[1] > _BRIEF * whole:
             span = stretch[1] - stretch[0]
             middle = stretch[0] + span * (0.25 if stretch[3] else 0.5)
             waiting[count, 0], waiting[count, 1] = stretch[0], middle
             waiting[count, 2], waiting[count, 3], waiting[count, 4] = stretch[2], stretch[3], stretch[4] + 1.0
+            waiting[count, 5] = stretch[5]
             stretch[0], stretch[3], stretch[4] = middle, 0.0, stretch[4] + 1.0
             count += 1
             continue
@@ -334,7 +414,7 @@ def follow(
         if not folds:
             steadiness = min(max(series(room.slope, stop) * stop / (at_end - at_begin), 0.0), 1.0)
         _over_drive_angle(stop, at_begin, at_end, steadiness, on, room)
-        _write(angles, rows, sign, offset, (at_begin, at_end), steadiness, room, out)
+        _write(angles, rows, sign, offset, (at_begin, at_end), steadiness, stop, tolerance, room, out)
         at_begin, is_first = at_end, False
         if folds:
             grows_to_the_end = False

@@ -1,4 +1,4 @@
-"""Loads of a touching rod from the rough tables of `tactile_bayes.universal`."""
+"""Loads of a touching rod from the tables of `tactile_bayes.universal`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 
 from tactile_bayes.compiled.compiler import compiled, inlined
 from tactile_bayes.compiled.lane import Lane, place
-from tactile_bayes.universal import rough_tables
+from tactile_bayes.universal import number_tables
 
-__all__ = ["Tables", "combine", "excess", "series", "state", "tables"]
+__all__ = ["SMALL_FORCE", "SMALL_TURN", "Room", "Tables", "combine", "excess", "room_for", "series", "state", "tables"]
 
 Floats = NDArray[np.float64]
+
+_WIDE = 1.25
+"""Angle of a tip contact in its table from which on the small one misses by ten times as much [rad]."""
+
+SMALL_FORCE, SMALL_TURN = 1.3e-7, 1.3e-7
+"""Largest errors of the small tables elsewhere: of loads over the loads, and of the drive angle [rad]."""
 
 
 class Tables(NamedTuple):
@@ -33,8 +39,22 @@ class Tables(NamedTuple):
     tip_tilt: Floats
 
 
-def tables() -> Tables:
-    lying, radius, tip = rough_tables()
+class Room(NamedTuple):
+    """Room for the polynomials of one state, of the sizes of its tables."""
+
+    by_angle: Floats
+    by_share: Floats
+    row: Floats
+
+
+def room_for(known: Tables) -> Room:
+    shares, angles = known.tip_force.shape
+    return Room(np.empty(angles), np.empty(shares), np.empty(angles))
+
+
+def tables(*, roughly: bool) -> Tables:
+    """Those of `tactile_bayes.universal`, large or small."""
+    lying, radius, tip = number_tables(roughly=roughly)
     return Tables(*(np.array(table) for table in (*lying, radius, *tip)))
 
 
@@ -87,9 +107,10 @@ def _twice(coefficients: Floats, by_share: Floats, by_angle: Floats, row: Floats
 
 @inlined
 def state(
-    lane: Lane, p: float, tip: bool, known: Tables, by_angle: Floats, by_share: Floats, row: Floats
+    lane: Lane, p: float, tip: bool, both: tuple[Tables, Tables], rooms: tuple[Room, Room], large: bool
 ) -> tuple[float, float, float, float]:
-    """Drive angle, holding moment and forces of a contact; NaN where the rod cannot make it."""
+    """Drive angle, holding moment and forces of a contact, from small or large tables; NaN where the rod cannot make it.
+    """
     x, y, sin, cos, _, _ = place(lane, p)
     slope = math.atan2(sin, cos)
     along, across = x * cos + y * sin, y * cos - x * sin
@@ -99,6 +120,9 @@ def state(
     if tip:
         lack, tilt = math.sqrt(1.0 - distance2), max(math.atan2(along, across), 0.0)
         angle = math.atan2(lack, tilt)
+        which = int(large or angle > _WIDE)
+        known, room = both[which], rooms[which]
+        by_angle, by_share, row = room.by_angle, room.by_share, room.row
         _polynomials(angle / (0.5 * math.pi), by_angle)
         share = min(math.sqrt(lack * lack + tilt * tilt) / series(known.radius, angle / (0.5 * math.pi)), 1.0)
         _polynomials(share, by_share)
@@ -106,6 +130,7 @@ def state(
         turn = _twice(known.tip_turn, by_share, by_angle, row) * angle
         drive_angle = slope + 0.5 * math.pi - _twice(known.tip_tilt, by_share, by_angle, row) * share + turn
     else:
+        known = both[int(large)]
         angle = math.atan2(across, along)
         level = min(angle / (0.5 * math.pi), 1.0)
         force = series(known.lying_force, level) * angle / distance2

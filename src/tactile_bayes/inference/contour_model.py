@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.families import Family, Prior
-from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood, Rig
+from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
 from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.prior_density import log_density_of
@@ -24,9 +24,6 @@ Floats = NDArray[np.float64]
 
 _MOST_TRIALS = 50
 """Draws from the prior for each that is wanted within reach, before fewer will do."""
-
-_QUIET = 3e-4
-"""Noise over the largest load below which the fast interpolation of loads would be felt."""
 
 
 class ContourModel:
@@ -61,10 +58,12 @@ class ContourModel:
         self.likelihood = RecordLikelihood(
             measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
         )
-        self.deviation = self._rough_noise()
-        largest = np.abs(self.likelihood.measured[:, self.present]).max(axis=0)
-        quiet = np.any(self.deviation[self.present] < _QUIET * largest)
-        self.likelihood.order = FINE_ORDER if quiet else FAST_ORDER
+        rough = self._rough_noise()
+        floor = np.maximum(1e-4 * np.nan_to_num(np.abs(self.likelihood.measured)).max(axis=0), 1e-12)
+        self.deviation = np.where(self.present, np.maximum(rough, floor), 1.0)
+        # Loads that bend strongly from one sample to the next look rough: what is stated is nearer then.
+        stated = noise.cell.dimensionless(self.likelihood.rod).noise if noise.stated_cell else rough
+        self.likelihood.noise = np.where(self.present, np.minimum(rough, np.where(stated > 0.0, stated, rough)), np.inf)
 
     @property
     def present(self) -> NDArray[np.bool_]:
@@ -133,9 +132,5 @@ class ContourModel:
 
     def _rough_noise(self) -> Floats:
         """Standard deviation of each channel from the median bend between neighbouring samples, shape (3,)."""
-        measured = self.likelihood.measured
-        deviation = np.ones(len(CHANNELS))
-        for i in np.flatnonzero(self.present):
-            level = rough_noise(measured[:, i]) if len(measured) > 2 else float(self.likelihood.load_cell.noise[i])
-            deviation[i] = max(level, 1e-4 * float(np.max(np.abs(measured[:, i]))), 1e-12)
-        return deviation
+        measured, stated = self.likelihood.measured, self.likelihood.load_cell.noise
+        return np.array([rough_noise(v) if len(v) > 2 else s for v, s in zip(measured.T, stated, strict=True)])
