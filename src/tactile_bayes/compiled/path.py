@@ -1,9 +1,9 @@
 """The path of one lane, and the loads on it at drive angles: `tactile_bayes.path` without friction, as well as noise
 asks.
 
-Each stretch of a path is halved until the interpolated loads miss by less than a tolerance, that of every channel, which
-the noise sets: near pivots loads are far above it. Where the small tables of states miss by more, the large ones serve,
-and where loads are no polynomials of the drive angle, every sample is looked for by itself.
+Each stretch of a path is halved until the interpolated loads miss by less than a tolerance of each channel, which the
+noise sets: near pivots loads are far above it. Where the small tables of states miss by more, the large ones serve, and
+where loads are no polynomials of the drive angle, each sample is looked for by itself.
 """
 
 from __future__ import annotations
@@ -18,7 +18,17 @@ from tactile_bayes import chebyshev
 from tactile_bayes.compiled.compiler import compiled, inlined
 from tactile_bayes.compiled.lane import Lane, bearing
 from tactile_bayes.compiled.limits import limits
-from tactile_bayes.compiled.states import SMALL_FORCE, SMALL_TURN, Room, Tables, combine, excess, room_for, series, state
+from tactile_bayes.compiled.states import (
+    SMALL_FORCE,
+    SMALL_TURN,
+    Room,
+    Tables,
+    combine,
+    excess,
+    room_for,
+    series,
+    state,
+)
 from tactile_bayes.reach import Reach
 from tactile_bayes.segments import BRIEF
 

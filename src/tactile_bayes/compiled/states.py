@@ -109,8 +109,7 @@ def _twice(coefficients: Floats, by_share: Floats, by_angle: Floats, row: Floats
 def state(
     lane: Lane, p: float, tip: bool, both: tuple[Tables, Tables], rooms: tuple[Room, Room], large: bool
 ) -> tuple[float, float, float, float]:
-    """Drive angle, holding moment and forces of a contact, from small or large tables; NaN where the rod cannot make it.
-    """
+    """Drive angle, holding moment and forces of a contact; NaN where the rod cannot make it."""
     x, y, sin, cos, _, _ = place(lane, p)
     slope = math.atan2(sin, cos)
     along, across = x * cos + y * sin, y * cos - x * sin

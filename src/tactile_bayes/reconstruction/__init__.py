@@ -1,7 +1,8 @@
 """Step 2: contact points from a measured record, sample by sample, raw or constrained to what a rod can do."""
 
 from tactile_bayes.reconstruction.estimate import STATUSES
-from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, contact_sides, loaded_samples, samples_of
+from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, loaded_samples, samples_of
+from tactile_bayes.reconstruction.sides import contact_sides, doubtful_sweeps, with_sides
 from tactile_bayes.reconstruction.step2 import AXIAL_ALARM, reconstruct
 
 __all__ = [
@@ -10,7 +11,9 @@ __all__ = [
     "STATUSES",
     "Samples",
     "contact_sides",
+    "doubtful_sweeps",
     "loaded_samples",
     "reconstruct",
     "samples_of",
+    "with_sides",
 ]

@@ -11,19 +11,18 @@ from scipy.special import chdtri
 
 from tactile_bayes.contact_fit import Reading
 from tactile_bayes.errors import RecordError
-from tactile_bayes.load_cell import LoadCell, rough_noise
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
 from tactile_bayes.rod import Rod
 
-__all__ = ["FALSE_ALARM", "Samples", "contact_sides", "loaded_samples", "samples_of"]
+__all__ = ["FALSE_ALARM", "Samples", "loaded_samples", "samples_of"]
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FALSE_ALARM = 1e-3
 """Share of unloaded samples that noise makes look loaded."""
-
-_ALL_BUT_OUTLIERS = 0.98
 
 _MIRROR = np.array([-1.0, -1.0, 1.0])
 """Signs of the loads of a backward contact seen as a forward one."""
@@ -139,26 +138,3 @@ def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> F
             loaded |= measured[name].values != load_cell.bias[index]
     noisy = int(np.count_nonzero(~np.isnan(readings).all(axis=0)))
     return loaded | (load_cell.surprise(readings) > chdtri(noisy, FALSE_ALARM)) if noisy else loaded
-
-
-def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
-    """+1 where the object is met as in a forward sweep, −1 as in a backward one, shape (samples,).
-
-    It is the sign of a sweep's total holding moment, so that a drive may also turn back in contact; single outliers do
-    not count for more than the largest others. The direction of the drive decides where the moment is missing, or sums
-    to no more than six standard errors of its noise, which is the load cell's, or what neighbours differ by if that is
-    more.
-    """
-    known = 0.0 if load_cell is None else float(np.sqrt(load_cell.covariance(np.zeros((1, 3)))[0, 0, 0]))
-    sweep, moment = record.sweep.values, record.holding_moment.values
-    side = np.empty(sweep.size)
-    order = np.argsort(sweep, kind="stable")
-    for rows in np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1):
-        of_sweep = moment[rows]
-        most = np.quantile(np.abs(of_sweep), _ALL_BUT_OUTLIERS)
-        total = np.clip(of_sweep, -most, most).sum()
-        if abs(total) > 6.0 * max(rough_noise(of_sweep), known) * np.sqrt(rows.size):
-            side[rows] = np.sign(total)
-        else:
-            side[rows] = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
-    return side

@@ -1,0 +1,137 @@
+"""The side of the object that each sweep touches: as its direction says, unless the moment contradicts that."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell, rough_noise
+from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
+from tactile_bayes.record import CHANNELS, present_channels, rod_of
+
+__all__ = ["contact_sides", "doubtful_sweeps", "with_sides"]
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_ATTRIBUTE = "contact_sides"
+"""Of a record: a JSON object from sweep to the direction of a sweep that touches the object from that side."""
+
+_CONTRADICTED, _DOUBTED = -6.0, -2.0
+"""Mean moment in contact, on the direction's side of the zero, in standard errors, below which the direction is not
+believed, and below which it is doubted."""
+
+_ZERO = 0.1
+"""Standard deviation of a zero of which nothing is known [EI/L]."""
+
+_WANDER = 0.2
+"""That of a zero that moves between contact and the unloaded samples beside it, in standard deviations of the noise."""
+
+_FALSE_ALARM = 1e-3
+_ALL_BUT_OUTLIERS = 0.98
+
+
+class _Zero(NamedTuple):
+    """Of unloaded samples."""
+
+    total: float
+    count: int
+
+
+def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
+    """+1 where the object is touched as in a forward sweep, −1 as in a backward one, shape (samples,).
+
+    It is the side of the sweep's direction, unless the moment contradicts that, since a drive may also turn back in
+    contact: in contact the moment is on the other side of its zero by more than six standard errors. The zero is the
+    mean of the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else none within a
+    standard deviation of 0.1 EI/L. A record may state the sides of its sweeps itself (`with_sides`).
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A valid record. Known errors of the load cell are taken out.
+    load_cell : LoadCell, optional
+        Its noise counts where neighbours differ by less.
+    """
+    direction = np.where(record.direction.values == "backward", -1.0, 1.0)
+    side = direction.copy()
+    for sweep, rows, score in _scores(record, load_cell):
+        stated = _stated(record).get(sweep)
+        if stated is not None:
+            side[rows] = -1.0 if stated == "backward" else 1.0
+        else:
+            side[rows] = -direction[rows[0]] if score < _CONTRADICTED else direction[rows[0]]
+    return side
+
+
+def doubtful_sweeps(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[int, ...]:
+    """Sweeps whose moment speaks against their direction, and not clearly, the most doubtful first."""
+    scores = [(score, sweep) for sweep, _, score in _scores(record, load_cell) if sweep not in _stated(record)]
+    return tuple(sweep for score, sweep in sorted(scores) if _CONTRADICTED <= score < _DOUBTED)
+
+
+def with_sides(record: xr.Dataset, sides: Mapping[int, str]) -> xr.Dataset:
+    """The record with the sides of some sweeps stated: "forward" as a forward sweep touches, or "backward".
+
+    Raises
+    ------
+    ParameterError
+        If a sweep is none of the record, or a side is neither.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> record = scan(paper_profile("II", q=0.5), direction="forward").record
+    >>> sorted(set(contact_sides(with_sides(record, {0: "backward"})).tolist()))
+    [-1.0]
+    """
+    for sweep, side in sides.items():
+        if sweep not in record.sweep.values or side not in ("forward", "backward"):
+            raise ParameterError(f"there is no side {side!r} of sweep {sweep!r}: give sweeps, each forward or backward")
+    every = {**_stated(record), **{int(sweep): side for sweep, side in sides.items()}}
+    return record.assign_attrs({_ATTRIBUTE: json.dumps(every)})
+
+
+def _stated(record: xr.Dataset) -> dict[int, str]:
+    return {int(sweep): side for sweep, side in json.loads(record.attrs.get(_ATTRIBUTE, "{}")).items()}
+
+
+def _scores(record: xr.Dataset, load_cell: LoadCell | None) -> list[tuple[int, Index, float]]:
+    """Every sweep, its samples, and how far, in standard errors, its moment is on the side of its direction."""
+    unit = rod_of(record).moment_unit
+    cell = load_cell or LoadCell()
+    known = float(np.sqrt(cell.covariance(np.zeros((1, 3)))[0, 0, 0]))
+    unknown = float(np.hypot(_ZERO * unit, cell.bias_uncertainty[0]))
+    present = present_channels(record)
+    sweep, moment = record.sweep.values, record.holding_moment.values
+    order = np.argsort(sweep, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
+    if CHANNELS[0] not in present:
+        return [(int(sweep[rows[0]]), rows, np.inf) for rows in parts]
+    readings = np.stack([record[name].values for name in present], axis=-1)
+    loaded, zeros = [], []
+    for rows in parts:
+        bounds = contact_bounds(readings[rows], _FALSE_ALARM, np.full(len(present), np.finfo(float).tiny))
+        inside = np.s_[bounds.before : len(rows) - bounds.after] if bounds.found else np.s_[:]
+        unloaded = np.concatenate([rows[: bounds.before], rows[len(rows) - bounds.after :]])
+        loaded.append(rows[inside])
+        zeros.append(_Zero(float(moment[unloaded].sum()), unloaded.size))
+    every = _Zero(sum(zero.total for zero in zeros), sum(zero.count for zero in zeros))
+    found = []
+    for rows, inside, own in zip(parts, loaded, zeros, strict=True):
+        noise = max(rough_noise(moment[rows]), known, np.finfo(float).tiny)
+        zero = own if own.count >= FEWEST and inside.size < rows.size else every
+        mean, error = (zero.total / zero.count, noise / np.sqrt(zero.count)) if zero.count >= FEWEST else (0.0, unknown)
+        apart = moment[inside] - mean
+        most = np.quantile(np.abs(apart), _ALL_BUT_OUTLIERS)
+        error = np.sqrt(error**2 + noise**2 / inside.size + (_WANDER * noise) ** 2)
+        sign = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
+        found.append((int(sweep[rows[0]]), rows, float(sign * np.clip(apart, -most, most).mean() / error)))
+    return found
