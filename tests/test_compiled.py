@@ -40,7 +40,7 @@ def drawn(name, rod, count, seed=1):
 
 
 def arrays_of(likelihood, contours):
-    loads, usable = likelihood._by_arrays(contours)
+    loads, usable, _ = likelihood._by_arrays(contours)
     return loads[:, 0], usable
 
 

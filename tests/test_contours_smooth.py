@@ -65,7 +65,7 @@ def test_compiled_loads_are_those_of_the_arrays(diameter):
     waves = 0.3 * rng.normal(size=(20, 4, 1)) * np.cos(np.arange(4)[:, None] * (Smooth.nodes(NODES) + 0.7))
     contours = Smooth(np.log(0.8) + waves.sum(axis=1), q=rng.uniform(0.4, 0.6, 20), x_c=rng.normal(0.0, 0.05, 20))
     fast, usable = likelihood.predict(contours)
-    slow, reached = likelihood._by_arrays(contours)
+    slow, reached, _ = likelihood._by_arrays(contours)
     np.testing.assert_array_equal(usable, reached)
     assert usable.sum() > 10
     off = np.abs(fast - slow[:, 0])[usable].max(axis=2)

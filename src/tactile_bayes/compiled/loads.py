@@ -47,8 +47,9 @@ def loads_of(
     tolerance: Floats,
     *,
     is_always_clear: bool,
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Loads in EI/L and EI/L², zero out of contact, shape (n, samples, 3), and which contours are usable, shape (n,).
+) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    """Loads in EI/L and EI/L², zero out of contact, shape (n, samples, 3), which contours are usable, shape (n,), and
+    drive angles of first contact and snap-off, as read and as seen in forward sweeps, shape (n, strokes, 2).
 
     Usable are contours that every stroke reaches, and that the rod has passed once it has snapped off.
 
@@ -70,6 +71,7 @@ def loads_of(
     contours = np.stack([np.broadcast_to(column, halves.x.shape) for column in columns], axis=1)
     out = np.zeros((halves.x.size, strokes.samples.size, 3))
     usable = np.ones(halves.x.size, dtype=bool)
+    events = np.empty((halves.x.size, strokes.base_x.size, 2))
     kinds, room = (halves.left.kind, halves.right.kind), work(int(np.diff(strokes.first).max()), known)
     both = contours, None if halves.tables is None else halves.tables / rod[0]
     _fill(
@@ -82,10 +84,9 @@ def loads_of(
         is_always_clear,
         (known, on),
         room,
-        out,
-        usable,
+        (out, usable, events),
     )
-    return out, usable
+    return out, usable, events
 
 
 @functools.cache
@@ -120,10 +121,10 @@ def _fill(
     is_always_clear: bool,
     constants: tuple[tuple[Tables, Tables], Nodes],
     room: Work,
-    out: Floats,
-    usable: NDArray[np.bool_],
+    found: tuple[Floats, NDArray[np.bool_], Floats],
 ) -> None:
     left, right = kinds
+    out, usable, events = found
     contours, tables = both
     length, standoff = rod
     rig, shifts, tolerance = rigs
@@ -141,9 +142,10 @@ def _fill(
                 lane, sign = mirrored(lane), -1.0
             of_stroke = slice(strokes.first[k], strokes.first[k + 1])
             angles, samples = strokes.angles[of_stroke], strokes.samples[of_stroke]
-            reach, snap = follow(
+            reach, first, snap = follow(
                 lane, has_knot, angles, samples, sign, rig[i, 0], rig[i, 1], tolerance, known, on, room, out[i]
             )
+            events[i, k, 0], events[i, k, 1] = first + sign * rig[i, 0], snap + sign * rig[i, 0]
             if reach != _TOUCHES:
                 usable[i] = False
             elif not is_always_clear:

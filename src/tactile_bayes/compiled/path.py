@@ -376,22 +376,24 @@ def follow(
     on: Nodes,
     room: Work,
     out: Floats,
-) -> tuple[int, float]:
-    """`Reach` and snap-off's drive angle of a lane; loads at drive angles go into rows of `out`, zero beforehand.
+) -> tuple[int, float, float]:
+    """`Reach`, drive angles of first contact and snap-off of a lane; loads at drive angles go into rows of `out`.
 
+    They are zero beforehand.
     The sign is −1 in backward sweeps; the offset is what the encoder reads too much, the compliance the suspension's.
     Loads may miss by about the tolerance, of moment and forces.
     """
     reach, begin, end, tip_first, runs_out = limits(lane)
     if reach != _TOUCHES:
-        return reach, math.nan
+        return reach, math.nan, math.nan
     waiting = room.waiting
     count = _cut(lane, begin, end, has_knot, tip_first, known[0].stretch, waiting)
     for k in range(count // 2):  # the first one is to be the last, where a stack ends
         for c in range(6):
             waiting[k, c], waiting[count - 1 - k, c] = waiting[count - 1 - k, c], waiting[k, c]
     whole = begin - end
-    at_begin, is_first = bearing(lane, begin), True
+    first = bearing(lane, begin)
+    at_begin, is_first = first, True
     grows_to_the_end = True
     while count:
         stretch = waiting[count - 1]
@@ -430,5 +432,5 @@ def follow(
             grows_to_the_end = False
             break
     if runs_out and grows_to_the_end:
-        return _RUNS_OUT, math.nan
-    return _TOUCHES, at_begin
+        return _RUNS_OUT, math.nan, math.nan
+    return _TOUCHES, first, at_begin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,18 +10,21 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import ReachError
+from tactile_bayes.errors import DriftWarning, ReachError
 from tactile_bayes.inference.families import Family, Prior
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
 from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.prior_density import log_density_of
-from tactile_bayes.load_cell import rough_noise
+from tactile_bayes.load_cell import rough_noise, zero_load
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["ContourModel"]
 
 Floats = NDArray[np.float64]
+
+_FEWEST_UNLOADED = 12
+"""Unloaded samples that tell zero and noise of a channel."""
 
 _MOST_TRIALS = 50
 """Draws from the prior for each that is wanted within reach, before fewer will do."""
@@ -58,12 +62,12 @@ class ContourModel:
         self.likelihood = RecordLikelihood(
             measured, noise.cell, nuisances.friction, is_always_clear=family.is_always_clear and not rubs
         )
-        rough = self._rough_noise()
-        floor = np.maximum(1e-4 * np.nan_to_num(np.abs(self.likelihood.measured)).max(axis=0), 1e-12)
-        self.deviation = np.where(self.present, np.maximum(rough, floor), 1.0)
-        # Loads that bend strongly from one sample to the next look rough: what is stated is nearer then.
-        stated = noise.cell.dimensionless(self.likelihood.rod).noise if noise.stated_cell else rough
-        self.likelihood.noise = np.where(self.present, np.minimum(rough, np.where(stated > 0.0, stated, rough)), np.inf)
+        self.found = self._zero_load()
+        self.zero, noise_found = self._unloaded()
+        rough = np.where(noise_found > 0.0, noise_found, self._rough_noise())
+        largest = np.nan_to_num(np.abs(self.likelihood.measured)).max(axis=0)
+        self.deviation = np.where(self.present, np.maximum(rough, np.maximum(1e-7 * largest, 1e-12)), 1.0)
+        self.likelihood.noise = np.where(self.present, rough, np.inf)
 
     @property
     def present(self) -> NDArray[np.bool_]:
@@ -84,6 +88,11 @@ class ContourModel:
         """What the load cell senses at the drive angles read, shape (n, samples, 3)."""
         loads, _ = self.likelihood.predict(self.contours(points), self.rig(points))
         return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell)
+
+    def loads_and_events(self, points: Floats) -> tuple[Floats, Floats]:
+        """`loads`, and drive angles of first contact and snap-off, see `RecordLikelihood.predict_with_events`."""
+        loads, _, events = self.likelihood.predict_with_events(self.contours(points), self.rig(points))
+        return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell), events
 
     def loads_with_errors(self, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """`loads` for every error of the encoder, shape (n, errors, samples, 3), and which points are usable, (n,)."""
@@ -129,6 +138,19 @@ class ContourModel:
                 "units right, and the priors in the record's units?"
             )
         return points[:count], len(points) / drawn
+
+    def _zero_load(self) -> xr.Dataset:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DriftWarning)
+            return zero_load(self.measured)
+
+    def _unloaded(self) -> tuple[Floats, Floats]:
+        """Mean and standard deviation of each channel's unloaded samples, shape (3,); NaN where there are few."""
+        if int(self.found["unloaded"].sum()) < _FEWEST_UNLOADED:
+            return np.full(len(CHANNELS), np.nan), np.full(len(CHANNELS), np.nan)
+        rod = self.likelihood.rod
+        units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+        return self.found["bias"].values / units, self.found["noise"].values / units
 
     def _rough_noise(self) -> Floats:
         """Standard deviation of each channel from the median bend between neighbouring samples, shape (3,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.families import support_of
+from tactile_bayes.inference.nuisances import BIASES
 from tactile_bayes.inference.start import best_optimum
+from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
 
@@ -18,9 +21,18 @@ __all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optimum_of"]
 
 Floats = NDArray[np.float64]
 
+_PRIOR_DRAWS = 1000
 _CANDIDATES = 8
 """Draws from the prior from which the optimum is sought, the likeliest first, until one explains the record. A sample
 at an event that is loaded or not holds the search up where it began too far away."""
+
+_SHARP = 0.1
+"""Of the angle between the samples beside an event: how far it may be outside for a residual of one."""
+
+_FAR_OFF = 300.0
+
+_FIRM = 2.0
+"""Standard deviation of a contact across the contour, over the median one, up to which a contour is fitted to it."""
 
 _FAR_BETTER = 100.0
 """Log-likelihood, roughly, by which a record is explained better beyond the end of a prior for that to be a mistake."""
@@ -37,21 +49,64 @@ class ContourOptimum(NamedTuple):
     """What the record wants and the priors do not allow, where that explains it far better; in words."""
 
 
+class Brackets(NamedTuple):
+    """Drive angles between which contact begins or ends, as read and as seen in forward sweeps, a row an event."""
+
+    stroke: NDArray[np.intp]
+    ends: NDArray[np.intp]
+    """0 for first contact, 1 for snap-off."""
+    low: Floats
+    high: Floats
+    width: Floats
+    """In which a residual grows by one."""
+
+    def missed(self, events: Floats) -> Floats:
+        """By how much events, shape (n, strokes, 2), are outside, in widths, shape (n, events)."""
+        at = events[:, self.stroke, self.ends]
+        missed = np.maximum(self.low - at, 0.0) - np.maximum(at - self.high, 0.0)
+        return np.clip(np.nan_to_num(missed / self.width, nan=_FAR_OFF), -_FAR_OFF, _FAR_OFF)
+
+
+def event_brackets(model: ContourModel) -> Brackets:
+    """Between which samples contact begins and ends, by the loads alone.
+
+    Loads say nothing of where a rod lets go until a sample is on the other side: what is missed here leads there.
+    """
+    angle = model.likelihood.seen_angles
+    of_sample = model.likelihood.stroke_of_sample
+    rows = []
+    for onset, snap_off in zip(model.found["onset"].values, model.found["snap_off"].values, strict=True):
+        for ends, (before, after) in enumerate((onset, snap_off)):
+            if before < 0 or after < 0 or of_sample[before] != of_sample[after] or angle[before] >= angle[after]:
+                continue  # there is none, or the drive turns back
+            rows.append((of_sample[before], ends, angle[before], angle[after], _SHARP * (angle[after] - angle[before])))
+    columns = np.array(rows, dtype=float).reshape(-1, 5).T
+    return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
+
+
 def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
     """The best of several searches, which begin at Step 2's contacts and at draws from the prior."""
     size = len(model.located)
     deviation, present = model.deviation, model.present
     measured = model.likelihood.measured[:, present] / deviation[present]
-    candidates, _ = model.draw_prior(rng, 400)
+    brackets = event_brackets(model)
+    candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS)
+    units = [model.nuisances.units[name] for name in BIASES]
+    for name, zero, unit in zip(BIASES, model.zero, units, strict=True):
+        if name in model.names and np.isfinite(zero):
+            candidates[:, model.names.index(name)] = zero * unit
 
     def residuals(points: Floats) -> Floats:
         # A prior that ends somewhere is no wall: the way to where it does not may lead through there.
         allowed = ((points > model.low[:size]) & (points < model.high[:size])).all(axis=1)
         out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
+        late = np.full((len(points), brackets.low.size), _FAR_OFF)
         if allowed.any():
-            expected = model.likelihood.load_cell.expected(model.loads(points[allowed]))
+            loads, events = model.loads_and_events(points[allowed])
+            expected = model.likelihood.load_cell.expected(loads)
             out[allowed] = measured - expected[..., present] / deviation[present]
-        return out.reshape(len(points), -1)
+            late[allowed] = brackets.missed(events)
+        return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
     spread = np.array([float(model.priors[name].std()) for name in model.located])
     percentiles = np.quantile(candidates[:, :size], [0.16, 0.84], axis=0)
@@ -69,7 +124,7 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
     optimum = best_optimum(residuals, starts(), percentiles.mean(axis=0), spread, low, high)
 
-    noise = fitted_noise(model, optimum.residuals.reshape(measured.shape))
+    noise = fitted_noise(model, optimum.residuals[: measured.size].reshape(measured.shape))
     possible = candidates[:, size:]
     if not np.isfinite(model.log_prior(np.append(optimum.point, noise)[None]))[0]:
         noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
@@ -100,12 +155,11 @@ def contact_fit(model: ContourModel) -> Floats | None:
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None
     contacts = reconstruct(
-        model.measured,
-        load_cell=model.noise.stated_cell,
-        friction=model.nuisances.friction,
+        model.measured, method="constrained", load_cell=_zeroed_cell(model), friction=model.nuisances.friction
     )
-    force = np.hypot(model.measured.force_x.values, model.measured.force_y.values)
-    firm = (contacts.status.values == "ok") & (force > 0.1 * force.max())
+    firm = contacts.status.values == "ok"
+    if firm.any():
+        firm &= contacts.normal_sd.values <= _FIRM * np.median(contacts.normal_sd.values[firm])
     said = len(model.family.parameters) - len(model.family.roughness)
     if np.count_nonzero(firm) < 2 * said:
         return None
@@ -114,3 +168,17 @@ def contact_fit(model: ContourModel) -> Floats | None:
     point = np.array([values[name] * length**power for name, power in model.family.length_powers.items()])
     inside = [np.isfinite(model.priors[n].logpdf(v)) for n, v in zip(model.family.parameters, point, strict=True)]
     return point if all(inside) else None
+
+
+def _zeroed_cell(model: ContourModel) -> LoadCell:
+    """The load cell, its zeros and noise those of the record's unloaded samples where they are inferred."""
+    rod = model.likelihood.rod
+    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    moment, *forces = model.deviation * units
+    noise = (
+        {"moment_noise": float(moment), "force_noise": float(max(forces))} if model.noise.stated_cell is None else {}
+    )
+    inferred = [name in model.nuisances.names for name in BIASES]
+    known = inferred & np.isfinite(model.zero)
+    bias = np.where(known, model.zero * units, model.noise.cell.bias)
+    return replace(model.noise.cell, bias=tuple(bias.tolist()), **noise)

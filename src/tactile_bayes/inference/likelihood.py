@@ -189,10 +189,22 @@ class RecordLikelihood:
     def event_angles(self, loaded: NDArray[np.bool_]) -> Floats:
         """Drive angles of `event_samples`, as seen in forward sweeps; NaN where there is none."""
         samples = self.event_samples(loaded)
-        by_sample = np.empty(len(self.measured))
-        for stroke, angles in zip(self.strokes, self._angles, strict=True):
-            by_sample[stroke.samples] = angles[: stroke.samples.size]
-        return np.where(samples >= 0, by_sample[samples], np.nan)
+        return np.where(samples >= 0, self.seen_angles[samples], np.nan)
+
+    @property
+    def seen_angles(self) -> Floats:
+        """Drive angle of each sample, as read and as seen in forward sweeps."""
+        angles = np.empty(len(self.measured))
+        for stroke, seen in zip(self.strokes, self._angles, strict=True):
+            angles[stroke.samples] = seen[: stroke.samples.size]
+        return angles
+
+    @property
+    def stroke_of_sample(self) -> NDArray[np.intp]:
+        which = np.empty(len(self.measured), dtype=np.intp)
+        for k, stroke in enumerate(self.strokes):
+            which[stroke.samples] = k
+        return which
 
     def usable(self, contours: Contour, rig: Rig | None = None) -> NDArray[np.bool_]:
         """Contours that every stroke can reach, and that the rod is past after snap-off, shape (n,)."""
@@ -217,26 +229,34 @@ class RecordLikelihood:
 
         Forces are in the record's frame, loads in units of the rod as stated, drive angles as read.
         """
-        loads, reached = self._predict(contours, rig, np.zeros(1))
-        return loads[:, 0], reached
+        return self.predict_with_events(contours, rig)[:2]
 
     def predict_with_errors(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, NDArray[np.bool_]]:
         """`predict` for every error that the encoder may have made, shape (n, errors, samples, 3)."""
-        return self._predict(contours, rig, self.encoder.errors)
+        return self._predict(contours, rig, self.encoder.errors)[:2]
 
-    def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def predict_with_events(
+        self, contours: Contour, rig: Rig | None = None
+    ) -> tuple[Floats, NDArray[np.bool_], Floats]:
+        """`predict`, and drive angles of first contact and snap-off, as read and as seen in forward sweeps, shape
+        (n, strokes, 2); NaN where there is none.
+        """
+        loads, reached, events = self._predict(contours, rig, np.zeros(1))
+        return loads[:, 0], reached, events
+
+    def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
         rig = self._rig_of(rig, contours.shape[0])
         halves = contours.halves
         if halves is None or np.any(rig.friction) or self.order > FAST_ORDER:
-            predicted, reached = self._by_arrays(contours, rig, errors)
+            predicted, reached, events = self._by_arrays(contours, rig, errors)
         else:
-            predicted, reached = self._by_compiled(halves, rig, errors)
+            predicted, reached, events = self._by_compiled(halves, rig, errors)
         if self._turn is not None:
             turn = self._turn - rig.drive_angle_offset[:, None, None] - errors[:, None]
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
         if np.any(rig.rigidity_scale != 1.0):
             predicted *= rig.rigidity_scale[:, None, None, None]
-        return predicted, reached
+        return predicted, reached, events
 
     def _rig_of(self, rig: Rig | None, count: int) -> Rig:
         """Of every contour, what is known of the rig where nothing is said of it."""
@@ -246,15 +266,15 @@ class RecordLikelihood:
             shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
         return Rig._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
 
-    def _by_compiled(self, halves: Halves, rig: Rig, errors: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """`predict`, in the pivot's frame, without friction and to `FAST_ORDER`."""
+    def _by_compiled(self, halves: Halves, rig: Rig, errors: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
+        """`_predict`, in the pivot's frame, without friction."""
         from tactile_bayes.compiled.loads import loads_of  # numba takes a second to load
 
         rod = self.rod.length, 0.5 * self.rod.diameter
         offset_and_compliance = np.stack(
             [rig.drive_angle_offset, rig.suspension_compliance * rig.rigidity_scale], axis=1
         )
-        loads, usable = loads_of(
+        loads, usable, events = loads_of(
             halves,
             self._strokes_with(errors),
             rod,
@@ -263,7 +283,7 @@ class RecordLikelihood:
             self._tolerance,
             is_always_clear=self.is_always_clear,
         )
-        return loads.reshape(len(loads), errors.size, *self.measured.shape), usable
+        return loads.reshape(len(loads), errors.size, *self.measured.shape), usable, events
 
     def _strokes_with(self, errors: Floats) -> Strokes:
         """Every sample once for each error, one error after the other."""
@@ -290,8 +310,8 @@ class RecordLikelihood:
 
     def _by_arrays(
         self, contours: Contour, rig: Rig | None = None, errors: Floats | None = None
-    ) -> tuple[Floats, NDArray[np.bool_]]:
-        """`predict`, in the pivot's frame, for any contour, with friction, and to any accuracy."""
+    ) -> tuple[Floats, NDArray[np.bool_], Floats]:
+        """`_predict`, in the pivot's frame, for any contour, with friction, and to any accuracy."""
         count, errors = contours.shape[0], np.zeros(1) if errors is None else errors
         rig = self._rig_of(rig, count)
         paths = self.paths(contours, rig)
@@ -305,7 +325,12 @@ class RecordLikelihood:
             sign = np.array([-1.0, -1.0, 1.0]) if stroke.backward else 1.0
             own = loads[k * count : (k + 1) * count].reshape(count, errors.size, longest, -1)
             predicted[:, :, stroke.samples] = sign * own[:, :, : stroke.samples.size]
-        return predicted, self._usable(paths, count)
+        events = np.stack([paths.first_angle, paths.snap_angle], axis=1).reshape(len(self.strokes), count, 2)
+        return (
+            predicted,
+            self._usable(paths, count),
+            events.swapaxes(0, 1) + offset.reshape(-1, count, 1).swapaxes(0, 1),
+        )
 
     def log_likelihood(
         self, contours: Contour, noise_scale: Any = 1.0, rig: Rig | None = None, *, pointwise: bool = False

@@ -20,7 +20,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import present_channels, rod_of
 from tactile_bayes.rod import Rod
 
-__all__ = ["BIAS", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
+__all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +32,8 @@ MAY_VANISH = ("friction", "suspension_compliance")
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}
+
+BIASES = _GROUPS["bias"]
 
 BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""

@@ -21,6 +21,14 @@ Residuals = Callable[[Floats], Floats]
 _BRAVE = 2.0
 """Residual in standard deviations from which on a sample pulls less than by its square."""
 
+_CLOSER = 0.2
+"""Factor from one such residual to the next, the first being as large as all of them are."""
+
+_MOST_STEPS = 40
+
+_GAIN = 1.0
+"""Cost by which a search that begins where one ended has to be better to go on."""
+
 _WIDER = 2.0
 """How many times wider than the posterior walkers start."""
 
@@ -76,6 +84,9 @@ def best_optimum(
     best: Optimum | None = None
     for candidate in candidates:
         found = _descend(residuals, candidate, middle, spread)
+        again = _descend(residuals, found.point, middle, spread)
+        while again.cost < found.cost - _GAIN:  # samples that fell on an event's other side on the way
+            found, again = again, _descend(residuals, again.point, middle, spread)
         if best is None or found.cost < best.cost:
             best = found
         if best.cost < _FITS * best.residuals.size:
@@ -107,8 +118,21 @@ def _descend(
         slopes = central_slopes(lambda points: residuals(points * spread), point, 1e-4)
         return np.concatenate([slopes, np.eye(point.size)])
 
+    def loss(squares: Floats) -> Floats:
+        """Outliers are the record's: to be far from where a parameter lies a priori costs its square."""
+        root = np.sqrt(1.0 + squares)
+        found = np.stack([2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3])
+        own = squares[-start.size :]
+        found[:, -start.size :] = own, np.ones(own.size), np.zeros(own.size)
+        return found
+
     bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
-    solution = least_squares(one, start / spread, jacobian, bounds, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)
+    point, scale = start / spread, np.inf
+    while scale > _BRAVE:  # far off, residuals all pull by their squares, or the way would be long
+        typical = float(np.sqrt(np.mean(np.square(one(point)))))
+        scale = max(_BRAVE, min(typical, _CLOSER * scale))
+        solution = least_squares(one, point, jacobian, bounds, loss=loss, f_scale=scale, max_nfev=_MOST_STEPS)
+        point = solution.x
     _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
     axes = axes / sizes[:, None] * spread
     covariance = axes.T @ axes
