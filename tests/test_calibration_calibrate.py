@@ -161,13 +161,15 @@ def test_what_is_lost_is_kept(with_lost, monkeypatch):
     assert quickly(replicates=4, settings=FEW_STEPS, out=folder).identical(found)
 
 
-def test_a_failure_in_another_process_is_the_same_outcome(with_lost, monkeypatch):
+@pytest.mark.parametrize("count", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_a_failure_in_another_process_is_the_same_outcome(with_lost, monkeypatch, count):
+    """The third takes a posterior, before it fails."""
     monkeypatch.setattr(module, "replicate", failing)
-    found = quickly(replicates=3, settings=FEW_STEPS, workers=2)
-    expected = with_lost[0].isel(replicate=slice(3))
+    found = quickly(replicates=count, settings=FEW_STEPS, workers=2)
+    expected = with_lost[0].isel(replicate=slice(count))
     for name in ("message", "traceback"):
         assert found[name].identical(expected[name])
-    assert found.attrs["lost"] == 3
+    assert found.attrs["lost"] == count
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])

@@ -260,7 +260,8 @@ def test_nothing_but_failures():
     assert (found.sizes["quantity"], found.sizes["claim"]) == (0, 0)
     assert found.attrs["verdict"].startswith(
         "It cannot be said whether posteriors are right: of 30 replicates 30 were lost (at most 1% may be); 0 "
-        "posteriors are left, and 20 the least. 30 lost, and counted as not holding: 0, 1, 2, 3, 4, … (InferenceError). To see why"
+        "posteriors are left, and 20 the least. "
+        "30 lost, and counted as not holding: 0, 1, 2, 3, 4, … (InferenceError). "
     )
 
 
@@ -294,8 +295,8 @@ def test_power_is_stated():
     least, most = float(found.noticed_below.min()), float(found.noticed_above.max())
     assert (
         f"What would have been noticed with a probability of 90%: coverage of at most {least:.1%} or at least "
-        f"{most:.1%} in place of 90%, posteriors off by {ranks.shift:.2g} standard deviations, too narrow by a factor of "
-        f"{ranks.narrow:.2f}, too wide by a factor of {ranks.wide:.2f}. " in attrs["verdict"]
+        f"{most:.1%} in place of 90%, posteriors off by {ranks.shift:.2g} standard deviations, too narrow by a "
+        f"factor of {ranks.narrow:.2f}, too wide by a factor of {ranks.wide:.2f}. " in attrs["verdict"]
     )
 
 
