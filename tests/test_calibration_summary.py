@@ -228,8 +228,8 @@ def test_too_many_lost_are_no_calibration():
     assert (found.attrs["calibrated"], found.attrs["conclusion"], found.attrs["lost"]) == (0, "undecided", 60)
     assert np.all(found.coverage < 0.65)
     assert found.attrs["verdict"].startswith(
-        "It cannot be said whether posteriors are right: of 160 replicates 60 were lost (at most 1% may be); no fault "
-        "is found in the rest. Of those with 90% hold: band, in the gap"
+        "It cannot be said whether posteriors are right: of 160 replicates 60 were lost (at most 1% may be); no other "
+        "fault is found. Of those with 90% hold: band, in the gap"
     )
 
 
@@ -273,7 +273,7 @@ def test_too_many_that_did_not_converge_are_no_calibration():
     assert few.attrs["verdict"].endswith(" 5 did not converge, and are counted like all others.")
     many = summary(EXPERIMENT, rows | {number: unconverged[number] for number in range(6)})
     assert (many.attrs["conclusion"], many.attrs["not_converged"]) == ("undecided", 6)
-    assert "of 100 replicates 6 did not converge (at most 5% may); no fault is found" in many.attrs["verdict"]
+    assert "of 100 replicates 6 did not converge (at most 5% may); no other fault is found" in many.attrs["verdict"]
 
 
 def test_alarms_of_the_check_are_counted():

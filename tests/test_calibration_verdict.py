@@ -41,13 +41,13 @@ def test_conclusions(tally, has_faults, expected):
             "undecided",
             Tally(200, lost=3),
             "It cannot be said whether posteriors are right: of 200 replicates 3 were lost (at most 1% may be); no "
-            "fault is found in the rest.",
+            "other fault is found.",
         ),
         (
             "undecided",
             Tally(200, unconverged=11),
             "It cannot be said whether posteriors are right: of 200 replicates 11 did not converge (at most 5% may); "
-            "no fault is found in the rest.",
+            "no other fault is found.",
         ),
         (
             "undecided",

@@ -34,7 +34,7 @@ def coverage_p_value(share: ArrayLike, count: int, probability: float, *, is_who
     Examples
     --------
     >>> coverage_p_value([0.9, 0.5], 20, 0.9, is_whole=True).round(4)
-    array([1.    , 0.    ])
+    array([1., 0.])
     """
     share = np.asarray(share, dtype=float)
     limit = np.clip(share, probability - _MARGIN, min(probability + _MARGIN, 1.0))

@@ -68,7 +68,7 @@ def statement(concluded: Conclusion, tally: Tally, reason: str) -> str:
     too_many = [] if tally.has_few_lost else [f"{tally.lost} were lost (at most {_MOST_LOST:.0%} may be)"]
     if not tally.has_few_unconverged:
         too_many.append(f"{tally.unconverged} did not converge (at most {_MOST_UNCONVERGED:.0%} may)")
-    rest = "no fault is found in the rest" if left >= FEWEST else f"{left} posteriors are left, and {FEWEST} the least"
+    rest = "no other fault is found" if left >= FEWEST else f"{left} posteriors are left, and {FEWEST} the least"
     return f"It cannot be said whether posteriors are right: of {count} replicates {' and '.join(too_many)}; {rest}."
 
 
