@@ -59,7 +59,7 @@ def noticed_coverage(
     Examples
     --------
     >>> [round(coverage, 3) for coverage in noticed_coverage(200, 0.9, 0.001, 0.9, is_whole=True)]
-    [0.765, 0.984]
+    [0.77, 0.984]
     """
     held = np.arange(count + 1)
     is_fault = coverage_p_value(held / count, count, probability, is_whole=is_whole) <= level

@@ -87,7 +87,7 @@ def noticed_ranks(count: int, top: int, level: float, power: float) -> NoticedRa
     --------
     >>> noticed = noticed_ranks(200, 99, 0.001, 0.9)
     >>> [round(error, 2) for error in noticed]
-    [0.4, 1.4, 1.45]
+    [0.39, 1.42, 1.51]
     """
 
     def smallest(shift: float, log_scale: float) -> float:
