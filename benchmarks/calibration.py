@@ -35,7 +35,7 @@ def main(replicates: int = 200, *families: str) -> None:
 
 def print_one(family: str, found: xr.Dataset) -> None:
     seconds = found.seconds
-    print(f"{family}: {found.attrs['verdict']}")
+    print(f"{family}: {found.attrs['verdict']}")  # which names replicates that were lost; below they hold nowhere
     print(f"  seconds a replicate: {float(seconds.mean()):.1f}, the longest {float(seconds.max()):.1f}")
     for name in found.claim.values:
         row = found.sel(claim=name)

@@ -91,7 +91,10 @@ def main(replicates: int = 40, *names: str) -> None:
     print(
         f"{replicates} replicates; noise 0.05 EI/L² and 0.02 EI/L, steps of 2°; bands of 90 %; noticed by the check of"
     )
-    print("the record, by the misfit of single samples, by the axial score, by any of them; not converged\n")
+    print(
+        "the record, by the misfit of single samples, by the axial score, by any of them; not converged, or lost: of a"
+    )
+    print("replicate that ended with an error nothing holds, and nothing is noticed\n")
     heads = ("in the gap", "beside it", "bias [L]", "width [L]", "check", "misfit", "axial", "any", "not conv.")
     print(f"{'':<38}" + "".join(f"{head:>11}" for head in heads), flush=True)
     for name in names or CASES:
@@ -121,6 +124,8 @@ def calibrated(name: str, world: dict[str, Any], asked: dict[str, Any], replicat
 
 def row(name: str, found: xr.Dataset, *, cured: bool = False) -> str:
     """Single samples are judged by what is stated, so that a cure changes nothing of that."""
+    if found.attrs["lost"] == found.sizes["replicate"]:
+        return f"{name:<38} {found.attrs['verdict']}"
     check = found.check_passed.values == 0.0
     misfit = found.misfit_probability.values < CHANCE
     axial = np.abs(found.axial_score.values) > SCORE
@@ -129,7 +134,7 @@ def row(name: str, found: xr.Dataset, *, cured: bool = False) -> str:
     cells = [f"{v:.2f}" for v in numbers] + [f"{v:.4f}" for v in lengths]
     cells += [f"{check.mean():.0%}"]
     cells += ["", "", ""] if cured else [f"{alarm.mean():.0%}" for alarm in (misfit, axial, check | misfit | axial)]
-    cells += [f"{np.mean(found.converged.values == 0.0):.0%}"]
+    cells += [f"{np.mean(found.converged.values != 1.0):.0%}"]
     return f"{name:<38}" + "".join(f"{cell:>11}" for cell in cells)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 import subprocess
 import sys
@@ -14,8 +15,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.replicates import STAGES, failing
 from helpers.tasks import wait_until
-from tactile_bayes.calibration.calibrate import calibrate, experiment_of
+from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate, experiment_of
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.world import World
@@ -24,6 +26,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings, moves
 from tactile_bayes.load_cell import LoadCell
 
 module = importlib.import_module("tactile_bayes.calibration.calibrate")
+making = importlib.import_module("tactile_bayes.calibration.replicate")
 
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
 ANGLES = np.radians(np.arange(-30.0, 211.0, 4.0))
@@ -103,6 +106,150 @@ def test_replicates_do_not_depend_on_how_many_there_are(noted):
     three, five = quickly(replicates=3), quickly(replicates=5)
     np.testing.assert_array_equal(three["ranks"], five["ranks"][:3])
     assert not np.array_equal(three["ranks"], quickly(replicates=3, seed=2)["ranks"])
+
+
+# ---- what is lost
+
+
+@pytest.fixture(scope="module")
+def with_lost(tmp_path_factory):
+    """Three replicates that fail, each at another stage, one that does not, and where they are kept."""
+    folder = tmp_path_factory.mktemp("lost")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "replicate", failing)
+        return quickly(replicates=4, settings=FEW_STEPS, out=folder), folder
+
+
+def test_a_failure_is_an_outcome_whatever_it_comes_from(with_lost):
+    found, folder = with_lost
+    assert (found.sizes["replicate"], found.attrs["lost"]) == (4, 3)
+    np.testing.assert_array_equal((found["ranks"] >= 0).any("quantity"), [False, False, False, True])
+    rows = json.loads((folder / REPLICATES.file).read_text(encoding="utf-8"))["replicates"]
+    for number, (stage, words) in enumerate(STAGES.items()):
+        row = rows[number]
+        assert (row["number"], row["ranks"], row["message"]) == (number, {}, f"_StrangeError: an error {words}")
+        assert f"{stage}(" in row["traceback"]
+        assert row["traceback"].endswith(f"_StrangeError: an error {words}\n")
+        assert (str(found.message[number].values), str(found.traceback[number].values)) == (
+            row["message"],
+            row["traceback"],
+        )
+    assert "traceback" not in rows[3]
+    assert str(found.traceback[3].values) == ""
+
+
+def test_what_is_lost_holds_nowhere(with_lost):
+    found, _ = with_lost
+    assert found.sizes["claim"] == 6
+    for name in found.claim.values:
+        np.testing.assert_array_equal(found[str(name)][:3], 0.0)
+    np.testing.assert_array_equal(found.coverage_replicates, 4)
+    np.testing.assert_allclose(found.coverage, [float(found[str(name)][3]) / 4.0 for name in found.claim.values])
+
+
+def test_what_is_lost_is_named_with_the_way_to_it(with_lost):
+    found, _ = with_lost
+    said = found.attrs["verdict"]
+    assert said.startswith("Too few replicates to judge: 1 posteriors, and 20 are the least. ")
+    assert "3 lost, and counted as not holding: 0, 1, 2 (_StrangeError). To see why, add --replicate 0 --debug" in said
+
+
+def test_what_is_lost_is_kept(with_lost, monkeypatch):
+    """A further run makes none of them again."""
+    found, folder = with_lost
+    monkeypatch.setattr(module, "replicate", pytest.fail)
+    assert quickly(replicates=4, settings=FEW_STEPS, out=folder).identical(found)
+
+
+@pytest.mark.parametrize("count", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_a_failure_in_another_process_is_the_same_outcome(with_lost, monkeypatch, count):
+    """The third takes a posterior, before it fails."""
+    monkeypatch.setattr(module, "replicate", failing)
+    found = quickly(replicates=count, settings=FEW_STEPS, workers=2)
+    expected = with_lost[0].isel(replicate=slice(count))
+    for name in ("message", "traceback"):
+        assert found[name].identical(expected[name])
+    assert found.attrs["lost"] == count
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])
+def test_an_interrupt_is_no_failure(tmp_path, monkeypatch, error):
+    def interrupt(*arguments):
+        raise error
+
+    monkeypatch.setattr(making, "simulate", interrupt)
+    with pytest.raises(error):
+        quickly(out=tmp_path)
+    assert json.loads((tmp_path / REPLICATES.file).read_text())["replicates"] == []
+
+
+def test_an_interrupt_in_the_sampler_loses_the_replicate_and_not_half_of_it(tmp_path, monkeypatch):
+    """A sampler that is interrupted gives what it has, which is no posterior to be judged."""
+
+    def interrupt(state):
+        raise KeyboardInterrupt
+
+    sampled = making.sampled
+    monkeypatch.setattr(making, "sampled", lambda problem, **options: sampled(problem, **options, progress=interrupt))
+    with pytest.raises(KeyboardInterrupt, match="interrupted while sampling replicate 0"):
+        quickly(settings=FEW_STEPS, out=tmp_path)
+    assert json.loads((tmp_path / REPLICATES.file).read_text())["replicates"] == []
+
+
+# ---- one replicate again
+
+
+def again(number, **options):
+    asked = {"nuisances": [], "priors": PRIORS, "drive_angles": ANGLES, "settings": FEW_STEPS, "seed": 1}
+    return calibration_replicate(number, **(asked | options))
+
+
+def test_a_replicate_is_the_same_again(small):
+    found, folder = small
+    before = (folder / REPLICATES.file).read_bytes()
+    made = again(1, out=folder)
+    ranks, numbers = made.outcome.ranks, made.outcome.numbers
+    assert (made.number, made.outcome.message) == (1, str(found.message[1].values))
+    assert ranks == {name: int(found["ranks"].sel(replicate=1, quantity=name)) for name in found.quantity.values}
+    for name in set(numbers) - {"seconds"}:
+        np.testing.assert_array_equal(numbers[name], found[name][1])
+    assert list(made.truth) == [*PRIORS, "noise_scale"]
+    assert made.measured.sizes["sample"] == 2 * ANGLES.size
+    assert list(made.posterior["posterior"].data_vars) == list(made.truth)
+    assert (folder / REPLICATES.file).read_bytes() == before
+
+
+def test_the_error_is_raised_where_a_replicate_is_lost(monkeypatch):
+    def fail(*arguments, **options):
+        raise ZeroDivisionError("nothing left")
+
+    monkeypatch.setattr(making, "sampled", fail)
+    with pytest.raises(ZeroDivisionError, match="nothing left"):
+        again(0)
+    made = again(0, throw=False)
+    assert made.outcome.is_lost
+    assert made.outcome.message == "ZeroDivisionError: nothing left"
+    assert list(made.truth) == [*PRIORS, "noise_scale"]
+    assert made.measured.sizes["sample"] == 2 * ANGLES.size
+    assert made.posterior is None
+    monkeypatch.setattr(making, "simulate", fail)
+    made = again(0, throw=False)
+    assert (made.truth, made.measured, made.posterior) == ({}, None, None)
+
+
+def test_a_replicate_of_another_calibration_is_refused(small, tmp_path):
+    with pytest.raises(CalibrationError, match="replicates of another experiment: seed is 1 there and 2 here"):
+        again(0, out=small[1], seed=2)
+    for number in (-1, True, 0.0, "1"):
+        with pytest.raises(ParameterError, match=f"number of the replicate is {number!r}: give a whole number from 0"):
+            again(number)
+
+
+def test_defaults_of_one_replicate_are_those_of_all():
+    own, all_of_them = (inspect.signature(function).parameters for function in (experiment_of, calibrate))
+    assert {name: option.default for name, option in own.items()} == {name: all_of_them[name].default for name in own}
+    others = set(all_of_them) - set(own)
+    assert others == {"replicates", "out", "workers", "scheduler", "progress"}
 
 
 # ---- going on

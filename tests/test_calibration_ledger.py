@@ -18,7 +18,7 @@ WORDS = {"family": "parabola", "seed": "1", "friction": "0.0", "load_cell": '{"f
 
 ROWS = {
     3: Outcome({"a": 0, "q": 99}, {"seconds": 0.1 + 0.2, "width_in_gap": math.nan, "share": 1.0}, "converged: R̂ 1.01"),
-    0: Outcome({}, {"seconds": 1e-300}, 'InferenceError: "nothing"\nfits'),
+    0: Outcome({}, {"seconds": 1e-300}, 'InferenceError: "nothing"\nfits', 'File "a.py", line 1\n  in f\n'),
     11: Outcome({"a": 50}, {}, ""),
 }
 
@@ -29,7 +29,7 @@ def equal(one, other):
         dict(one.ranks) == dict(other.ranks)
         and list(one.numbers) == list(other.numbers)
         and all(v == w or (math.isnan(v) and math.isnan(w)) for v, w in zip(*map(_values, (one, other)), strict=True))
-        and one.message == other.message
+        and (one.message, one.traceback) == (other.message, other.traceback)
     )
 
 
@@ -72,6 +72,17 @@ def test_the_file_is_plain_json(tmp_path):
     assert table["experiment"] == WORDS
     assert [row["number"] for row in table["replicates"]] == [0, 3, 11]
     assert table["replicates"][1]["numbers"]["width_in_gap"] is None
+
+
+def test_a_ledger_without_tracebacks_is_read(tmp_path):
+    """As older ones are; what was lost there is lost here."""
+    file = filled(tmp_path)
+    table = json.loads(file.read_text(encoding="utf-8"))
+    assert [row.pop("traceback", None) is not None for row in table["replicates"]] == [True, False, False]
+    file.write_text(json.dumps(table), encoding="utf-8")
+    outcomes = Ledger(WORDS, tmp_path, REPLICATES).outcomes
+    assert all(equal(outcomes[number], row._replace(traceback="")) for number, row in ROWS.items())
+    assert [outcomes[number].is_lost for number in (0, 3, 11)] == [True, False, False]
 
 
 def test_new_ones_are_added_to_those_that_are_there(tmp_path):

@@ -9,7 +9,16 @@ import pytest
 from arviz_stats.ecdf_utils import simulate_confidence_bands
 from scipy.special import ndtr
 
-from tactile_bayes.calibration.ranks import _SIMULATIONS, _null, expected_shares, simultaneous_band, uniformity_p_value
+from tactile_bayes.calibration.ranks import (
+    _SIMULATIONS,
+    _null,
+    _power,
+    _rank_probabilities,
+    expected_shares,
+    noticed_ranks,
+    simultaneous_band,
+    uniformity_p_value,
+)
 
 LEAST = 1.0 / (_SIMULATIONS + 1)
 """The smallest p-value there is."""
@@ -120,6 +129,66 @@ def test_order_does_not_matter_and_numbers_are_the_same_again():
     _null.cache_clear()
     assert uniformity_p_value(ranks[::-1], 4) == first
     assert uniformity_p_value(list(map(int, ranks)), 4) == first
+
+
+# ---- what is noticed
+
+
+def test_ranks_of_right_posteriors_have_one_probability():
+    np.testing.assert_allclose(_rank_probabilities(99, 0.0, 1.0), 0.01, rtol=1e-12)
+    np.testing.assert_allclose(_rank_probabilities(9, 0.3, 2.0), _rank_probabilities(9, -0.3, 2.0)[::-1], rtol=1e-12)
+
+
+def test_rank_probabilities_of_one_draw():
+    """The truth is the larger one with Φ(shift / √(1 + scale²)), as the difference of two normal numbers is normal."""
+    for shift, scale in ((0.7, 1.0), (-0.4, 2.5), (1.1, 0.3)):
+        found = _rank_probabilities(1, shift, scale)
+        np.testing.assert_allclose(found[1], ndtr(shift / math.hypot(1.0, scale)), rtol=1e-10)
+        np.testing.assert_allclose(found.sum(), 1.0, rtol=1e-12)
+
+
+def test_power_of_a_single_rank_is_a_sum():
+    """Over the ranks whose p value is small enough."""
+    law = _rank_probabilities(99, 1.5, 1.0)
+    for level in (0.03, 0.1, 0.5):
+        expected = sum(law[rank] for rank in range(100) if uniformity_p_value([rank], 99) <= level)
+        np.testing.assert_allclose(_power(1, law, level), expected, atol=1e-12)
+        assert expected > 0.0
+
+
+def test_power_of_few_ranks_is_a_sum_over_all_of_them():
+    law, level = np.array([0.1, 0.2, 0.3, 0.4]), 0.2
+    sets = np.stack(np.meshgrid(*4 * [np.arange(4)]), axis=-1).reshape(-1, 4)
+    expected = np.sum(np.prod(law[sets], axis=1)[p_values(sets, 3) <= level])
+    np.testing.assert_allclose(_power(4, law, level), expected, atol=1e-12)
+    assert 0.0 < expected < 1.0
+
+
+@pytest.mark.parametrize("kind", ["shift", "narrow", "wide"])
+def test_what_is_noticed_is_noticed_as_often_in_simulation(kind):
+    """Of normal posteriors with 99 draws each; false alarm 1e-6 each."""
+    count, level, power, sets = 60, 1e-3, 0.9, 1000
+    error = getattr(noticed_ranks(count, 99, level, power), kind)
+    shift, scale = {"shift": (error, 1.0), "narrow": (0.0, error), "wide": (0.0, 1.0 / error)}[kind]
+    rng = np.random.default_rng(8)
+    truths = shift + scale * rng.normal(size=(sets, count))
+    found = p_values(rng.binomial(99, ndtr(truths)), 99)  # the number of draws below a truth
+    assert abs(np.mean(found <= level) - power) <= five_errors(power, sets)
+
+
+def test_more_ranks_notice_less():
+    noticed = np.array([noticed_ranks(count, 99, 1e-3, 0.9) for count in (60, 100, 200)])
+    assert np.all(np.diff(noticed, axis=0) < 0.0)
+    assert np.all(noticed[:, 1:] > 1.0)
+
+
+def test_what_is_noticed_by_none():
+    """With 20 ranks posteriors can be as wide as they like; and no p value is below that of all simulations."""
+    few = noticed_ranks(20, 99, 1e-3, 0.9)
+    assert few.shift > 1.0
+    assert few.narrow > 2.0
+    assert np.isnan(few.wide)
+    assert np.isnan(noticed_ranks(60, 99, 0.5 * LEAST, 0.9)).all()
 
 
 # ---- the band itself

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import importlib
 import json
+import signal
 
 import pytest
+import typer
 import xarray as xr
 from typer.testing import CliRunner
 
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.cli.app import app
+from tactile_bayes.cli.interrupts import going_on
+
+making = importlib.import_module("tactile_bayes.calibration.replicate")
 
 QUICK = ("--as-stated", "--drive-step", "8", "--workers", "1", "-q")
 
@@ -87,6 +92,86 @@ def test_a_world_is_told_and_kept(tmp_path, monkeypatch):
     words = json.loads((tmp_path / REPLICATES.file).read_text(encoding="utf-8"))["experiment"]
     assert [(world.friction, tuple(world.base_shift)) for world in made] == [(0.3, (0.01, -0.02))]
     assert (words["world_friction"], words["world_base_shift"]) == ("0.3", "(0.01, -0.02)")
+
+
+# ---- one replicate again
+
+
+def fail(*arguments, **options):
+    raise ZeroDivisionError("nothing left")
+
+
+def test_a_replicate_again_is_the_one_of_the_run(done):
+    out, _ = done
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    result = call("--out", out, "--replicates", 2, "--replicate", 1, *QUICK)
+    assert result.exit_code == 0, result.output
+    row = json.loads((out / REPLICATES.file).read_text(encoding="utf-8"))["replicates"][1]
+    lines = result.stdout.splitlines()
+    assert lines[0] == f"Replicate 1 is done: {row['message']}."
+    said = {line.split()[0]: line.split()[1:] for line in lines[1:] if line}
+    for name, rank in row["ranks"].items():
+        assert said[name][-1] == str(rank)
+    numbers = {name: value for name, value in row["numbers"].items() if name != "seconds" and value is not None}
+    assert {name: said[name] for name in numbers} == {name: [f"{value:.6g}"] for name, value in numbers.items()}
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_a_replicate_again_as_json(done):
+    out, _ = done
+    result = call("--out", out, "--replicate", 0, "--json", *QUICK)
+    told = json.loads(result.stdout)
+    row = json.loads((out / REPLICATES.file).read_text(encoding="utf-8"))["replicates"][0]
+    assert (told["number"], told["lost"], told["ranks"], told["message"]) == (0, False, row["ranks"], row["message"])
+    assert list(told["truth"]) == ["a", "q", "x_c", "noise_scale"]
+
+
+def test_a_lost_replicate_is_said_to_be(tmp_path, monkeypatch):
+    monkeypatch.setattr(making, "sampled", fail)
+    result = call("--out", tmp_path / "out", "--replicate", 3, *QUICK)
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert lines[0] == "Replicate 3 was lost: ZeroDivisionError: nothing left. --debug shows where."
+    assert [line.split()[0] for line in lines[3:7]] == ["a", "q", "x_c", "noise_scale"]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [("calibrate", "--debug"), ("--debug", "calibrate")])
+def test_debug_lets_its_error_through(tmp_path, monkeypatch, words):
+    monkeypatch.setattr(making, "sampled", fail)
+    options = ("--out", tmp_path, "--replicate", 3, *QUICK)
+    result = CliRunner().invoke(app, [*words, *map(str, options)])
+    assert result.exit_code == 1
+    assert "Traceback (most recent call last)" in result.stderr
+    assert "in make_replicate" in result.stderr
+    assert result.stderr.splitlines()[-1] == "tactile-bayes: unexpected error, ZeroDivisionError: nothing left"
+
+
+def test_lost_replicates_end_no_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(making, "sampled", fail)
+    result = call("--out", tmp_path, "--replicates", 2, *QUICK)
+    assert result.exit_code == 0, result.output
+    assert "2 lost, and counted as not holding: 0, 1 (ZeroDivisionError)" in result.stdout
+    assert "add --replicate 0 --debug to the command" in result.stdout
+    told = json.loads(call("--out", tmp_path, "--replicates", 2, "--json", *QUICK).stdout)
+    assert (told["conclusion"], told["lost"], told["claims"]) == ("too few", 2, [])
+
+
+def test_a_termination_that_the_sampler_answers_is_still_one():
+    """It ends with the code of one, though what reaches the command is an interrupt of the sampler's own."""
+
+    def sampler():
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt("interrupted while sampling replicate 3") from None
+
+    with pytest.raises(typer.Exit) as ended, going_on(lambda: "3 of 5 replicates are there"):
+        sampler()
+    assert ended.value.exit_code == 143
+
+
+# ---- refusals
 
 
 @pytest.mark.parametrize(

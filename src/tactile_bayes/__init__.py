@@ -28,6 +28,7 @@ _HOMES = {
     "SamplerSettings": "inference.ensembles",
     "World": "calibration.world",
     "calibrate": "calibration.calibrate",
+    "calibration_replicate": "calibration.calibrate",
     "check_record": "uncertainty.record_check",
     "compare_families": "uncertainty.family_comparison",
     "contact_moments": "uncertainty.contact_moments",
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from tactile_bayes import paper_figures as paper_figures
     from tactile_bayes import plotting as plotting
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
+    from tactile_bayes.calibration.calibrate import calibration_replicate as calibration_replicate
     from tactile_bayes.calibration.world import World as World
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour

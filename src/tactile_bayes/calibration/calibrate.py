@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -14,18 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ledger import REPLICATES
-from tactile_bayes.calibration.replicate import replicate
+from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.calibration.world import World
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.ledger import TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.ledger import Ledger, TaskProgress, keep_outcomes, open_ledger
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rod import Rod
 
-__all__ = ["calibrate", "experiment_of"]
+__all__ = ["calibrate", "calibration_replicate", "experiment_of"]
 
 Floats = NDArray[np.float64]
 
@@ -65,6 +65,9 @@ def calibrate(
     calibration: Talts et al. 2018, arXiv:1804.06788), and what is stated with 90 % probability holds in nine of ten
     replicates. The other way round, ranks that are not uniform prove that sampler, likelihood or prior are wrong; and
     with a `world` that differs from what inference assumes they show what becomes of the intervals there.
+
+    An error in a replicate does not end the run: the replicate is lost, counts as one in which nothing holds, and is
+    made again, alone, by `calibration_replicate`. An interrupt ends the run.
 
     Parameters
     ----------
@@ -117,14 +120,23 @@ def calibrate(
             2022, doi 10.1007/s11222-022-10090-6).
         coverage, coverage_error, coverage_replicates (claim)
             Share in which what is stated holds, its standard error, and of how many: pointwise and simultaneous bands
-            of the contour in the gap and beside it, contact regions, the predicted angle of snap-off.
+            of the contour in the gap and beside it, contact regions, the predicted angle of snap-off. It holds in no
+            replicate that is lost.
+        noticed_below, noticed_above (claim)
+            Coverages below and above that stated that would have been called a fault with the probability ``power``,
+            by the binomial distribution; NaN where there is none.
         pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
         median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,
-        effective_draws, evaluations, seconds, message (replicate)
-            Of each; misfit_probability and axial_score, of single samples, only where a `world` is given.
+        effective_draws, evaluations, seconds, message, traceback (replicate)
+            Of each; misfit_probability and axial_score, of single samples, only where a `world` is given. The message
+            of a replicate that is lost is its error, and only it has a traceback.
 
-        Attributes: verdict, in words; calibrated (0 or 1); false_alarm, the probability, at most, that right posteriors
-        are not called so, and level, the p-value below which a single quantity or claim is at fault; the experiment.
+        Attributes: verdict, in words; conclusion, "calibrated", "not calibrated", "undecided" (more than 1 % of the
+        replicates are lost, or more than 5 % did not converge) or "too few"; calibrated (0 or 1); lost and
+        not_converged, how many; false_alarm, the probability, at most, that right posteriors are not called so, and
+        level, the p-value below which a single quantity or claim is at fault; the experiment. The smallest errors of
+        normal posteriors that their ranks would have shown with the probability power: noticed_shift, in standard
+        deviations, noticed_narrow and noticed_wide, factors by which these are too small or too large.
 
     Raises
     ------
@@ -132,8 +144,6 @@ def calibrate(
         If an argument is impossible.
     CalibrationError
         If `out` holds replicates of another experiment, or is being worked on.
-    ReachError
-        If the rod hardly ever reaches a contour of the prior.
     TaskError
         If processes died over a replicate again and again, or cannot begin.
 
@@ -172,24 +182,67 @@ def calibrate(
     return summary(experiment, kept)
 
 
+def calibration_replicate(
+    number: int, *, out: str | os.PathLike[str] | None = None, throw: bool = True, **options: Any
+) -> Replicate:
+    """Make one replicate of a calibration again, alone: the same record, the same posterior, or the same error.
+
+    Parameters
+    ----------
+    number : int
+        Of the replicate, from 0 up.
+    out : path-like, optional
+        Folder of the calibration, to be sure that it is the same one; nothing is written.
+    throw : bool
+        Whether the error of a replicate that is lost is raised; else it is in the outcome.
+    options
+        What is simulated and inferred, as `calibrate` was given it: all but `replicates`, `workers`, `scheduler` and
+        `progress`.
+
+    Returns
+    -------
+    Replicate
+        With ``outcome``, ``truth``, ``measured`` and ``posterior``.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is impossible.
+    CalibrationError
+        If `out` holds replicates of another experiment.
+
+    Examples
+    --------
+    >>> from scipy import stats
+    >>> again = calibration_replicate(1, nuisances=[], priors={"a": stats.uniform(0.4, 0.4)}, seed=1)
+    >>> list(again.truth), "posterior" in again.posterior
+    (['a', 'q', 'x_c', 'noise_scale'], True)
+    """
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 0:
+        raise ParameterError(f"number of the replicate is {number!r}: give a whole number from 0 up")
+    experiment = experiment_of(**options)
+    Ledger(experiment.words, None if out is None else Path(out), REPLICATES)  # refuses that of another experiment
+    return make_replicate(experiment, int(number), throw=throw)
+
+
 def experiment_of(
     *,
     seed: int,
-    family: str,
-    load_cell: LoadCell | None,
-    rod: Rod | None,
-    base: tuple[float, float] | Sequence[tuple[float, float]],
-    direction: str,
-    drive_angles: ArrayLike | None,
-    priors: Mapping[str, Prior] | None,
-    nuisances: Sequence[str],
-    friction: float,
-    events: bool,
-    settings: SamplerSettings | None,
-    probability: float,
-    world: World | None,
+    family: str = "parabola",
+    load_cell: LoadCell | None = None,
+    rod: Rod | None = None,
+    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
+    direction: str = "both",
+    drive_angles: ArrayLike | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    nuisances: Sequence[str] = STANDARD,
+    friction: float = 0.0,
+    events: bool = True,
+    settings: SamplerSettings | None = None,
+    probability: float = 0.9,
+    world: World | None = None,
 ) -> Experiment:
-    """What `calibrate` is asked for, as it says."""
+    """What `calibrate` is asked for, as it says, and by the same defaults."""
     kinds = {"load_cell": LoadCell, "rod": Rod, "settings": SamplerSettings, "world": World, "priors": Mapping}
     given = {"load_cell": load_cell, "rod": rod, "settings": settings, "world": world, "priors": priors}
     for name, kind in kinds.items():

@@ -14,7 +14,8 @@ __all__ = ["REPLICATES"]
 
 
 def _encode(outcome: Outcome) -> dict[str, Any]:
-    return {"ranks": dict(outcome.ranks), "numbers": _without_nan(outcome.numbers), "message": outcome.message}
+    row = {"ranks": dict(outcome.ranks), "numbers": _without_nan(outcome.numbers), "message": outcome.message}
+    return row | ({"traceback": outcome.traceback} if outcome.traceback else {})
 
 
 def _decode(row: dict[str, Any]) -> Outcome:
@@ -22,6 +23,7 @@ def _decode(row: dict[str, Any]) -> Outcome:
         {name: int(rank) for name, rank in row["ranks"].items()},
         {name: math.nan if v is None else float(v) for name, v in row["numbers"].items()},
         str(row["message"]),
+        str(row.get("traceback", "")),  # of older ledgers none was kept
     )
 
 

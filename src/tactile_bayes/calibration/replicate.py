@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.calibration.world import World
 from tactile_bayes.errors import InferenceError, TactileBayesError
-from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.uncertainty.band import contour_band
@@ -22,7 +23,7 @@ from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
 from tactile_bayes.uncertainty.record_check import check_record
 
-__all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "replicate"]
+__all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "Replicate", "make_replicate", "replicate"]
 
 Floats = NDArray[np.float64]
 
@@ -50,35 +51,98 @@ class Outcome(NamedTuple):
     numbers: Mapping[str, float]
     """Shares, widths, scores and times by name."""
     message: str
-    """How sampling ended, or why there is no posterior."""
+    """How sampling ended, or the error over which the replicate was lost."""
+    traceback: str = ""
+    """Of that error; empty where there was none."""
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether an error ended the replicate before the truth had its ranks."""
+        return not self.ranks
+
+
+class Replicate(NamedTuple):
+    """One replicate, with all that was made on the way, as far as it came.
+
+    Attributes
+    ----------
+    number : int
+    outcome : Outcome
+        What a calibration keeps of it: ``ranks``, ``numbers``, ``message`` and ``traceback``.
+    truth : mapping of str to float
+        Parameters that were drawn, by name; empty if none were.
+    measured : xr.Dataset, optional
+        The record.
+    posterior : xr.DataTree, optional
+        What was inferred from it.
+    """
+
+    number: int
+    outcome: Outcome
+    truth: Mapping[str, float]
+    measured: xr.Dataset | None
+    posterior: xr.DataTree | None
 
 
 def replicate(task: tuple[Experiment, int]) -> Outcome:
-    """Simulate record `number` of an experiment, infer from it, and compare."""
-    experiment, number = task
+    """Outcome of one replicate of an experiment; an error is an outcome as well."""
+    return make_replicate(*task).outcome
+
+
+def make_replicate(experiment: Experiment, number: int, *, throw: bool = False) -> Replicate:
+    """Simulate record `number` of an experiment, infer from it, and compare.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    number : int
+    throw : bool
+        Whether an error is raised; else it is the outcome. An interrupt always is.
+    """
     simulated, inferred, picked = np.random.SeedSequence(experiment.seed, spawn_key=(number,)).spawn(3)
-    simulation = simulate(experiment, np.random.default_rng(simulated))
+    simulation: Simulation | None = None
+    result: Sampled | None = None
     began = time.perf_counter()
     try:
+        simulation = simulate(experiment, np.random.default_rng(simulated))
+        began = time.perf_counter()
         problem = experiment.problem_of(simulation.measured)
         result = sampled(problem, seed=inferred, settings=experiment.settings, with_prior=False)
-    except InferenceError as error:
-        return Outcome({}, {"seconds": time.perf_counter() - began}, f"{type(error).__name__}: {error}")
+        seconds = time.perf_counter() - began
+        result.draws.refuse_interrupted(f"replicate {number}")
+        outcome = _compared(experiment, simulation, problem.model, result, np.random.default_rng(picked))
+        outcome = outcome._replace(numbers={"seconds": seconds, **outcome.numbers})
+    except Exception as error:
+        if throw:
+            raise
+        numbers = {"seconds": time.perf_counter() - began}
+        outcome = Outcome({}, numbers, f"{type(error).__name__}: {error}", traceback.format_exc())
+    return Replicate(
+        number,
+        outcome,
+        {} if simulation is None else simulation.truth,
+        None if simulation is None else simulation.measured,
+        None if result is None else result.tree,
+    )
+
+
+def _compared(
+    experiment: Experiment, simulation: Simulation, model: ContourModel, result: Sampled, rng: np.random.Generator
+) -> Outcome:
+    """A posterior beside the truth."""
+    tree, draws = result.tree, result.draws
     numbers = {
-        "seconds": time.perf_counter() - began,
-        "converged": float(result.draws.converged),
-        "effective_draws": float(np.min([result.draws.ess_bulk, result.draws.ess_tail])),
-        "evaluations": float(result.draws.evaluations),
+        "converged": float(draws.converged),
+        "effective_draws": float(np.min([draws.ess_bulk, draws.ess_tail])),
+        "evaluations": float(draws.evaluations),
     }
-    rng = np.random.default_rng(picked)
-    tree = result.tree
-    ranks = _ranks(problem.model, result.draws.samples, simulation.truth, experiment.is_of_family, rng)
+    ranks = _ranks(model, draws.samples, simulation.truth, experiment.is_of_family, rng)
     ranks |= _ranks_of_events(tree, simulation, rng)
     numbers |= _bands(tree, simulation, experiment.probability)
     numbers |= _snap_offs(tree, simulation, experiment.probability)
-    numbers |= _contacts(problem.model, result.draws.samples, simulation, experiment, rng)
+    numbers |= _contacts(model, draws.samples, simulation, experiment, rng)
     numbers |= _checks(tree, simulation, experiment)
-    return Outcome(ranks, numbers, result.draws.message)
+    return Outcome(ranks, numbers, draws.message)
 
 
 def _ranks(

@@ -1,20 +1,27 @@
-"""What replicates say together: uniformity of ranks, coverage, how often a check raises alarm; and the verdict."""
+"""What replicates say together: uniformity of ranks, coverage, power, how often a check raises alarm; the verdict."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.special import rel_entr
 
+from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverage
 from tactile_bayes.calibration.experiment import Experiment
-from tactile_bayes.calibration.ranks import uniformity_p_value
+from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniformity_p_value
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
+from tactile_bayes.calibration.verdict import (
+    FEWEST,
+    POWER,
+    Tally,
+    conclusion,
+    lost_in_words,
+    power_in_words,
+    statement,
+)
 
 __all__ = ["CLAIMS", "FALSE_ALARM", "summary"]
 
@@ -32,14 +39,6 @@ CLAIMS = {
     "snap_off": "angle of snap-off",
 }
 """What is stated with a probability, and is to hold with that."""
-
-_MARGIN = 0.01
-"""What quantiles of some hundred draws may miss of a probability."""
-
-_FEWEST = 20
-"""Replicates below which nothing is said of uniformity or coverage."""
-
-_MOST_FAILED = 0.01
 
 
 class _Fault(NamedTuple):
@@ -59,9 +58,16 @@ def summary(experiment: Experiment, outcomes: Mapping[int, Outcome]) -> xr.Datas
     columns = list(dict.fromkeys(name for row in rows for name in row.numbers))
     values = {name: np.array([row.numbers.get(name, np.nan) for row in rows]) for name in columns}
     found = [name for name in CLAIMS if name in values]
+    is_lost = np.array([row.is_lost for row in rows])
+    for name in found:
+        values[name][is_lost] = 0.0
     shares = {name: values[name][np.isfinite(values[name])] for name in found}
     coverage = [float(s.mean()) if s.size else np.nan for s in shares.values()]
     errors = [float(s.std(ddof=1) / np.sqrt(s.size)) if s.size > 1 else np.nan for s in shares.values()]
+    # Shared by all that is looked at.
+    tested = int(np.isfinite(p_values).sum()) + sum(s.size >= FEWEST for s in shares.values())
+    level = FALSE_ALARM / max(tested, 1)
+    noticed = [_noticed_coverage(s, experiment.probability, level) for s in shares.values()]
     data = xr.Dataset(
         {
             "ranks": (("replicate", "quantity"), ranks, {"long_name": f"rank of the truth among {DRAWS} draws"}),
@@ -69,37 +75,55 @@ def summary(experiment: Experiment, outcomes: Mapping[int, Outcome]) -> xr.Datas
             "coverage": ("claim", coverage),
             "coverage_error": ("claim", errors),
             "coverage_replicates": ("claim", [s.size for s in shares.values()]),
+            "noticed_below": ("claim", [below for below, _ in noticed]),
+            "noticed_above": ("claim", [above for _, above in noticed]),
             "message": ("replicate", [row.message for row in rows]),
+            "traceback": ("replicate", [row.traceback for row in rows]),
             **{name: ("replicate", of_name) for name, of_name in values.items()},
         },
         coords={"replicate": numbers, "quantity": names, "claim": found},
     )
-    failed = Counter(row.message.split(":")[0] for row in rows if not row.ranks)
-    with_posterior = sum(1 for row in rows if row.ranks)
-    converged = values.get("converged", np.empty(0))
-    # Shared by all that is looked at.
-    tested = int(np.isfinite(data.rank_p_value).sum()) + int((data.coverage_replicates >= _FEWEST).sum())
-    level = FALSE_ALARM / max(tested, 1)
-    faults = _faults(data, experiment.probability, level)
-    enough = with_posterior >= _FEWEST
-    is_calibrated = enough and not faults and sum(failed.values()) <= _MOST_FAILED * len(rows)
+    unconverged = int(np.sum(data.converged.values == 0.0)) if "converged" in data else 0
+    tally = Tally(len(rows), int(is_lost.sum()), unconverged)
+    # Where many are lost, their share is what the verdict states, and faults are looked for in what remains.
+    judged = data if tally.has_few_lost else data.isel(replicate=~is_lost)
+    faults = _faults(judged, experiment.probability, level)
+    concluded = conclusion(tally, has_faults=bool(faults))
+    left = len(rows) - tally.lost
+    ranks_noticed = noticed_ranks(left, DRAWS, level, POWER) if left >= FEWEST else NoticedRanks(*3 * [np.nan])
     data.attrs = {
         **experiment.words,
-        "verdict": _verdict(data, experiment, faults, failed, enough),
-        "calibrated": int(is_calibrated),
+        "calibrated": int(concluded == "calibrated"),
+        "conclusion": concluded,
         "false_alarm": FALSE_ALARM,
         "level": level,
-        "replicates": len(rows),
-        "without_posterior": sum(failed.values()),
-        "not_converged": int(np.sum(converged == 0.0)),
+        "power": POWER,
+        **{f"noticed_{name}": value for name, value in ranks_noticed._asdict().items()},
+        "replicates": tally.replicates,
+        "lost": tally.lost,
+        "not_converged": tally.unconverged,
         "probability": experiment.probability,
     }
+    reason = _uniform_and_covered(data) if concluded == "calibrated" else "; ".join(fault.words for fault in faults)
+    lost = {number: row.message for number, row in zip(numbers, rows, strict=True) if row.is_lost}
+    data.attrs["verdict"] = " ".join([statement(concluded, tally, reason), *_further(data, ranks_noticed, lost)])
     return data
+
+
+def _noticed_coverage(shares: Floats, probability: float, level: float) -> tuple[float, float]:
+    if shares.size < FEWEST:
+        return np.nan, np.nan
+    return noticed_coverage(shares.size, probability, level, POWER, is_whole=_is_whole(shares))
+
+
+def _is_whole(shares: Floats) -> bool:
+    """Whether a claim held or failed as a whole in each replicate."""
+    return bool(np.isin(shares, (0.0, 1.0)).all())
 
 
 def _uniformity(ranks: NDArray[np.intp]) -> float:
     known = ranks[ranks >= 0]
-    return uniformity_p_value(known, DRAWS) if known.size >= _FEWEST else np.nan
+    return uniformity_p_value(known, DRAWS) if known.size >= FEWEST else np.nan
 
 
 def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
@@ -109,34 +133,15 @@ def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
         if p_value <= level:
             faults.append(_Fault(float(p_value), f"{name}: {_off(data['ranks'].sel(quantity=name).values, str(name))}"))
     for name in data.claim.values:
-        of_claim = data.sel(claim=name)
-        if of_claim.coverage_replicates < _FEWEST:
+        shares = data[str(name)].values
+        shares = shares[np.isfinite(shares)]
+        if shares.size < FEWEST:
             continue
-        held = data[str(name)].values
-        p_value = _coverage_p_value(held[np.isfinite(held)], probability)
+        share = float(shares.mean())
+        p_value = float(coverage_p_value(share, shares.size, probability, is_whole=_is_whole(shares)))
         if p_value <= level:
-            share = float(of_claim.coverage)
             faults.append(_Fault(p_value, f"{CLAIMS[str(name)]}: {share:.0%} hold, not {probability:.0%}"))
     return sorted(faults)
-
-
-def _coverage_p_value(held: Floats, probability: float) -> float:
-    """At most the probability that shares, one for each replicate, have a mean so far from what they are to have.
-
-    Exact where everything holds or not; else by the bound for any numbers between 0 and 1 (Hoeffding 1963, doi
-    10.1080/01621459.1963.10500830, theorem 1), as places of one replicate are held together.
-    """
-    share = float(held.mean())
-    limit = float(np.clip(share, probability - _MARGIN, min(probability + _MARGIN, 1.0)))
-    if share == limit or not 0.0 < limit < 1.0:
-        return 1.0
-    if np.isin(held, (0.0, 1.0)).all():
-        count = int(held.sum())
-        law = stats.binom(held.size, limit)
-        one_sided = float(law.sf(count - 1) if share > limit else law.cdf(count))
-    else:
-        one_sided = float(np.exp(-held.size * (rel_entr(share, limit) + rel_entr(1.0 - share, 1.0 - limit))))
-    return min(1.0, 2.0 * one_sided)
 
 
 def _off(ranks: NDArray[np.intp], name: str) -> str:
@@ -151,36 +156,33 @@ def _off(ranks: NDArray[np.intp], name: str) -> str:
     return f"posteriors are too {'narrow' if spread > 0.0 else 'wide'}"
 
 
-def _verdict(data: xr.Dataset, experiment: Experiment, faults: list[_Fault], failed: Counter[str], enough: bool) -> str:
-    count, probability = data.sizes["replicate"], experiment.probability
-    said = []
-    if not enough:
-        said.append(f"Too few replicates to judge: {count - failed.total()} posteriors, and {_FEWEST} are the least.")
-    elif faults:
-        said.append(f"Not calibrated, over {count} replicates: " + "; ".join(fault.words for fault in faults) + ".")
-    else:
-        least = float(np.nanmin(data.rank_p_value))
-        said.append(
-            f"Calibrated, as far as {count} replicates tell: ranks of the truth are uniform (smallest p of "
-            f"{data.sizes['quantity']} quantities {least:.2g}), and what is stated with {probability:.0%} holds as "
-            "often."
-        )
-    held = [
-        f"{CLAIMS[str(name)]} {float(data.coverage.sel(claim=name)):.1%} ± "
-        f"{float(data.coverage_error.sel(claim=name)):.1%}"
-        for name in data.claim.values
-        if data.coverage_replicates.sel(claim=name) >= _FEWEST
-    ]
-    if held:
+def _uniform_and_covered(data: xr.Dataset) -> str:
+    """Why posteriors without a fault are called calibrated."""
+    least, stated = float(np.nanmin(data.rank_p_value)), data.attrs["probability"]
+    return (
+        f"ranks of the truth are uniform (smallest p of {data.sizes['quantity']} quantities {least:.2g}), and what is "
+        f"stated with {stated:.0%} holds as often"
+    )
+
+
+def _further(data: xr.Dataset, ranks_noticed: NoticedRanks, lost: Mapping[int, str]) -> list[str]:
+    """What a verdict goes on with: coverage, power, the check, what did not converge, what was lost."""
+    said, probability = [], data.attrs["probability"]
+    judged = data.sel(claim=data.coverage_replicates >= FEWEST)
+    below = above = np.nan
+    if judged.sizes["claim"]:
+        shares = zip(judged.claim.values, judged.coverage.values, judged.coverage_error.values, strict=True)
+        held = [f"{CLAIMS[str(name)]} {share:.1%} ± {error:.1%}" for name, share, error in shares]
         said.append(f"Of those with {probability:.0%} hold: {', '.join(held)}.")
+        # Of the claim by which the least is noticed; NaN if there is one by which nothing is.
+        below, above = float(np.min(judged.noticed_below.values)), float(np.max(judged.noticed_above.values))
+    if np.isfinite([below, *ranks_noticed]).any():
+        said.append(power_in_words(probability, below, above, ranks_noticed))
     if "check_passed" in data:
         passed = data.check_passed.values[np.isfinite(data.check_passed.values)]
         said.append(f"The check of the record raises alarm in {np.mean(passed == 0.0):.1%} of {passed.size}.")
-    unconverged = int(np.sum(data.converged.values == 0.0)) if "converged" in data else 0
-    if unconverged:
-        said.append(f"{unconverged} did not converge, and are counted like all others.")
-    if failed:
-        said.append(f"{failed.total()} had no posterior ({', '.join(failed)}), and are not counted.")
-    if enough and not faults and failed.total() > _MOST_FAILED * count:
-        said.append("These are too many to call it calibrated.")
-    return " ".join(said)
+    if data.attrs["not_converged"]:
+        said.append(f"{data.attrs['not_converged']} did not converge, and are counted like all others.")
+    if lost:
+        said.append(lost_in_words(lost))
+    return said

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.answer import Json, columns_of, print_json
+from tactile_bayes.cli.answer import Json, columns_of, print_json, print_sentences, print_table, table_of
 from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from tactile_bayes.calibration.replicate import Replicate
     from tactile_bayes.calibration.world import World
     from tactile_bayes.ledger import TaskProgress
     from tactile_bayes.runs.calibration import CalibrationRun
@@ -36,6 +37,7 @@ __all__ = ["calibrate"]
 
 
 def calibrate(
+    ctx: typer.Context,
     out: Out,
     family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
     replicates: Annotated[int, typer.Option(help="How many records.", min=1)] = 200,
@@ -61,19 +63,47 @@ def calibrate(
     workers: Workers = None,
     scheduler: Scheduler = None,
     seed: Seed = 1,
+    replicate: Annotated[
+        int | None,
+        typer.Option(
+            help="Make this replicate alone, once more, and print what comes of it; nothing is written.", min=0
+        ),
+    ] = None,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where an error comes from; with --replicate, the one that lost it.")
+    ] = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Show whether intervals hold: simulate records, infer from each, and compare with the truth.
 
-    A run that was stopped goes on by the same command; with more replicates it begins with those that are there.
+    A run that was stopped goes on by the same command; with more replicates it begins with those that are there. An
+    error in a replicate does not end the run, but counts against it; --replicate shows which error it was.
     """
     import numpy as np
 
     from tactile_bayes.runs.calibration import calibrate_into
 
     refuse_both(workers, scheduler)
-    rod = rod_asked(length, flexural_rigidity, diameter)
+    common = ctx.find_root().params
+    common["debug"] = common["debug"] or debug
+    experiment: dict[str, Any] = {
+        "family": family,
+        "load_cell": load_cell_asked(force_noise, moment_noise),
+        "rod": rod_asked(length, flexural_rigidity, diameter),
+        "base": [numbers_asked(pivot, "--base", 2) for pivot in base or ["0,0"]],
+        "drive_angles": np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
+        "friction": friction,
+        "nuisances": nuisances_asked(nuisance, as_stated),
+        "world": _world(world or []),
+        "probability": probability,
+        "seed": seed,
+    }
+    if replicate is not None:
+        from tactile_bayes.calibration.calibrate import calibration_replicate
+
+        _print_replicate(calibration_replicate(replicate, out=out, throw=common["debug"], **experiment), json)
+        return
     last: TaskProgress | None = None
 
     def have() -> str:
@@ -89,24 +119,16 @@ def calibrate(
 
         run = calibrate_into(
             out,
-            family=family,
             replicates=replicates,
-            load_cell=load_cell_asked(force_noise, moment_noise),
-            rod=rod,
-            base=[numbers_asked(pivot, "--base", 2) for pivot in base or ["0,0"]],
-            drive_angles=np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
-            friction=friction,
-            nuisances=nuisances_asked(nuisance, as_stated),
-            world=_world(world or []),
-            probability=probability,
             workers=workers,
             scheduler=scheduler,
-            seed=seed,
             progress=note,
+            **experiment,
         )
     if json:
         found = run.calibration
-        told = {"words": [found.attrs["verdict"]], "probability": found.attrs["probability"]}
+        names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
+        told = {"words": [found.attrs["verdict"]], **{name: found.attrs[name] for name in names}}
         print_json({**told, "claims": columns_of(found, "claim"), "files": run.files})
         return
     _print_run(run)
@@ -137,6 +159,27 @@ def _print_run(run: CalibrationRun) -> None:
     console.print()
     for what, path in run.files.items():
         console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)
+
+
+def _print_replicate(made: Replicate, json: bool) -> None:
+    outcome = made.outcome
+    if json:
+        print_json({"number": made.number, "lost": outcome.is_lost, "truth": made.truth, **outcome._asdict()})
+        return
+    how = f"was lost: {outcome.message}. --debug shows where" if outcome.is_lost else f"is done: {outcome.message}"
+    print_sentences([f"Replicate {made.number} {how}.", ""])
+    quantities = table_of(["quantity", "truth", "rank"], left=["quantity"])
+    for name in dict.fromkeys([*made.truth, *outcome.ranks]):
+        truth = f"{made.truth[name]:.6g}" if name in made.truth else ""
+        quantities.add_row(name, truth, str(outcome.ranks.get(name, "")))
+    numbers = table_of(["number", "value"], left=["number"])
+    for name, value in outcome.numbers.items():
+        if value == value:  # NaN is what could not be had
+            numbers.add_row(name, f"{value:.6g}")
+    for table in (quantities, numbers):
+        if table.row_count:
+            print_table(table)
+            print_sentences([""])
 
 
 def _table(found: xr.Dataset) -> object:

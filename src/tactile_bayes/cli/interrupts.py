@@ -86,6 +86,9 @@ def _interrupts_kept() -> Iterator[Callable[[], object]]:
         signal.signal(number, interrupt)
     try:
         yield raise_lost
+    except KeyboardInterrupt:  # it may be another that stands for the one that came
+        raise_lost()
+        raise
     finally:
         for number in ours:
             signal.signal(number, usual[number])

@@ -52,7 +52,7 @@ def calibrate_into(out: str | os.PathLike[str], **options: Any) -> CalibrationRu
 
     Raises
     ------
-    ParameterError, CalibrationError, ReachError, TaskError
+    ParameterError, CalibrationError, TaskError
         As `calibrate`.
     """
     folder = Path(out)

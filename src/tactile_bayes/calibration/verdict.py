@@ -1,0 +1,94 @@
+"""The verdict of a calibration: what may be concluded, and sentences on that, on its power, and on what was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tactile_bayes.calibration.ranks import NoticedRanks
+
+__all__ = ["FEWEST", "POWER", "Conclusion", "Tally", "conclusion", "lost_in_words", "power_in_words", "statement"]
+
+Conclusion = Literal["calibrated", "not calibrated", "undecided", "too few"]
+
+FEWEST = 20
+"""Replicates below which nothing is said of uniformity or coverage."""
+
+POWER = 0.9
+"""Probability with which the faults would have been noticed that a verdict names."""
+
+_MOST_LOST = 0.01
+"""Share of lost replicates up to which posteriors can be called calibrated: by as much coverage may be off."""
+
+_MOST_UNCONVERGED = 0.05
+"""Share of unconverged runs up to which it is posteriors that are judged, and not the limit of steps."""
+
+_NAMED = 5
+"""Lost replicates whose numbers are stated."""
+
+
+@dataclass(frozen=True)
+class Tally:
+    """How many replicates there are, how many of them are lost, and how many did not converge."""
+
+    replicates: int
+    lost: int = 0
+    unconverged: int = 0
+
+    @property
+    def has_few_lost(self) -> bool:
+        return self.lost <= _MOST_LOST * self.replicates
+
+    @property
+    def has_few_unconverged(self) -> bool:
+        return self.unconverged <= _MOST_UNCONVERGED * self.replicates
+
+
+def conclusion(tally: Tally, *, has_faults: bool) -> Conclusion:
+    """What may be concluded: a fault stands whatever was lost; that there is none counts if nearly all was judged."""
+    if tally.replicates < FEWEST:
+        return "too few"
+    if has_faults:
+        return "not calibrated"
+    return "calibrated" if tally.has_few_lost and tally.has_few_unconverged else "undecided"
+
+
+def statement(concluded: Conclusion, tally: Tally, reason: str) -> str:
+    """A conclusion in words; the reason is why posteriors are called calibrated, or not."""
+    count, left = tally.replicates, tally.replicates - tally.lost
+    if concluded == "calibrated":
+        return f"Calibrated, as far as {count} replicates tell: {reason}."
+    if concluded == "not calibrated":
+        return f"Not calibrated, over {count} replicates: {reason}."
+    if concluded == "too few":
+        return f"Too few replicates to judge: {left} posteriors, and {FEWEST} are the least."
+    too_many = [] if tally.has_few_lost else [f"{tally.lost} were lost (at most {_MOST_LOST:.0%} may be)"]
+    if not tally.has_few_unconverged:
+        too_many.append(f"{tally.unconverged} did not converge (at most {_MOST_UNCONVERGED:.0%} may)")
+    rest = "no other fault is found" if left >= FEWEST else f"{left} posteriors are left, and {FEWEST} the least"
+    return f"It cannot be said whether posteriors are right: of {count} replicates {' and '.join(too_many)}; {rest}."
+
+
+def power_in_words(probability: float, below: float, above: float, ranks: NoticedRanks) -> str:
+    """What would have been noticed; NaN stands for nothing of the kind."""
+    bounds = {"at most": below, "at least": above}
+    coverages = [f"{bound} {share:.1%}" for bound, share in bounds.items() if np.isfinite(share)]
+    faults = [f"coverage of {' or '.join(coverages)} in place of {probability:.0%}"] if coverages else []
+    faults += [f"posteriors off by {ranks.shift:.2g} standard deviations"] if np.isfinite(ranks.shift) else []
+    widths = {"narrow": ranks.narrow, "wide": ranks.wide}
+    faults += [f"too {way} by a factor of {factor:.2f}" for way, factor in widths.items() if np.isfinite(factor)]
+    return f"What would have been noticed with a probability of {POWER:.0%}: {', '.join(faults)}."
+
+
+def lost_in_words(messages: Mapping[int, str]) -> str:
+    """How many replicates are lost, the numbers of the first, and how to see why; from their messages by number."""
+    numbers = list(messages)
+    first = ", ".join(map(str, numbers[:_NAMED])) + (", …" if len(numbers) > _NAMED else "")
+    kinds = ", ".join(dict.fromkeys(message.partition(":")[0] for message in messages.values()))
+    return (
+        f"{len(numbers)} lost, and counted as not holding: {first} ({kinds}). To see why, add --replicate {numbers[0]} "
+        f"--debug to the command, or call calibration_replicate({numbers[0]}, …) with the options of calibrate."
+    )

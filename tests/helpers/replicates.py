@@ -1,0 +1,36 @@
+"""Replicates that fail, for processes as well: functions of a module, which patch where they run."""
+
+from __future__ import annotations
+
+import pytest
+
+from tactile_bayes.calibration import replicate as module
+
+__all__ = ["STAGES", "failing"]
+
+STAGES = {"simulate": "of the simulation", "sampled": "of inference", "_snap_offs": "of what comes after"}
+"""Functions that fail in replicates 0, 1 and 2, and what their errors say."""
+
+_REPLICATE = module.replicate
+
+
+class _StrangeError(Exception):
+    """Cannot be made again from its arguments: its class wants two."""
+
+    def __init__(self, one: str, two: str) -> None:
+        super().__init__(f"{one} {two}")
+
+
+def failing(task):
+    """A replicate, where the first three fail, each at another stage, with an error that nobody expects."""
+    number = task[1]
+    if number >= len(STAGES):
+        return _REPLICATE(task)
+    stage, words = list(STAGES.items())[number]
+
+    def fail(*arguments, **options):
+        raise _StrangeError("an error", words)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, stage, fail)
+        return _REPLICATE(task)
