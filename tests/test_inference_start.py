@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.start import best_optimum, gather
+from tactile_bayes.inference.start import gather, optima
 
 DESIGN = np.random.default_rng(1).normal(size=(50, 2))
 TRUE = np.array([3.0, -0.02])
 SPREAD = np.array([10.0, 0.1])
 MIDDLE = TRUE
+
+
+def best_optimum(*problem):
+    return min(optima(*problem), key=lambda found: found.cost)
 
 
 def linear(data):
@@ -69,16 +72,26 @@ def test_the_better_of_two_valleys_is_taken():
         assert best_optimum(residuals, np.array(order), np.ones(1), np.ones(1)).point == pytest.approx(1.0)
 
 
-def test_no_candidate_is_refused():
-    with pytest.raises(InferenceError, match="no contour was found"):
-        best_optimum(linear(np.zeros(50)), np.empty((0, 2)), MIDDLE, SPREAD)
+def test_a_search_from_far_off_is_as_good_as_one_from_near():
+    """Residuals of thousands pull by their squares at first, else forty steps would not lead here."""
+    data = 1e4 * DESIGN @ (TRUE / SPREAD)
+    found = best_optimum(lambda p: data - 1e4 * p / SPREAD @ DESIGN.T, [100.0 * SPREAD], MIDDLE, SPREAD)
+    np.testing.assert_allclose(found.point, TRUE, rtol=1e-6)
+    assert found.fits
+
+
+def test_to_be_far_from_the_prior_costs_its_square():
+    """One datum of ten deviations against a prior as sharp: both give way alike, though data alone may be outliers."""
+    found = best_optimum(lambda p: 10.0 - p / SPREAD[:1], [np.zeros(1)], np.zeros(1), SPREAD[:1])
+    robust = found.residuals[0] / np.sqrt(1.0 + (found.residuals[0] / 2.0) ** 2)
+    assert found.point[0] / SPREAD[0] == pytest.approx(robust, rel=1e-4)
 
 
 COVARIANCE = np.array([[1.0, 0.6], [0.6, 0.5]]) * 1e-4
 
 
 def gaussian(points):
-    return stats.multivariate_normal([1.0, 2.0], COVARIANCE).logpdf(points)
+    return np.atleast_1d(stats.multivariate_normal([1.0, 2.0], COVARIANCE).logpdf(points))
 
 
 def test_a_good_guess_is_kept_and_its_cloud_is_twice_as_wide():
@@ -100,6 +113,18 @@ def test_a_bad_guess_is_mended(width):
     # Nothing hopeless: all within √(2 (12 · 2 + some)) standard deviations, yet at least as wide as the target.
     assert gaussian(good).min() > gaussian(np.array([1.0, 2.0])) - 24.0 - 5.0
     assert np.all(good.std(axis=0) > 0.8 * np.sqrt(np.diag(COVARIANCE)))
+
+
+def test_a_sharp_peak_is_not_left_for_what_lies_around_it():
+    """Nearly all points of a wide cloud are hopeless beside its centre: it shrinks, and does not move away."""
+
+    def sharp(points):
+        apart = np.abs(points - np.array([1.0, 2.0])).max(axis=1)
+        return np.where(apart < 1e-3, gaussian(points), -1e5 - 1e3 * points[:, 0])
+
+    cloud = gather(sharp, np.array([1.0, 2.0]), np.eye(2), np.random.default_rng(1))
+    points = cloud.draw(np.random.default_rng(2), 1000)
+    assert np.mean(sharp(points) > -100.0) > 0.3
 
 
 def test_a_wall_is_respected():

@@ -9,15 +9,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.families import support_of
 from tactile_bayes.inference.nuisances import BIASES
-from tactile_bayes.inference.start import best_optimum
+from tactile_bayes.inference.start import optima
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
 
-__all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optimum_of"]
+__all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +30,8 @@ at an event that is loaded or not holds the search up where it began too far awa
 _SHARP = 0.1
 """Of the angle between the samples beside an event: how far it may be outside for a residual of one."""
 
-_FAR_OFF = 300.0
+_FAR_OFF = 1000.0
+"""Residual of an event that does not happen."""
 
 _FIRM = 2.0
 """Standard deviation of a contact across the contour, over the median one, up to which a contour is fitted to it."""
@@ -45,6 +47,10 @@ class ContourOptimum(NamedTuple):
     """All of the model's."""
     covariance: Floats
     """Roughly theirs in the posterior, of the logarithms of those of the noise."""
+    cost: float
+    """Of robust least squares."""
+    fits: bool
+    """Whether noise as it was guessed explains the record."""
     beyond: str = ""
     """What the record wants and the priors do not allow, where that explains it far better; in words."""
 
@@ -64,7 +70,7 @@ class Brackets(NamedTuple):
         """By how much events, shape (n, strokes, 2), are outside, in widths, shape (n, events)."""
         at = events[:, self.stroke, self.ends]
         missed = np.maximum(self.low - at, 0.0) - np.maximum(at - self.high, 0.0)
-        return np.clip(np.nan_to_num(missed / self.width, nan=_FAR_OFF), -_FAR_OFF, _FAR_OFF)
+        return np.nan_to_num(missed / self.width, nan=_FAR_OFF)
 
 
 def event_brackets(model: ContourModel) -> Brackets:
@@ -85,7 +91,26 @@ def event_brackets(model: ContourModel) -> Brackets:
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
-    """The best of several searches, which begin at Step 2's contacts and at draws from the prior."""
+    """The best of `optima_of`, or the first that explains the record.
+
+    Raises
+    ------
+    InferenceError
+        If there is none.
+    """
+    best: ContourOptimum | None = None
+    for found in optima_of(model, rng):
+        if best is None or found.cost < best.cost:
+            best = found
+        if best.fits:
+            break
+    if best is None:
+        raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
+    return best
+
+
+def optima_of(model: ContourModel, rng: np.random.Generator) -> Iterator[ContourOptimum]:
+    """Where searches end that begin at Step 2's contacts and at draws from the prior, the likeliest first."""
     size = len(model.located)
     deviation, present = model.deviation, model.present
     measured = model.likelihood.measured[:, present] / deviation[present]
@@ -118,27 +143,31 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
         if by_contacts is not None:
             yield np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0))
         costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
-        yield from (candidates[i, :size] for i in np.argsort(costs)[:_CANDIDATES])
+        for i in np.argsort(costs)[:_CANDIDATES]:
+            by_events = next(
+                optima(lambda points: residuals(points)[:, measured.size :], [candidates[i, :size]], *about)
+            )
+            yield by_events.point if brackets.low.size else candidates[i, :size]
 
     ends = np.array([support_of(model.priors[name]) for name in model.located])
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
-    optimum = best_optimum(residuals, starts(), percentiles.mean(axis=0), spread, low, high)
-
-    noise = fitted_noise(model, optimum.residuals[: measured.size].reshape(measured.shape))
+    about = percentiles.mean(axis=0), spread, low, high
     possible = candidates[:, size:]
-    if not np.isfinite(model.log_prior(np.append(optimum.point, noise)[None]))[0]:
-        noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
-    narrow = np.minimum(0.5 * spread / np.sqrt(np.diag(optimum.covariance)), 1.0)
-    covariance = np.zeros((len(model.names), len(model.names)))
-    covariance[:size, :size] = optimum.covariance * np.outer(narrow, narrow)
-    covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
-    beyond = ""
-    if optimum.beyond is not None and optimum.excess > _FAR_BETTER:
-        off = np.flatnonzero((optimum.beyond <= low) | (optimum.beyond >= high))
-        beyond = ", ".join(
-            f"{model.located[i]} = {optimum.beyond[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
-        )
-    return ContourOptimum(np.append(optimum.point, noise), covariance, beyond)
+    for found in optima(residuals, starts(), *about):
+        noise = fitted_noise(model, found.residuals[: measured.size].reshape(measured.shape))
+        if not np.isfinite(model.log_prior(np.append(found.point, noise)[None]))[0]:
+            noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
+        narrow = np.minimum(0.5 * spread / np.sqrt(np.diag(found.covariance)), 1.0)
+        covariance = np.zeros((len(model.names), len(model.names)))
+        covariance[:size, :size] = found.covariance * np.outer(narrow, narrow)
+        covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
+        beyond = ""
+        if found.beyond is not None and found.excess > _FAR_BETTER:
+            off = np.flatnonzero((found.beyond <= low) | (found.beyond >= high))
+            beyond = ", ".join(
+                f"{model.located[i]} = {found.beyond[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
+            )
+        yield ContourOptimum(np.append(found.point, noise), covariance, found.cost, found.fits, beyond)
 
 
 def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:

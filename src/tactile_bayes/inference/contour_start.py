@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_optimum import contact_fit, fitted_noise, optimum_of
+from tactile_bayes.inference.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optima_of, optimum_of
 from tactile_bayes.inference.ensembles import (
     Coordinates,
     Logarithms,
+    Mixture,
+    Proposal,
     SamplerSettings,
     approximate,
     in_coordinates,
@@ -22,7 +24,7 @@ from tactile_bayes.inference.ensembles import (
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
-from tactile_bayes.inference.start import gather
+from tactile_bayes.inference.start import Cloud, gather
 
 __all__ = ["Walk", "walk_of"]
 
@@ -31,6 +33,21 @@ Floats = NDArray[np.float64]
 _OF_ROUGHNESS, _OF_NOISE, _OF_REST = 0.3, 0.1, 0.7
 """Standard deviations, half those of the walkers, of the logarithms of amplitude, length scale and noise, and of
 coordinates whose posterior is nearly standard normal: wider in all of those at once is far out."""
+
+_MUCH = 100
+"""Loaded samples from which on what explains a record is not one of several contours that do."""
+
+_EFFICIENT = 0.3
+"""Efficiency of a proposal from which on the posterior is nearly normal around it."""
+
+_HOPELESS = 100.0
+"""Cost above the least from which on a place is not weighed."""
+
+_SAME = 3.0
+"""Distance from a mode, over that of its typical points, up to which a place belongs to it."""
+
+_RARE = 9.0
+"""Logarithm of how much less mass a mode may have than another to be left out: one draw in ten thousand."""
 
 _POOR = 2.0
 """Mean square of what is left of a record, over its own roughness, from which on a search is worth its time."""
@@ -89,40 +106,101 @@ def _misfit(model: ContourModel, point: Floats) -> float:
     return float(np.mean(np.minimum(np.abs(left / model.deviation)[:, model.present], 5.0) ** 2))
 
 
+class _Mode(NamedTuple):
+    """One place where the posterior has mass."""
+
+    optimum: ContourOptimum
+    cloud: Cloud
+    """In the coordinates of `_around`."""
+    proposal: Proposal
+    """In those in which walkers walk."""
+
+
+def _around(model: ContourModel) -> Logarithms:
+    """Coordinates in which walkers are scattered."""
+    return Logarithms(np.arange(len(model.names)) >= len(model.located))
+
+
 def _scattered(
     model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
 ) -> Walk:
-    """Walkers scattered twice as wide as a normal approximation, which they are then proposed from."""
-    optimum = optimum_of(model, rng)
-    of_noise = np.arange(len(model.names)) >= len(model.located)
-    around = Logarithms(of_noise)
+    """Walkers scattered twice as wide as a normal approximation of each mode, which they are then proposed from."""
+    modes = _modes(model, rng)
+    around = _around(model)
+    proposal = Mixture(tuple(mode.proposal for mode in modes))
+    floor = min(mode.cloud.floor for mode in modes)
 
-    def log_probability(coordinates: Floats) -> Floats:
-        return model.log_probability(around.parameters(coordinates)[0])
+    def draw(rng: np.random.Generator, count: int) -> Floats:
+        counts = rng.multinomial(count, proposal.shares)
+        points = [mode.cloud.draw(rng, int(each)) for mode, each in zip(modes, counts, strict=True)]
+        return around.parameters(np.concatenate(points)[rng.permutation(count)])[0]
 
-    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng)
     try:
         start = scatter_walkers(
-            lambda points: np.where(model.log_probability(points) > cloud.floor, 0.0, -np.inf),
-            lambda rng, count: around.parameters(cloud.draw(rng, count))[0],
+            lambda points: np.where(model.log_probability(points) > floor, 0.0, -np.inf),
+            draw,
             parameters=len(model.names),
             seed=seed,
             settings=settings,
         )
     except InferenceError as error:
-        best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, optimum.point, strict=False))
+        point = modes[0].optimum.point
+        best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
         raise InferenceError(
             f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, "
             "signs, drive angle, rod, base and family right? tactile-bayes inspect may tell"
         ) from error
-    positive = (model.low == 0.0) & ~np.isin(model.names, MAY_VANISH)
-    walked = Logarithms(positive)
+    walked = _walked(model)
+    return Walk(walked.of(start), Logarithms(walked.positive, proposal), modes[0].optimum.beyond)
+
+
+def _walked(model: ContourModel) -> Logarithms:
+    return Logarithms((model.low == 0.0) & ~np.isin(model.names, MAY_VANISH))
+
+
+def _modes(model: ContourModel, rng: np.random.Generator) -> list[_Mode]:
+    """Where the posterior has mass, the most first: one, if that explains a record that says much; else all to which
+    searches lead, weighed by their evidence.
+    """
+    found: list[_Mode] = []
+    waiting: list[ContourOptimum] = []
+    says_much = np.count_nonzero(~model.found["unloaded"].values) >= _MUCH
+    for optimum in optima_of(model, rng):
+        if not optimum.fits:
+            waiting.append(optimum)
+        elif not _is_known(model, optimum, found):
+            found.append(_mode(model, optimum, rng))
+            if says_much and found[-1].proposal.efficiency > _EFFICIENT:
+                break
+    for optimum in sorted(waiting, key=lambda one: one.cost):
+        least = min((mode.optimum.cost for mode in found), default=optimum.cost)
+        if optimum.cost < least + _HOPELESS and not _is_known(model, optimum, found):
+            found.append(_mode(model, optimum, rng))
+    if not found:
+        raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
+    found.sort(key=lambda mode: -mode.proposal.log_mass)
+    return [mode for mode in found if mode is found[0] or mode.proposal.log_mass > found[0].proposal.log_mass - _RARE]
+
+
+def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) -> bool:
+    """Whether an optimum belongs to a mode that was found."""
+    place = _walked(model).of(optimum.point[None])
+    return any(np.linalg.norm(mode.proposal.steps(place)) < _SAME * np.sqrt(place.size) for mode in found)
+
+
+def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator) -> _Mode:
+    around, walked = _around(model), _walked(model)
+
+    def log_probability(coordinates: Floats) -> Floats:
+        return model.log_probability(around.parameters(coordinates)[0])
+
+    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng)
     centre = around.parameters(cloud.centre[None])[0]
-    per_unit = np.where(positive & ~of_noise, 1.0 / centre[0], 1.0)
+    per_unit = np.where(walked.positive & ~around.positive, 1.0 / centre[0], 1.0)
     proposal = approximate(
         in_coordinates(model.log_probability, walked),
         walked.of(centre)[0],
         cloud.narrow_covariance * np.outer(per_unit, per_unit),
         rng,
     )
-    return Walk(walked.of(start), Logarithms(positive, proposal), optimum.beyond)
+    return _Mode(optimum, cloud, proposal)

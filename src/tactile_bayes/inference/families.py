@@ -19,6 +19,9 @@ __all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior", "refuse_no_prior", 
 
 _MOST_STEPS = 100
 
+_FAR = 1e3
+"""Widths from the vertex beyond which a power law is as high as here, or its height would overflow."""
+
 _SETTLED = 1e-5
 """Change of parameters, in rod lengths and over their size, after which least squares are not repeated."""
 
@@ -273,7 +276,9 @@ FLANKS: dict[str, Flank] = {
         {"w": _POSITIVE, "n": (1.1, 50.0)},
         lambda length: {"w": stats.lognorm(s=1.0, scale=length), "n": stats.lognorm(s=0.7, loc=1.0, scale=1.0)},
         lambda a: {"w": 1.0 / a, "n": 2.0},
-        lambda u, v, values: values["w"] * np.abs(u / values["w"]) ** values["n"] - v,
+        lambda u, v, values: (
+            values["w"] * np.minimum(np.abs(u / values["w"]), _FAR) ** np.minimum(values["n"], 50.0) - v
+        ),
     ),
 }
 """By name; any two make a joined family."""

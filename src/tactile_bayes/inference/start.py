@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.differences import central_slopes
 
-__all__ = ["Cloud", "Optimum", "best_optimum", "gather"]
+__all__ = ["Cloud", "Optimum", "gather", "optima"]
 
 Floats = NDArray[np.float64]
 Residuals = Callable[[Floats], Floats]
@@ -57,19 +56,24 @@ class Optimum(NamedTuple):
     excess: float = 0.0
     """Cost above that there."""
 
+    @property
+    def fits(self) -> bool:
+        """Whether noise as it was guessed explains the record."""
+        return self.cost < _FITS * self.residuals.size
 
-def best_optimum(
+
+def optima(
     residuals: Residuals,
     candidates: Iterable[Floats],
     middle: Floats,
     spread: Floats,
     low: Floats | float = -np.inf,
     high: Floats | float = np.inf,
-) -> Optimum:
-    """Robust least squares from one candidate after the other until one fits; the best of them.
+) -> Iterator[Optimum]:
+    """Robust least squares from one candidate after the other.
 
-    The way to it may lead through what is impossible a priori; if it ends there, the search goes on from the nearest
-    place where that is not so, and stays there.
+    The way to an optimum may lead through what is impossible a priori; if it ends there, the search goes on from the
+    nearest place where that is not so, and stays there.
 
     Parameters
     ----------
@@ -81,23 +85,16 @@ def best_optimum(
     low, high : ndarray, shape (d,), or float
         Between what each parameter can be.
     """
-    best: Optimum | None = None
     for candidate in candidates:
         found = _descend(residuals, candidate, middle, spread)
         again = _descend(residuals, found.point, middle, spread)
         while again.cost < found.cost - _GAIN:  # samples that fell on an event's other side on the way
             found, again = again, _descend(residuals, again.point, middle, spread)
-        if best is None or found.cost < best.cost:
-            best = found
-        if best.cost < _FITS * best.residuals.size:
-            break
-    if best is None:
-        raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
-    if np.all((best.point > low) & (best.point < high)):
-        return best
-    inside = np.clip(best.point, low + _INSIDE * spread, high - _INSIDE * spread)
-    found = _descend(residuals, inside, middle, spread, low, high)
-    return found._replace(beyond=best.point, excess=found.cost - best.cost)
+        if not np.all((found.point > low) & (found.point < high)):
+            inside = np.clip(found.point, low + _INSIDE * spread, high - _INSIDE * spread)
+            bounded = _descend(residuals, inside, middle, spread, low, high)
+            found = bounded._replace(beyond=found.point, excess=bounded.cost - found.cost)
+        yield found
 
 
 def _descend(
@@ -177,19 +174,23 @@ def gather(
     rng : np.random.Generator
     """
     size = centre.size
+    top = float(log_probability(centre[None])[0])
     for _ in range(_ROUNDS):
         root = _square_root(covariance)
         cloud = Cloud(centre, _WIDER * root, -np.inf)
         points = cloud.draw(rng, 60 * size)
         values = log_probability(points)
-        floor = values.max() - _DEFICIT * size
+        if values.max() > top:
+            top = float(values.max())
+        floor = top - _DEFICIT * size
         if np.mean(values > floor) > 0.5:
             break
         best = np.argsort(values)[-12 * size :]
         best = best[np.isfinite(values[best])]
-        if best.size > 2 * size:
+        if np.count_nonzero(values > floor) > 2 * size:
             centre, covariance = points[best].mean(axis=0), 0.5 * np.cov(points[best].T)
-        else:
+        else:  # nearly all are hopeless beside the centre, or beside the best that was found on the way
+            centre = points[best[-1]] if best.size and values[best[-1]] == top else centre
             covariance = 0.25 * covariance
     return replace(cloud, floor=float(min(floor, np.quantile(values, 0.8, method="lower"))))
 

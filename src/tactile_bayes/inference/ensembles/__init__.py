@@ -26,7 +26,7 @@ from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithm
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.places import Place
-from tactile_bayes.inference.ensembles.proposal import approximate
+from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, spawn
@@ -35,9 +35,11 @@ __all__ = [
     "Coordinates",
     "Draws",
     "Logarithms",
+    "Mixture",
     "Place",
     "Plain",
     "Progress",
+    "Proposal",
     "SamplerSettings",
     "Seed",
     "approximate",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.inference.ensembles.moves import standard_moves
-from tactile_bayes.inference.ensembles.proposal import Proposal
+from tactile_bayes.inference.ensembles.proposal import Mixture
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["Coordinates", "Logarithms", "Plain", "in_coordinates"]
@@ -54,9 +54,9 @@ class Logarithms(Plain):
     Where a record tells a ratio of powers of two sizes, and hardly the sizes, their logarithms lie along a line.
     """
 
-    def __init__(self, positive: NDArray[np.bool_], proposal: Proposal | None = None) -> None:
+    def __init__(self, positive: NDArray[np.bool_], proposal: Mixture | None = None) -> None:
         """What is known to come near the posterior, of the coordinates, may be proposed to walkers."""
-        self._positive = positive
+        self.positive = positive
         self._proposal = proposal
         self.digest = f"logarithms of parameters {', '.join(map(str, np.flatnonzero(positive)))}"
         if proposal is not None:
@@ -64,13 +64,13 @@ class Logarithms(Plain):
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         points = coordinates.copy()
-        points[:, self._positive] = np.exp(coordinates[:, self._positive])
-        return points, np.sum(coordinates[:, self._positive], axis=1)
+        points[:, self.positive] = np.exp(coordinates[:, self.positive])
+        return points, np.sum(coordinates[:, self.positive], axis=1)
 
     def of(self, points: Floats) -> Floats:
         """Coordinates of points, shape (..., parameters)."""
         coordinates = points.copy()
-        coordinates[..., self._positive] = np.log(points[..., self._positive])
+        coordinates[..., self.positive] = np.log(points[..., self.positive])
         return coordinates
 
     def moves(self) -> list[tuple[Any, float]]:

@@ -9,7 +9,7 @@ import emcee
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.inference.ensembles.proposal import Proposal
+from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 
 __all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
 
@@ -30,7 +30,7 @@ class FixedMove(emcee.moves.RedBlueMove):
     The nearer it is to the target the more of them are accepted, and a walker has forgotten where it was.
     """
 
-    def __init__(self, proposal: Proposal) -> None:
+    def __init__(self, proposal: Mixture) -> None:
         super().__init__()
         self._proposal = proposal
 
@@ -96,7 +96,7 @@ class NormalMove(emcee.moves.RedBlueMove):
         return proposed, 0.5 * np.sum(there**2 - moving**2, axis=1)
 
 
-def standard_moves(proposal: Proposal | None = None) -> list[tuple[Any, float]]:
+def standard_moves(proposal: Mixture | None = None) -> list[tuple[Any, float]]:
     """Moves of one ensemble and their shares, new ones for each ensemble, since a move keeps its scale between calls.
 
     Proposals fitted to the walkers where the posterior is nearly normal; differences of two other walkers, scaled and

@@ -9,10 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
 
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["Proposal", "approximate"]
+__all__ = ["Mixture", "Proposal", "approximate"]
 
 Floats = NDArray[np.float64]
 
@@ -41,6 +42,10 @@ class Random(Protocol):
 
     def chisquare(self, df: float, size: int, /) -> Floats: ...
 
+    def multinomial(self, n: int, pvals: Floats, /) -> NDArray[np.int_]: ...
+
+    def permutation(self, x: int, /) -> NDArray[np.int_]: ...
+
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
@@ -53,11 +58,14 @@ class Proposal:
         Lower triangle; times its transpose the scale matrix.
     efficiency : float
         Effective share of independent draws, weighted by the target: 1 if it is the target's own distribution.
+    log_mass : float
+        Logarithm of the target's integral over what it covers, up to a constant of the number of parameters.
     """
 
     mean: Floats
     root: Floats
     efficiency: float = 0.0
+    log_mass: float = -np.inf
 
     @classmethod
     def fitted(cls, points: Floats, weights: Floats | None = None) -> Proposal:
@@ -87,11 +95,57 @@ class Proposal:
         """Points, shape (count, parameters), and the logarithm of their density, up to the constant of `log_density`"""
         normal = random.standard_normal((count, self.mean.size))
         steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, count) / _DEGREES_OF_FREEDOM)[:, None]
-        return self.mean + steps @ self.root.T, _log_density(steps)
+        return self.mean + steps @ self.root.T, _log_density(steps) - self._log_volume
 
     def log_density(self, points: Floats) -> Floats:
-        """Of points, shape (n, parameters), up to a constant."""
-        return _log_density(solve_triangular(self.root, (points - self.mean).T, lower=True).T)
+        """Of points, shape (n, parameters), up to a constant of the number of parameters."""
+        return _log_density(self.steps(points)) - self._log_volume
+
+    def steps(self, points: Floats) -> Floats:
+        """Points, shape (n, parameters), as seen from the mean, in units of the scale."""
+        return np.asarray(solve_triangular(self.root, (points - self.mean).T, lower=True).T)
+
+    @property
+    def _log_volume(self) -> float:
+        return float(np.log(np.diag(self.root)).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """Several proposals, each for a mode of the target.
+
+    Parameters
+    ----------
+    parts : tuple of Proposal
+    """
+
+    parts: tuple[Proposal, ...]
+
+    @property
+    def shares(self) -> Floats:
+        """Of the parts, in proportion to the target's integral."""
+        return _weights(np.array([part.log_mass for part in self.parts]))
+
+    @property
+    def efficiency(self) -> float:
+        """Of the parts together, as if each kept to its own mode."""
+        return float(1.0 / np.sum(self.shares / np.array([part.efficiency for part in self.parts])))
+
+    @property
+    def digest(self) -> str:
+        return hashlib.sha256("".join(part.digest for part in self.parts).encode()).hexdigest()
+
+    def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
+        """As `Proposal.draw`."""
+        counts = random.multinomial(count, self.shares)
+        parts = [part.draw(random, int(each))[0] for part, each in zip(self.parts, counts, strict=True)]
+        points = np.concatenate(parts)[random.permutation(count)]
+        return points, self.log_density(points)
+
+    def log_density(self, points: Floats) -> Floats:
+        """As `Proposal.log_density`."""
+        each = [part.log_density(points) for part in self.parts]
+        return np.asarray(logsumexp(each, axis=0, b=self.shares[:, None]))
 
 
 def approximate(
@@ -112,7 +166,8 @@ def approximate(
             break
         efficiency = _effective(_weights(surplus)) / len(points)
         if efficiency > best.efficiency:
-            best = Proposal(proposal.mean, proposal.root, efficiency)
+            log_mass = float(logsumexp(surplus) - np.log(len(points)))
+            best = Proposal(proposal.mean, proposal.root, efficiency, log_mass)
         if best.efficiency >= _GOOD:
             break
         power = 1.0
