@@ -383,7 +383,7 @@ def test_what_is_wrong_in_a_csv_file_is_refused_with_its_line(tmp_path, lines, m
 
 def test_files_that_are_something_else_are_refused(tmp_path):
     (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
-    with refused("this is no NetCDF file that can be read"):
+    with refused("a.nc: the file cannot be read, it is damaged or cut short, or no NetCDF 4 file ("):
         read_record(tmp_path / "a.nc")
     for path in ("a.txt", "a"):
         (tmp_path / path).write_text(f"{HEADER}\n{ROW}\n")

@@ -8,6 +8,7 @@ from typing import Any
 
 import xarray as xr
 
+from tactile_bayes import netcdf
 from tactile_bayes.record.table import Source, Table, table_of
 
 __all__ = ["read_netcdf", "write_netcdf"]
@@ -19,19 +20,14 @@ def read_netcdf(path: Path, columns: Mapping[str, str]) -> Table:
     The dimension of the samples may have any name, if all columns lie along it.
     """
     source = Source(str(path))
-    with open(path, "rb"):  # what the system refuses, it refuses in fewer words than HDF5
-        pass
-    try:
-        with xr.open_dataset(
-            path,
-            engine="h5netcdf",
-            decode_times=False,
-            decode_timedelta=False,
-            decode_coords=False,
-        ) as stored:
-            record = stored.load()
-    except (OSError, ValueError) as error:
-        raise source.error(f"this is no NetCDF file that can be read ({error}): write it again") from error
+    record = netcdf.read_netcdf(
+        path,
+        xr.open_dataset,
+        lambda what: source.error(f"the file {what}: write it again, or put a copy of it back"),
+        decode_times=False,
+        decode_timedelta=False,
+        decode_coords=False,
+    )
     dimensions = {variable.dims for variable in record.variables.values()}
     shared = dimensions.pop() if len(dimensions) == 1 else ()
     return table_of(record, source, shared[0] if len(shared) == 1 else "sample")
@@ -49,4 +45,4 @@ def write_netcdf(record: xr.Dataset, path: Path) -> None:
             encoding[name] = {"dtype": "S1", "char_dim_name": dimension}
         elif variable.dtype.kind != "O":  # objects are texts of different lengths
             encoding[name] = {"_FillValue": None}
-    record.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+    netcdf.write_netcdf(record, path, encoding)
