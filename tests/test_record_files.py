@@ -38,7 +38,7 @@ def write_text(path, *lines):
 finite = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=12)
 names = st.text(st.characters(exclude_categories=("Cs", "Cc")), min_size=1, max_size=8).filter(
-    lambda name: name.strip() == name and name.isprintable() and "/" not in name and name not in (".", "sample")
+    lambda name: name.strip() == name and name.isprintable() and "/" not in name and name != "."
 )
 
 
@@ -78,6 +78,10 @@ def awkward_record():
         note=["", " a ", "1,5", '"', "\r\n", "ß€😀"],
         digits=["1", "02", "nan", "", "-inf", "1e3"],
         note_length=np.arange(6.0),
+        note1=["a", "bc", "", "d", "e", "f"],
+        note2=["a"] * 6,
+        sample=["a", "a", "", "b", "c", "d"],
+        **{"1": ["x"] * 6},
         **{'key: "x" [m], #': time},
     )
     attrs = {"a: b": "1.0", "empty": "", "padded": " a,", "lines": "a\r\nb\u2028c", "run": 2**63 - 1, "limit": np.inf}

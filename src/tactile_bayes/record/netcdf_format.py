@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -37,11 +38,13 @@ def write_netcdf(record: xr.Dataset, path: Path) -> None:
     """Write a record that has been validated."""
     record = record.reset_coords([name for name in record.coords if name not in record.dims])
     encoding: dict[Any, dict[str, Any]] = {}
+    taken = {*map(str, record.variables), "sample"}
     for name, variable in record.variables.items():
         if variable.dtype.kind == "U":  # as fixed-width characters, which every NetCDF library reads
-            dimension = f"{name}_length"
-            while dimension in record.variables:
+            dimension = re.sub(r"\d", "_", f"{name}_length")  # a number in it would be taken for the length
+            while dimension in taken:
                 dimension += "_"
+            taken.add(dimension)
             encoding[name] = {"dtype": "S1", "char_dim_name": dimension}
         elif variable.dtype.kind != "O":  # objects are texts of different lengths
             encoding[name] = {"_FillValue": None}
