@@ -455,3 +455,58 @@ def test_writing_that_fails_leaves_the_old_file(tmp_path, suffix, monkeypatch):
         write_record(make_record(columns(), rod=WIRE), path)
     assert path.read_bytes() == old
     assert list(tmp_path.iterdir()) == [path]
+
+
+NINES = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([HEADER, ROW.replace("0,", f"{NINES},", 1)], "line 2, column 'sweep': '999"),
+        ([f"# rod_length: 1 [{'Gm9 ' * 40}]", HEADER, ROW], "line 1: rod_length is in [Gm9"),
+        ([f"{HEADER},note", f"{ROW},a\0b"], "line 2: there is a NUL character (0x00), which is no text: remove it"),
+        (["# note: a\0b", HEADER, ROW], "line 1: there is a NUL character (0x00), which is no text: remove it"),
+        (
+            [f"{HEADER},note", f"{ROW},a", f"{ROW},{'x' * 131_073}"],
+            "line 3: the line cannot be read (field larger than",
+        ),
+        (
+            ['# note: "a\\u0000"', HEADER, ROW],
+            "line 1, attribute 'note' has a NUL character (0x00) in it, which no file",
+        ),
+        (
+            ['# note: "\\ud800"', HEADER, ROW],
+            "line 1, attribute 'note' has half of a surrogate pair in it, which no file",
+        ),
+        (
+            ['# column note: text [m] "\\ud800"', f"{HEADER},note", f"{ROW},a"],
+            "line 1, column 'note' has an attribute 'long_name' that has half of a surrogate pair in it: remove it",
+        ),
+        (["# CLASS: 1", HEADER, ROW], "the name 'CLASS' cannot be stored in every file"),
+        ([f"{HEADER},{'x' * 201}", f"{ROW},a"], "cannot be stored in every file"),
+        ([f"# tactile_bayes record, format {NINES}", HEADER, ROW], "line 1: the file has format 999"),
+    ],
+    ids=lambda value: None if isinstance(value, str) else "",
+)
+def test_what_no_file_could_store_is_refused_as_it_is_read(tmp_path, lines, message):
+    path = write_text(tmp_path / "rig.csv", *lines)
+    with refused(message) as caught:
+        read_record(path)
+    assert len(str(caught.value)) < 2000
+
+
+@pytest.mark.parametrize("text", ["a\0b", "\ud800", "x" * 131_073])
+def test_text_that_no_file_could_store_is_not_written(tmp_path, text):
+    with refused("sample 1, column 'note': the text has "):
+        make_record(columns(note=["", text, "", "", "", ""]))
+
+
+def test_numbers_of_any_length_in_remarks_are_text(tmp_path):
+    path = write_text(
+        tmp_path / "rig.csv", f"# run: {NINES}", f"# zeros: {'0' * 5000}7", f"{HEADER},tag", f"{ROW},{NINES}"
+    )
+    record = read_record(path)
+    assert record.attrs["run"] == NINES
+    assert record.attrs["zeros"] == 7
+    assert record["tag"].values.tolist() == [np.inf]

@@ -140,7 +140,7 @@ def outcomes(cases, folder):
         yield outcome(mutated(content, rng), options, folder)
 
 
-@pytest.mark.parametrize("cases", [120, pytest.param(6000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cases", [40, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_files_are_refused_or_read_and_written_again(tmp_path, cases):
     found = Counter(outcomes(cases, tmp_path))
     assert set(found) == {"refused", "read"}
