@@ -7,6 +7,7 @@ import math
 
 import pytest
 
+from tactile_bayes import files
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.errors import CalibrationError
@@ -125,7 +126,9 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path):
 def test_what_a_killed_run_left_behind_is_removed(tmp_path):
     """Only that: files that others put there stay."""
     filled(tmp_path)
-    (tmp_path / ".0123456789abcdef.tmp.json").write_text('{"format": 1, "exper')
+    half = tmp_path / f".tactile-bayes-{files._HOST}-0123456789abcdef.tmp"
+    half.mkdir()
+    (half / LEDGER).write_text('{"format": 1, "exper')
     (tmp_path / "notes.json").write_text("{}")
     with open_ledger(WORDS, tmp_path, REPLICATES) as ledger:
         assert len(ledger.outcomes) == len(ROWS)

@@ -160,7 +160,7 @@ def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
     with pytest.raises(SpecificationError, match=r"shard-000001\.nc is gone: dataset generate makes it again"):
         data.isel(record=9).load()
     (some / "shard-000002.nc").write_bytes(b"no NetCDF")
-    with pytest.raises(SpecificationError, match=r"shard-000002\.nc cannot be read .*: run dataset verify"):
+    with pytest.raises(SpecificationError, match=r"shard-000002\.nc cannot be read, .*: run dataset verify"):
         data.isel(record=20).load()
     data.isel(record=3).load()
 

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tactile_bayes import files
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, block, checkpoint, sample
 
@@ -111,7 +112,9 @@ def test_a_run_goes_on_when_killed_while_a_block_is_written(tmp_path, monkeypatc
         if written < 3:
             return made(path, block, seconds)
         if moment == "before the rename":
-            (tmp_path / ".0123456789abcdef.tmp.npz").write_bytes(b"PK half of a block")
+            half = tmp_path / f".tactile-bayes-{files._HOST}-0123456789abcdef.tmp"
+            half.mkdir()
+            (half / "block-00000020-00000030.npz").write_bytes(b"PK half of a block")
         if moment == "after the rename":
             made(path, block, seconds)
         raise Killed

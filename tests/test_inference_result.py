@@ -61,7 +61,10 @@ def test_what_is_no_result_is_refused(tmp_path):
     with pytest.raises(InferenceError, match="there is no file"):
         read_result(tmp_path / "none.nc")
     (tmp_path / "text.nc").write_text("no NetCDF")
-    with pytest.raises(InferenceError, match="is no NetCDF file of a posterior"):
+    with pytest.raises(
+        InferenceError,
+        match=r"text\.nc cannot be read, it is damaged .*no NetCDF 4 file .*: infer again",
+    ):
         read_result(tmp_path / "text.nc")
     other = xr.DataTree.from_dict({"prior": xr.Dataset({"a": 1.0})})
     other.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")

@@ -38,7 +38,7 @@ def write_text(path, *lines):
 finite = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=12)
 names = st.text(st.characters(exclude_categories=("Cs", "Cc")), min_size=1, max_size=8).filter(
-    lambda name: name.strip() == name and name.isprintable() and "/" not in name and name not in (".", "sample")
+    lambda name: name.strip() == name and name.isprintable() and "/" not in name and name != "."
 )
 
 
@@ -78,6 +78,10 @@ def awkward_record():
         note=["", " a ", "1,5", '"', "\r\n", "ß€😀"],
         digits=["1", "02", "nan", "", "-inf", "1e3"],
         note_length=np.arange(6.0),
+        note1=["a", "bc", "", "d", "e", "f"],
+        note2=["a"] * 6,
+        sample=["a", "a", "", "b", "c", "d"],
+        **{"1": ["x"] * 6},
         **{'key: "x" [m], #': time},
     )
     attrs = {"a: b": "1.0", "empty": "", "padded": " a,", "lines": "a\r\nb\u2028c", "run": 2**63 - 1, "limit": np.inf}
@@ -383,7 +387,7 @@ def test_what_is_wrong_in_a_csv_file_is_refused_with_its_line(tmp_path, lines, m
 
 def test_files_that_are_something_else_are_refused(tmp_path):
     (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
-    with refused("this is no NetCDF file that can be read"):
+    with refused("a.nc: the file cannot be read, it is damaged or cut short, or no NetCDF 4 file ("):
         read_record(tmp_path / "a.nc")
     for path in ("a.txt", "a"):
         (tmp_path / path).write_text(f"{HEADER}\n{ROW}\n")
@@ -451,3 +455,58 @@ def test_writing_that_fails_leaves_the_old_file(tmp_path, suffix, monkeypatch):
         write_record(make_record(columns(), rod=WIRE), path)
     assert path.read_bytes() == old
     assert list(tmp_path.iterdir()) == [path]
+
+
+NINES = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([HEADER, ROW.replace("0,", f"{NINES},", 1)], "line 2, column 'sweep': '999"),
+        ([f"# rod_length: 1 [{'Gm9 ' * 40}]", HEADER, ROW], "line 1: rod_length is in [Gm9"),
+        ([f"{HEADER},note", f"{ROW},a\0b"], "line 2: there is a NUL character (0x00), which is no text: remove it"),
+        (["# note: a\0b", HEADER, ROW], "line 1: there is a NUL character (0x00), which is no text: remove it"),
+        (
+            [f"{HEADER},note", f"{ROW},a", f"{ROW},{'x' * 131_073}"],
+            "line 3: the line cannot be read (field larger than",
+        ),
+        (
+            ['# note: "a\\u0000"', HEADER, ROW],
+            "line 1, attribute 'note' has a NUL character (0x00) in it, which no file",
+        ),
+        (
+            ['# note: "\\ud800"', HEADER, ROW],
+            "line 1, attribute 'note' has half of a surrogate pair in it, which no file",
+        ),
+        (
+            ['# column note: text [m] "\\ud800"', f"{HEADER},note", f"{ROW},a"],
+            "line 1, column 'note' has an attribute 'long_name' that has half of a surrogate pair in it: remove it",
+        ),
+        (["# CLASS: 1", HEADER, ROW], "the name 'CLASS' cannot be stored in every file"),
+        ([f"{HEADER},{'x' * 201}", f"{ROW},a"], "cannot be stored in every file"),
+        ([f"# tactile_bayes record, format {NINES}", HEADER, ROW], "line 1: the file has format 999"),
+    ],
+    ids=lambda value: None if isinstance(value, str) else "",
+)
+def test_what_no_file_could_store_is_refused_as_it_is_read(tmp_path, lines, message):
+    path = write_text(tmp_path / "rig.csv", *lines)
+    with refused(message) as caught:
+        read_record(path)
+    assert len(str(caught.value)) < 2000
+
+
+@pytest.mark.parametrize("text", ["a\0b", "\ud800", "x" * 131_073])
+def test_text_that_no_file_could_store_is_not_written(tmp_path, text):
+    with refused("sample 1, column 'note': the text has "):
+        make_record(columns(note=["", text, "", "", "", ""]))
+
+
+def test_numbers_of_any_length_in_remarks_are_text(tmp_path):
+    path = write_text(
+        tmp_path / "rig.csv", f"# run: {NINES}", f"# zeros: {'0' * 5000}7", f"{HEADER},tag", f"{ROW},{NINES}"
+    )
+    record = read_record(path)
+    assert record.attrs["run"] == NINES
+    assert record.attrs["zeros"] == 7
+    assert record["tag"].values.tolist() == [np.inf]

@@ -554,7 +554,7 @@ def test_what_is_no_run_is_refused(folder, tmp_path):
 def test_a_file_that_was_cut_short_is_refused(folder, tmp_path, share):
     content = (folder / "posterior.nc").read_bytes()
     (tmp_path / "posterior.nc").write_bytes(content[: int(share * len(content))])
-    refused(tmp_path, r"posterior\.nc (is no NetCDF file of a posterior|cannot be read, it is damaged)")
+    refused(tmp_path, r"posterior\.nc (is damaged, it is not as it was written|cannot be read, it is damaged)")
 
 
 def test_another_posterior_is_refused(tmp_path):

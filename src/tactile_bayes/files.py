@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
+import platform
+import re
 import secrets
+import shutil
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["alone_in", "write_atomically"]
+__all__ = ["alone_in", "is_temporary", "write_atomically"]
+
+_HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+_TEMPORARY = re.compile(r"\.tactile-bayes-(?P<host>[0-9a-f]{8})-[0-9a-f]{16}\.tmp")
+_DAY = 86_400.0
 
 
 @contextmanager
 def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path to write to, and put it in the place of `path` when the block has succeeded.
 
-    The temporary file lies in the same directory and has the same suffix. At the end of the block it is brought
-    to the disk, renamed, and the directory is brought to the disk; if the block raises, it is removed and what
-    was at `path` stays as it was.
+    The temporary file has the same name, in a hidden folder beside `path`, which is locked while it is there. At the
+    end of the block the file is brought to the disk and renamed, and the directory is brought to the disk; if the block
+    raises, it is removed and what was at `path` stays as it was.
+
+    Processes that were killed leave such folders behind. They are removed first, where the lock tells that nobody
+    writes in them: not on Windows, nor on a file system without locks. As locks may not reach other machines, those
+    from another machine have to be a day old, too.
 
     Parameters
     ----------
@@ -48,21 +61,80 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path).resolve()
     if not target.parent.is_dir():  # else the refusal would name the temporary file
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(target.parent))
-    temporary = target.with_name(f".{secrets.token_hex(8)}.tmp{target.suffix}")
-    try:
+    _remove_leftovers(target.parent)
+    with _hidden_folder(target.parent) as folder:
+        temporary = folder / target.name
         yield temporary
         with open(temporary, "r+b") as written:
             os.fsync(written.fileno())
         os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
     if os.name != "nt":  # Windows cannot open a directory, and its rename is journalled anyway
         directory = os.open(target.parent, os.O_RDONLY)
         try:
             os.fsync(directory)
         finally:
             os.close(directory)
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether a path is called like what `write_atomically` writes in, or a killed process left behind."""
+    return _TEMPORARY.fullmatch(path.name) is not None
+
+
+@contextmanager
+def _hidden_folder(parent: Path) -> Iterator[Path]:
+    """A new folder, locked, which is removed in the end."""
+    while True:
+        folder = parent / f".tactile-bayes-{_HOST}-{secrets.token_hex(8)}.tmp"
+        folder.mkdir()
+        with suppress(FileNotFoundError, BlockingIOError):  # another process took it for a leftover at once
+            handle = _lock(folder)
+            if handle is None or folder.exists():
+                break
+            os.close(handle)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if handle is not None:
+            os.close(handle)
+
+
+def _remove_leftovers(parent: Path) -> None:
+    """Remove hidden folders of processes that were killed, as far as that can be told and done."""
+    with suppress(OSError):
+        for name in os.listdir(parent):
+            if match := _TEMPORARY.fullmatch(name):
+                with suppress(OSError):
+                    folder = parent / name
+                    is_old = time.time() - folder.stat().st_mtime > _DAY
+                    handle = _lock(folder) if match["host"] == _HOST or is_old else None
+                    if handle is not None:
+                        shutil.rmtree(folder, ignore_errors=True)
+                        os.close(handle)
+
+
+def _lock(folder: Path) -> int | None:
+    """Lock a folder until the handle is closed or the process ends; None where the system cannot.
+
+    Raises
+    ------
+    BlockingIOError
+        If it is locked already.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(handle)
+        if isinstance(error, BlockingIOError):
+            raise
+        return None  # a file system without locks
+    return handle
 
 
 @contextmanager
@@ -75,18 +147,11 @@ def alone_in(folder: Path, refusal: type[Exception]) -> Iterator[None]:
         Of the type `refusal`, if another run is at work there.
     """
     try:
-        import fcntl
-    except ImportError:  # Windows: nothing keeps the second run out
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
+        handle = _lock(folder)
+    except BlockingIOError:
+        raise refusal(f"another run is at work on {folder}: wait for it, or stop it") from None
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise refusal(f"another run is at work on {folder}: wait for it, or stop it") from None
-        except OSError:  # a file system without locks
-            pass
         yield
     finally:
-        os.close(handle)
+        if handle is not None:
+            os.close(handle)

@@ -92,8 +92,6 @@ def open_ledger(words: Mapping[str, str], folder: Path | None, kind: Kind) -> It
         raise kind.error(f"{folder} is a file: give a folder")
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder, kind.error):
-        for leftover in folder.glob(".*.tmp.json"):
-            leftover.unlink(missing_ok=True)
         ledger: Ledger[Any] = Ledger(words, folder, kind)
         try:
             yield ledger

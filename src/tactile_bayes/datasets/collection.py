@@ -18,6 +18,7 @@ from xarray.core import indexing
 
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.errors import SpecificationError
+from tactile_bayes.netcdf import reading
 
 __all__ = ["open_dataset", "opened", "opened_shard"]
 
@@ -126,8 +127,7 @@ def opened_shard(path: Path) -> xr.Dataset:
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
     try:
-        yield
+        with reading(path, lambda what: SpecificationError(f"{path} {what}: run dataset verify")):
+            yield
     except FileNotFoundError:
         raise SpecificationError(f"{path} is gone: dataset generate makes it again") from None
-    except (OSError, KeyError) as error:
-        raise SpecificationError(f"{path} cannot be read ({error}): run dataset verify") from error

@@ -124,7 +124,6 @@ def generate(
                     if progress is not None:
                         progress(Production(before + made, spec.records, made, time.monotonic() - began))
         finally:
-            _sweep_up(folder)
             manifest = _noted(manifest, waiting, folder)
         _finish(spec, manifest, folder)
     return folder / MANIFEST
@@ -144,16 +143,8 @@ def _finish(spec: Specification, manifest: Manifest, folder: Path) -> None:
     write_manifest(replace(manifest, card_sha256=hashlib.sha256(content).hexdigest()), folder)
 
 
-def _sweep_up(folder: Path) -> None:
-    """Remove what files were begun and not finished."""
-    for suffix in (".nc", ".json", ".md"):
-        for leftover in folder.glob(f".*.tmp{suffix}"):
-            leftover.unlink(missing_ok=True)
-
-
 def _begun(spec: Specification, folder: Path) -> Manifest:
     """What there is of the data set in a folder, without the files that are not whole."""
-    _sweep_up(folder)
     if not (folder / MANIFEST).exists():
         strangers = [*folder.glob("shard-*.nc"), *folder.glob(CARD)]
         if strangers:

@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
+from tactile_bayes.netcdf import read_netcdf, write_netcdf
 
 __all__ = [
     "contact_draws",
@@ -136,8 +136,7 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
     if not isinstance(result, xr.DataTree):
         raise InferenceError("this is no result: give the tree that infer_contour or infer_contacts has returned")
     posterior_draws(result)
-    with write_atomically(path) as temporary:
-        result.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(result, path)
 
 
 def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
@@ -146,16 +145,15 @@ def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
     Raises
     ------
     InferenceError
-        If the file is none.
+        If the file is none, or damaged.
     """
     path = Path(path)
     try:
-        with xr.open_datatree(path, engine="h5netcdf") as tree:
-            result = tree.load()
+        result = read_netcdf(path, xr.open_datatree, lambda what: InferenceError(f"{path} {what}: infer again"))
     except FileNotFoundError:
         raise InferenceError(f"there is no file {path}") from None
-    except (OSError, ValueError) as error:
-        raise InferenceError(f"{path} is no NetCDF file of a posterior: {error}") from error
+    except OSError as error:
+        raise InferenceError(f"{path} cannot be opened ({error.strerror}): give the file of a posterior") from error
     posterior_draws(result)
     return result
 

@@ -14,6 +14,7 @@ from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, LOAD_CELL_UNITS, UNITS, Frame
 from tactile_bayes.record.spelling import nearest
+from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
 from tactile_bayes.rod import Rod
 
@@ -144,6 +145,8 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
                 raise source.attribute_error(name, f"is {plain!r}: give {what}")
         elif name.startswith("load_cell_") and _is_quantity(plain):
             raise source.attribute_error(name, f"is {plain!r}, but {no_entry(name.removeprefix('load_cell_'))}")
+        if isinstance(plain, str) and (reason := not_storable(plain)):
+            raise source.attribute_error(name, f"{reason}, which no file can store: remove it")
         is_storable = isinstance(plain, str | float) or (
             isinstance(plain, int) and not isinstance(plain, bool) and -(2**63) <= plain < 2**63
         )

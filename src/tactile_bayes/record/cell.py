@@ -25,8 +25,11 @@ def number_in(cell: Any) -> float | None:
 
 def integer_in(cell: Any) -> int | None:
     """The integer in a cell, None if there is something else in it; 2.0 is one, as tables often write it so."""
-    if isinstance(cell, int) or (isinstance(cell, str) and is_integer_text(cell)):
-        integer = int(cell)
+    if isinstance(cell, int):
+        integer = cell
+    elif isinstance(cell, str) and is_integer_text(cell):
+        digits = cell.strip().lstrip("+-").lstrip("0")[:20] or "0"  # 20 are too many; Python refuses more than 4300
+        integer = -int(digits) if "-" in cell else int(digits)
     else:
         number = number_in(cell)
         if number is None or not number.is_integer():

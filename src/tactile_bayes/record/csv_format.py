@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.files import write_atomically
 from tactile_bayes.record.csv_header import (
     FORMAT,
     KINDS,
@@ -39,7 +40,7 @@ def write_csv(record: xr.Dataset, path: Path) -> None:
     """Write a record that has been validated."""
     columns = {str(name): variable for name, variable in record.variables.items()}
     columns = {name: columns[name] for name in sorted(columns, key=lambda name: name not in MEASURED)}
-    with open(path, "w", encoding="utf-8", newline="") as file:
+    with write_atomically(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
         file.write(f"# tactile_bayes record, format {FORMAT}\n")
         for name, value in record.attrs.items():
             file.write(header_line(name, value, record.attrs["units"]))

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any, BinaryIO
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
-from tactile_bayes.record.encoding import not_utf8
+from tactile_bayes.record.encoding import WITH_NUL, not_utf8
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, MEASURED
 from tactile_bayes.record.table import Source
@@ -124,7 +124,8 @@ def read_header(file: BinaryIO, source: Source) -> Header:
             continue
         content = _unpadded(line[1:])
         if match := _FORMAT_LINE.fullmatch(content):
-            if int(match["format"]) > FORMAT:
+            found = integer_in(match["format"])
+            if found is None or found > FORMAT:
                 raise source.line_error(
                     number,
                     f"the file has format {match['format']}, but this version of tactile_bayes reads formats up to "
@@ -153,9 +154,12 @@ def read_header(file: BinaryIO, source: Source) -> Header:
 def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
     for number, line in enumerate(iter(file.readline, b""), start=1):
         try:
-            yield line.decode("utf-8-sig" if number == 1 else "utf-8")
+            text = line.decode("utf-8-sig" if number == 1 else "utf-8")
         except UnicodeDecodeError as error:
             raise source.line_error(number, not_utf8(error)) from error
+        if "\0" in text:
+            raise source.line_error(number, WITH_NUL)
+        yield text
 
 
 def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) -> dict[str, str | int | float]:

@@ -15,8 +15,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
-from tactile_bayes.record.encoding import not_utf8
+from tactile_bayes.record.encoding import WITH_NUL, not_utf8
 from tactile_bayes.record.schema import Kind
+from tactile_bayes.record.storable import LONGEST_CELL
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.text import FREE, text_array
 
@@ -257,7 +258,10 @@ def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
     for index, (name, kind) in enumerate(kinds.items()):
         values = frame[index].to_numpy()
         if kind == "text":
-            values = _text_array(values.tolist(), name in layout.meant)
+            texts = values.tolist()
+            if max(map(len, texts)) > LONGEST_CELL:
+                return None
+            values = _text_array(texts, name in layout.meant)
         elif values.dtype != (np.int64 if kind == "integer" else np.float64):
             return None
         columns[name] = values
@@ -318,7 +322,10 @@ def _read_carefully(
             if reader.line_num == len(lines):
                 break
     except csv.Error as error:
-        raise source.line_error(begin, f"the line cannot be read ({error}): correct it") from error
+        raise source.line_error(
+            begin,
+            f"the line cannot be read ({error}): correct it; a quotation mark that is not closed takes in what follows",
+        ) from error
     here = Source(source.name, begins, aliases=source.aliases)
     order = sorted(layout.names, key=lambda name: name not in layout.meant)  # they show what separates decimals
     places = {name: index for index, name in enumerate(layout.names)}
@@ -333,6 +340,9 @@ def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
     except UnicodeDecodeError as error:
         line = above + 1 + chunk.count(b"\n", 0, error.start)
         raise source.line_error(line, not_utf8(error)) from error
+    if "\0" in text:
+        line = above + 1 + text.count("\n", 0, text.index("\0"))
+        raise source.line_error(line, WITH_NUL)
     return io.StringIO(text, newline="").readlines()
 
 

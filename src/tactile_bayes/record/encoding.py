@@ -9,8 +9,9 @@ from typing import BinaryIO
 
 from tactile_bayes.record.table import Source
 
-__all__ = ["in_utf8", "not_utf8", "refuse_other_kinds"]
+__all__ = ["WITH_NUL", "in_utf8", "not_utf8", "refuse_other_kinds"]
 
+WITH_NUL = "there is a NUL character (0x00), which is no text: remove it"
 _CHUNK = 1 << 21
 _SAVE = "save it as CSV in UTF-8"
 _BEYOND_ASCII = re.compile("[^\0-\x7f]")

@@ -10,7 +10,6 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.errors import RecordError
-from tactile_bayes.files import write_atomically
 from tactile_bayes.record.construction import completed_record
 from tactile_bayes.record.conversion import in_units_of_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
@@ -180,8 +179,7 @@ def write_record(record: xr.Dataset, path: str | os.PathLike[str]) -> None:
     path = Path(path)
     write = _WRITERS[_suffix(path)]
     record = validate(record)
-    with write_atomically(path) as temporary:
-        write(record, temporary)
+    write(record, path)
 
 
 def _suffix(path: Path) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from tactile_bayes import netcdf
 from tactile_bayes.record.table import Source, Table, table_of
 
 __all__ = ["read_netcdf", "write_netcdf"]
@@ -19,19 +21,14 @@ def read_netcdf(path: Path, columns: Mapping[str, str]) -> Table:
     The dimension of the samples may have any name, if all columns lie along it.
     """
     source = Source(str(path))
-    with open(path, "rb"):  # what the system refuses, it refuses in fewer words than HDF5
-        pass
-    try:
-        with xr.open_dataset(
-            path,
-            engine="h5netcdf",
-            decode_times=False,
-            decode_timedelta=False,
-            decode_coords=False,
-        ) as stored:
-            record = stored.load()
-    except (OSError, ValueError) as error:
-        raise source.error(f"this is no NetCDF file that can be read ({error}): write it again") from error
+    record = netcdf.read_netcdf(
+        path,
+        xr.open_dataset,
+        lambda what: source.error(f"the file {what}: write it again, or put a copy of it back"),
+        decode_times=False,
+        decode_timedelta=False,
+        decode_coords=False,
+    )
     dimensions = {variable.dims for variable in record.variables.values()}
     shared = dimensions.pop() if len(dimensions) == 1 else ()
     return table_of(record, source, shared[0] if len(shared) == 1 else "sample")
@@ -41,12 +38,14 @@ def write_netcdf(record: xr.Dataset, path: Path) -> None:
     """Write a record that has been validated."""
     record = record.reset_coords([name for name in record.coords if name not in record.dims])
     encoding: dict[Any, dict[str, Any]] = {}
+    taken = {*map(str, record.variables), "sample"}
     for name, variable in record.variables.items():
         if variable.dtype.kind == "U":  # as fixed-width characters, which every NetCDF library reads
-            dimension = f"{name}_length"
-            while dimension in record.variables:
+            dimension = re.sub(r"\d", "_", f"{name}_length")  # a number in it would be taken for the length
+            while dimension in taken:
                 dimension += "_"
+            taken.add(dimension)
             encoding[name] = {"dtype": "S1", "char_dim_name": dimension}
         elif variable.dtype.kind != "O":  # objects are texts of different lengths
             encoding[name] = {"_FillValue": None}
-    record.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+    netcdf.write_netcdf(record, path, encoding)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, number_in
 from tactile_bayes.record.schema import Kind, column_of
+from tactile_bayes.record.storable import LONGEST_CELL, not_storable
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.text import text_array
 
@@ -42,6 +43,7 @@ def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[An
         if (integers == values).all() and (np.abs(values) < 2.0**63).all():
             return integers
     if kind == "text" and values.dtype.kind == "U":
+        _refuse_text(name, values, source)
         return values
     parse: Callable[[Any], Any] = {"integer": integer_in, "number": number_in, "text": _text}[kind]
     cells = values.tolist()
@@ -50,7 +52,21 @@ def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[An
         bad = parsed.index(None)
         what = {"integer": "an integer", "number": "a number", "text": "text"}[kind]
         raise source.cell_error(bad, name, f"{cells[bad]!r} is not {what}: correct it, or remove the row")
-    return text_array(parsed) if kind == "text" else np.array(parsed, np.int64 if kind == "integer" else np.float64)
+    if kind == "text":
+        _refuse_text(name, values, source)
+        return text_array(parsed)
+    return np.array(parsed, np.int64 if kind == "integer" else np.float64)
+
+
+def _refuse_text(name: str, values: NDArray[Any], source: Source) -> None:
+    """Refuse cells that no file, or not every one, can store."""
+    cells = values.tolist()
+    for text in set(cells):
+        reason = not_storable(text)
+        if reason is None and len(text) > LONGEST_CELL:
+            reason = f"has {len(text)} characters, more than {LONGEST_CELL}"
+        if reason:
+            raise source.cell_error(cells.index(text), name, f"the text {reason}: correct it, or shorten it")
 
 
 def _text(cell: Any) -> str | None:

@@ -61,6 +61,10 @@ _COMMON = {
     (-1, 0, 0, 0): ("1/m", "1/cm", "1/mm"),
     (0, 0, 0, 1): ("rad", "mrad", "deg", "°"),
 }
+_LONGEST = 100
+_LARGEST = 10**100
+"""Characters of a unit, and the most that one is in SI: what is longer or more is none."""
+
 _SYMBOL = re.compile(
     rf"(?P<prefix>{'|'.join(sorted(_PREFIXES, key=len, reverse=True))})"
     rf"(?P<base>{'|'.join(sorted(_BASES, key=len, reverse=True))})"
@@ -117,6 +121,8 @@ def unit_of(text: str) -> Unit | None:
     >>> unit_of("furlong") is None
     True
     """
+    if len(text) > _LONGEST:
+        return None
     text = unicodedata.normalize("NFKC", text).strip()
     text = _WORDS.get(text.lower(), text)
     scale, dimension = Fraction(1), (0, 0, 0, 0)
@@ -132,7 +138,7 @@ def unit_of(text: str) -> Unit | None:
                     sum(pair) for pair in zip(dimension, (sense * power for power in factor.dimension), strict=True)
                 )
                 dimension = (length, force, time, angle)
-    return Unit(scale, dimension)
+    return Unit(scale, dimension) if max(scale, 1 / scale) < _LARGEST else None
 
 
 def _factors(piece: str) -> tuple[Unit, ...] | None:

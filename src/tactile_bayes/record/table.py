@@ -17,6 +17,9 @@ __all__ = ["Cells", "Source", "Table", "table_of"]
 Cells = tuple[NDArray[Any], Mapping[str, Any]]
 """The values of a column, shape (n_samples,), and its attributes."""
 
+_LONGEST = 1500
+"""Characters of a refusal."""
+
 
 @dataclass(frozen=True)
 class Source:
@@ -54,6 +57,8 @@ class Source:
 
     def error(self, what: str) -> RecordError:
         """A refusal of the table."""
+        if len(what) > _LONGEST:  # what a file has in it may be of any length; the remedy is at the end
+            what = f"{what[: _LONGEST // 2]} … {what[-_LONGEST // 2 :]}"
         return RecordError(f"{self.name}: {what}" if self.name else what)
 
     def line_error(self, line: int, what: str) -> RecordError:

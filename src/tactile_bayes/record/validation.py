@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from tactile_bayes.record.attributes import checked_attributes, stated_frame
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.schema import CHANNELS, COLUMNS, FRAMES, MEASURED, REQUIRED, column_of, same_unit
 from tactile_bayes.record.spelling import nearest
-from tactile_bayes.record.storable import is_storable, storable
+from tactile_bayes.record.storable import is_storable, is_storable_attribute, not_storable, storable
 from tactile_bayes.record.sweep import refuse_impossible_sweeps
 from tactile_bayes.record.table import Cells, Source, Table, table_of
 
@@ -71,7 +71,7 @@ def validate(record: xr.Dataset) -> xr.Dataset:
 def checked_record(table: Table) -> xr.Dataset:
     """The record that a table makes, or the reason why it makes none."""
     columns, attrs, source = table.columns, table.attrs, table.source
-    _refuse_names(attrs, source)
+    _refuse_names(attrs, source, is_storable_attribute)
     attributes = checked_attributes(attrs, source)
     _refuse_absent_columns(columns, source)
     table.refuse_empty()
@@ -82,7 +82,7 @@ def checked_record(table: Table) -> xr.Dataset:
     values = {name: parsed_column(name, filled[name][0], source) for name in order}
     _refuse_gaps(values, source)
     refuse_impossible_sweeps(values, source)
-    _refuse_names(columns, source)
+    _refuse_names(columns, source, is_storable)
     variables = {
         name: ("sample", values[name], _checked_column_attributes(name, filled[name][1], attributes, source))
         for name in order
@@ -90,21 +90,27 @@ def checked_record(table: Table) -> xr.Dataset:
     return xr.Dataset(variables, attrs=attributes)
 
 
-def _refuse_names(names: Collection[Any], source: Source) -> None:
+def _refuse_names(names: Collection[Any], source: Source, is_allowed: Callable[[Any], bool]) -> None:
     for name in names:
-        if is_storable(name):
+        if is_allowed(name):
             continue
         what = f"the name {name!r} cannot be stored in every file"
         if isinstance(name, str) and name in source.names and is_storable(storable(name)):
             what += f", and as {storable(name)!r} there is another column: rename one of the two"
         else:
-            what += ": use printable characters, no '/', and not '.' alone"
+            what += (
+                ": use printable characters, at most 200 bytes of them, no '/', not '.' alone, and no name that NetCDF "
+                "keeps for itself"
+            )
         raise source.error(what)
 
 
 def _checked_column_attributes(
     name: str, attrs: Mapping[str, Any], of_record: Mapping[str, Any], source: Source
 ) -> dict[str, Any]:
+    for key, value in attrs.items():
+        if isinstance(value, str) and (reason := not_storable(value)):
+            raise source.column_error(name, f"has an attribute {key!r} that {reason}: remove it")
     column = column_of(name)
     if column is None:
         return {"units": "unknown", "long_name": name, **attrs}

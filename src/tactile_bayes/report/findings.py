@@ -13,6 +13,7 @@ import xarray as xr
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.load_cell import zero_load
+from tactile_bayes.netcdf import read_netcdf
 from tactile_bayes.record import record_hash
 from tactile_bayes.runs.contour import contact_points, reach, summary
 from tactile_bayes.runs.run_folder import posterior_in
@@ -150,12 +151,7 @@ def findings_of(
 
 def _contour_posterior(path: Path) -> xr.DataTree:
     """A result of `infer_contour`, and nothing else."""
-    try:
-        posterior = read_result(path)
-    except InferenceError:
-        raise
-    except Exception as error:  # what HDF5 finds in a damaged file is raised as anything
-        raise InferenceError(f"{path} cannot be read, it is damaged or cut short: infer again ({error})") from error
+    posterior = read_result(path)
     lacks = [name for name in _GROUPS if name not in posterior.children]
     lacks += [name for name in _SAID if name not in posterior.attrs]
     if lacks:
@@ -173,10 +169,7 @@ def _comparison_in(run: Path, compare: Path | None, data_sha256: str) -> xr.Data
         if compare is None:
             return None
         raise InferenceError(f"{compare} holds no comparison.nc: {remedy}")
-    try:
-        found = xr.load_dataset(path, engine="h5netcdf")
-    except Exception as error:  # likewise
-        raise InferenceError(f"{path} cannot be read, it is damaged or cut short: compare again ({error})") from error
+    found = read_netcdf(path, xr.open_dataset, lambda what: InferenceError(f"{path} {what}: compare again"))
     if "family" not in found.dims or not {*_COMPARISON} <= set(found.data_vars) or "verdict" not in found.attrs:
         raise InferenceError(f"{path} is no comparison of shapes: {remedy}")
     if "data_sha256" not in found.attrs:

@@ -14,6 +14,7 @@ import xarray as xr
 from tactile_bayes.calibration.calibrate import calibrate
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.files import write_atomically
+from tactile_bayes.netcdf import write_netcdf
 from tactile_bayes.runs.picture import write_picture
 
 __all__ = ["CalibrationRun", "calibrate_into"]
@@ -64,8 +65,7 @@ def calibrate_into(out: str | os.PathLike[str], **options: Any) -> CalibrationRu
         "ranks": folder / "ranks.png",
         "coverage": folder / "coverage.png",
     }
-    with write_atomically(files["calibration"]) as temporary:
-        found.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(found, files["calibration"])
     with write_atomically(files["verdict"]) as temporary:
         temporary.write_text(f"{found.attrs['verdict']}\n", encoding="utf-8")
     _draw(found, files["ranks"], files["coverage"])

@@ -15,6 +15,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.netcdf import write_netcdf
 from tactile_bayes.runs.picture import write_picture
 from tactile_bayes.uncertainty.family_comparison import compare_families
 from tactile_bayes.uncertainty.suspicions import suspicions
@@ -95,8 +96,7 @@ def write_comparison(comparison: xr.Dataset, folder: Path) -> dict[str, Path]:
         "table": folder / "comparison.csv",
         "families": folder / "families.png",
     }
-    with write_atomically(files["comparison"]) as temporary:
-        comparison.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(comparison, files["comparison"])
     with write_atomically(files["table"]) as temporary:
         _by_family(comparison).to_dataframe().to_csv(temporary)
     _draw(comparison, files["families"])

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.files import write_atomically
+from tactile_bayes.netcdf import write_netcdf
 from tactile_bayes.planning.design import design
 from tactile_bayes.runs.outermost import outermost
 from tactile_bayes.runs.picture import write_picture
@@ -67,8 +68,7 @@ def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, *
         "words": folder / "words.txt",
         "figure": folder / "design.png",
     }
-    with write_atomically(files["design"]) as temporary:
-        found.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(found, files["design"])
     columns = [name for name, values in found.data_vars.items() if values.dims == ("candidate",)]
     with write_atomically(files["candidates"]) as temporary:
         rows = np.stack([found[name].values for name in columns], axis=1)

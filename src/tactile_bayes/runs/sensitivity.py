@@ -15,6 +15,7 @@ import xarray as xr
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.ledger import TaskProgress
+from tactile_bayes.netcdf import write_netcdf
 from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
@@ -117,8 +118,7 @@ def sensitivity_into(
     found = sensitivity(**options, progress=lambda part: told(part.done))
     folder.mkdir(parents=True, exist_ok=True)
     files = {"sensitivity": folder / "sensitivity.nc", "words": folder / "words.txt"}
-    with write_atomically(files["sensitivity"]) as temporary:
-        found.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(found, files["sensitivity"])
     with write_atomically(files["words"]) as temporary:
         temporary.write_text(f"{found.attrs['words']}\n", encoding="utf-8")
     for part in found.children:
@@ -128,8 +128,7 @@ def sensitivity_into(
     if material is not None:
         rods = _rods(material, options, lambda rod: told(len(PARTS) + rod.done))
         files |= {"rods": folder / "rods.nc", "required_rod": folder / "required_rod.png"}
-        with write_atomically(files["rods"]) as temporary:
-            rods.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(rods, files["rods"])
         _write_figure(_draw_required_rod, rods, files["required_rod"])
         with write_atomically(files["words"]) as temporary:
             temporary.write_text(f"{found.attrs['words']}\n{rod_in_words(rods)}\n", encoding="utf-8")
@@ -138,8 +137,7 @@ def sensitivity_into(
     inside = folder / "study"
     studied = error_map(out=inside, **study)
     files |= {"cells": inside / CELLS.file, "study": inside / "study.nc", "errors": inside / "study.png"}
-    with write_atomically(files["study"]) as temporary:
-        studied.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(studied, files["study"])
     _write_figure(_draw_study, studied, files["errors"])
     return SensitivityRun(found, rods, studied, files)
 

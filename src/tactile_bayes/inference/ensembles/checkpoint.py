@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.files import alone_in, write_atomically
+from tactile_bayes.files import alone_in, is_temporary, write_atomically
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.identity import changes
 from tactile_bayes.inference.ensembles.walkers import RandomState
@@ -29,8 +29,6 @@ _FORMAT = 1
 
 _BLOCK = re.compile(r"block-(\d{8,})-(\d{8,})\.npz")
 """First step of a block, counted from 0, and the step after its last."""
-
-_UNFINISHED = re.compile(r"\.[0-9a-f]{16}\.tmp\.(npz|json)")
 
 
 class Checkpoint:
@@ -102,17 +100,14 @@ class Checkpoint:
 
     def _found(self) -> list[int]:
         """Ends of the blocks that are there, in steps; they have to be this run's and without gaps."""
-        files = sorted(path.name for path in self._folder.iterdir())
-        leftovers = [name for name in files if _UNFINISHED.fullmatch(name)]
+        files = sorted(path.name for path in self._folder.iterdir() if not is_temporary(path))
         if _DESCRIPTION in files:
             self.judged = self._description()
-        elif strangers := [name for name in files if name not in leftovers]:
+        elif files:
             raise InferenceError(
-                f"{self._folder} holds {strangers[0]!r} and no {_DESCRIPTION}, so it is no checkpoint: give a folder "
+                f"{self._folder} holds {files[0]!r} and no {_DESCRIPTION}, so it is no checkpoint: give a folder "
                 "that is empty or not there yet"
             )
-        for name in leftovers:
-            (self._folder / name).unlink(missing_ok=True)
         end, ends = 0, []
         for begin, stop in sorted((int(m[1]), int(m[2])) for m in map(_BLOCK.fullmatch, files) if m):
             if begin != end or stop <= begin:
