@@ -18,6 +18,7 @@ from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import Coordinates, Draws, Progress, SamplerSettings, Seed, sample, spawn
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.load_cell import LoadCell
@@ -187,7 +188,8 @@ def sampled(
             walk = walk_of(model, seeds[0], settings)
             if walk.beyond:
                 raise InferenceError(
-                    f"the record wants {walk.beyond}: give a wider prior, or are units, rod, base and family right?"
+                    f"the record wants {walk.beyond}: give a wider prior, or are units, rod and base right? "
+                    + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
                 )
         draws = sample(
             model.log_probability,

@@ -19,6 +19,7 @@ from tactile_bayes.inference.ensembles import (
     in_coordinates,
     scatter_walkers,
 )
+from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
@@ -113,7 +114,8 @@ def _scattered(
         best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, optimum.point, strict=False))
         raise InferenceError(
             f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, "
-            "signs, drive angle, rod, base and family right? tactile-bayes inspect may tell"
+            "signs, drive angle, rod and base right? tactile-bayes inspect may tell. "
+            + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
         ) from error
     positive = (model.low == 0.0) & ~np.isin(model.names, MAY_VANISH)
     walked = Logarithms(positive)

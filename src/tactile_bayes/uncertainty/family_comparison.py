@@ -139,7 +139,8 @@ def compare_families(
             Of the posterior.
 
         And `log_density` (family, sample), leave-one-out. Attributes: `verdict` in words, `most_probable`, `none_fits`
-        (1 if no family passes the check), `data_sha256` of the record.
+        (1 if no family passes the check), `nuisances` that were inferred (JSON), `friction` as stated, `data_sha256`
+        of the record.
 
     Raises
     ------
@@ -208,7 +209,8 @@ def compare_families(
         check = check_record(found.tree, false_alarm=false_alarm)
         p_value, passed = float(check.overall_p_value), bool(check.attrs["passed"])
         tried[name] = _Tried(ceiling, found.draws, evidence, foretold, p_value, passed)
-    return _labelled({name: tried[name] for name in names}).assign_attrs(data_sha256=record_hash(measured))
+    asked = {name: problem.about[name] for name in ("nuisances", "friction")}
+    return _labelled({name: tried[name] for name in names}, asked).assign_attrs(data_sha256=record_hash(measured))
 
 
 def _ceiling(model: ContourModel, walk: Walk) -> float:
@@ -229,7 +231,7 @@ def _checked(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]])
     return names
 
 
-def _labelled(tried: Mapping[str, _Tried]) -> xr.Dataset:
+def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Dataset:
     evidences = np.full((len(tried), len(WIDTHS)), np.nan)
     errors = np.full(len(tried), np.nan)
     for i, one in enumerate(tried.values()):
@@ -257,8 +259,8 @@ def _labelled(tried: Mapping[str, _Tried]) -> xr.Dataset:
     foretold = [one.foretold for one in tried.values()]
     if any(of_family is not None for of_family in foretold):
         variables |= _left_out(foretold)
-    result = xr.Dataset(variables, coords={"family": list(tried), "prior_width": list(WIDTHS)})
-    result.attrs = {
+    result = xr.Dataset(variables, coords={"family": list(tried), "prior_width": list(WIDTHS)}, attrs=asked)
+    result.attrs |= {
         "verdict": verdict_on(result),
         "most_probable": str(result.family.values[np.argmax(result.probability.values)]) if complete else "",
         "none_fits": int(not result.fits.any()),
