@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import check_kind, check_seed
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.correction import corrected
 from tactile_bayes.load_cell.corruption import corrupted_loads
@@ -117,6 +118,7 @@ class LoadCell(DataSheet):
         >>> LoadCell.from_record(make_record(columns, attrs=attrs, missing=("force_x", "force_y"))).moment_noise
         0.02
         """
+        check_kind("record", record, xr.Dataset, "give one, as tactile_bayes.read_record returns it")
         entries = stated_entries(record)
         return cls.from_entries(entries) if entries else None
 
@@ -446,6 +448,4 @@ class LoadCell(DataSheet):
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:
     if isinstance(seed, np.random.Generator):
         return seed
-    if not isinstance(seed, int | np.integer) or seed < 0:
-        raise ParameterError(f"seed={seed!r}: give a nonnegative integer or a numpy.random.Generator")
-    return np.random.default_rng(seed)
+    return np.random.default_rng(check_seed(seed, "give a nonnegative integer or a numpy.random.Generator"))

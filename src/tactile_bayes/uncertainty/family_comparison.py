@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.checks import check_function, check_mapping, check_names, check_probability, check_switch
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, spawn
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.matched_priors import matched_priors
@@ -172,8 +173,11 @@ def compare_families(
     >>> found.attrs["most_probable"], found.fits.values.tolist()
     ('circle', [True, True, False])
     """
-    settings = settings or SamplerSettings()
-    names = _checked(families, priors or {})
+    settings = settings_of(settings)
+    check_switch("leave_one_out", leave_one_out)
+    check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
+    check_function("progress", progress)
+    names = _checked(families, priors)
     measured = with_rod(validate(measured), rod)
     length = rod_of(measured).length
     seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
@@ -219,15 +223,17 @@ def _ceiling(model: ContourModel, walk: Walk) -> float:
     return float(np.max(model.log_probability(points) - model.log_prior(points)))
 
 
-def _checked(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]]) -> list[str]:
+def _checked(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]] | None) -> list[str]:
     if isinstance(families, str):
         raise ParameterError(f"families is {families!r}: give several, like ['parabola', {families!r}]")
-    names = [family_named(name).name for name in families]
+    names = [family_named(name).name for name in check_names("families", families)]
     if len(set(names)) < 2 or len(set(names)) < len(names):
         raise ParameterError(f"families are {', '.join(names) or 'none'}: give two or more different ones")
-    for name in priors:
+    check_mapping("priors", priors, "give those of each family by its name, {'circle': {'r': ...}}")
+    for name, of_family in (priors or {}).items():
         if name not in names:
             raise ParameterError(f"there are priors for {name!r}, which is not among the families {', '.join(names)}")
+        check_mapping(f"priors[{name!r}]", of_family, "give distributions by name of a parameter")
     return names
 
 

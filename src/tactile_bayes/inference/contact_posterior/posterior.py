@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.checks import as_number, check_choice, check_function, check_optional, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
 from tactile_bayes.inference.contact_posterior.draws import (
@@ -145,6 +146,10 @@ def infer_contacts(
     """
     measured = with_rod(validate(measured), rod)
     _refuse_options(draws, method, settings)
+    check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
+    check_function("progress", progress)
+    if as_number(friction) is None:
+        raise refused("friction", friction, "give Coulomb's coefficient, a number from 0 up")
     cell = load_cell or LoadCell.from_record(measured)
     if cell is None:
         raise ParameterError(
@@ -176,12 +181,13 @@ def _chance_of_misfit(measured: xr.Dataset, cell: LoadCell, friction: float) -> 
 
 
 def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -> None:
+    check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
     if settings is not None and settings.ensembles != CHAINS:
         raise ParameterError(f"{settings.ensembles} ensembles: give {CHAINS}, one for each chain of the result")
-    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < CHAINS or draws % CHAINS:
-        raise ParameterError(f"draws is {draws!r}: give a multiple of {CHAINS}, one share for each chain")
-    if method not in ("auto", "importance", "emcee"):
-        raise ParameterError(f"method is {method!r}: choose 'auto', 'importance' or 'emcee'")
+    remedy = f"give a multiple of {CHAINS}, one share for each chain"
+    if check_whole_number("draws", draws, CHAINS, remedy) % CHAINS:
+        raise refused("draws", draws, remedy)
+    check_choice("method", method, ("auto", "importance", "emcee"))
 
 
 def _density(
