@@ -127,15 +127,15 @@ def check_probability(
     return check_number(name, value, remedy, least=math.ulp(0.0), most=math.nextafter(below, 0.0))
 
 
-def check_whole_number(name: str, value: Any, least: int, remedy: str = "") -> int:
-    """Return a whole number from `least` up, which no truth value is.
+def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, most: float = math.inf) -> int:
+    """Return a whole number from `least` to `most`, which no truth value is.
 
     Examples
     --------
     >>> check_whole_number("draws", np.int64(4), 1)
     4
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
         raise refused(name, value, remedy or f"give a whole number from {least} up")
     return int(value)
 
@@ -209,7 +209,9 @@ def check_names(name: str, values: Any) -> list[str]:
 
 def check_mapping(name: str, values: Any, remedy: str) -> None:
     """Refuse what is no mapping from names, except None."""
-    if values is not None and not (isinstance(values, Mapping) and all(isinstance(key, str) for key in values)):
+    is_dataset = hasattr(values, "data_vars")  # which maps names, too, but to columns
+    is_mapping = isinstance(values, Mapping) and not is_dataset and all(isinstance(key, str) for key in values)
+    if values is not None and not is_mapping:
         raise refused(name, values, remedy)
 
 

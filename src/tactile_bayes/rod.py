@@ -59,8 +59,13 @@ class Rod:
         check_number("the rod's diameter", self.diameter, "give zero or a positive number [m]", least=0.0)
         if self.elastic_strain is not None:
             check_positive("the rod's elastic strain", self.elastic_strain, "give a positive number, or none")
-        square = self.length**2
-        if not (square > 0.0 and 0.0 < self.flexural_rigidity / square < math.inf):
+        if self.diameter > self.length:
+            raise ParameterError(
+                f"the rod's diameter is {self.diameter!r} and its length {self.length!r}: a rod is longer than it is "
+                "thick, give both in metres"
+            )
+        square = float(self.length) * float(self.length)
+        if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
             raise ParameterError(
                 f"the rod's length is {self.length!r} and its flexural_rigidity {self.flexural_rigidity!r}, so that "
                 "its unit of force EI/L² is beyond what numbers hold: are they in metres and N m²?"
@@ -96,7 +101,8 @@ class Rod:
         """
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
             check_positive(f"the rod's {name}", value)
-        return cls(length, youngs_modulus * math.pi * diameter**4 / 64, diameter, elastic_strain)
+        square = float(diameter) * float(diameter)
+        return cls(length, youngs_modulus * math.pi * (square * square) / 64, diameter, elastic_strain)
 
     @property
     def is_dimensionless(self) -> bool:

@@ -205,7 +205,7 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
-    check_choice("direction", direction, ("both", "forward", "backward"))
+    check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
     directions: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
     rod = Rod() if rod is None else rod
     check_number(
@@ -215,8 +215,9 @@ def scan(
         least=_FINEST,
         most=_COARSEST,
     )
-    grid = None if drive_angles is None else np.unique(_floats(drive_angles))
-    if grid is not None and not (grid.size and np.all(np.isfinite(grid)) and np.all(np.abs(grid) <= 2.0 * np.pi)):
+    given = None if drive_angles is None else _floats(drive_angles)
+    grid = None if given is None else np.unique(given)
+    if given is not None and not (given.ndim < 2 and given.size and np.all(np.abs(given) <= 2.0 * np.pi)):
         raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
 
     columns: list[dict[str, NDArray[np.generic]]] = []

@@ -298,7 +298,8 @@ def _scalar(name: str, value: Any) -> float:
 
 
 def _triple(name: str, values: Any) -> Triple:
-    numbers = [as_number(value) for value in values] if np.iterable(values) and not isinstance(values, str) else []
+    is_listed = np.iterable(values) and not isinstance(values, str | bytes)
+    numbers = [as_number(value) for value in values] if is_listed else []
     one, two, three = numbers if len(numbers) == 3 else (None, None, None)
     if one is None or two is None or three is None or not all(map(math.isfinite, (one, two, three))):
         raise ParameterError(f"the load cell's {name} is {shown(values)}: give three finite numbers ({_MEANING[name]})")

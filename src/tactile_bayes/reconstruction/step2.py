@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from tactile_bayes.checks import check_choice, check_number, check_optional
+from tactile_bayes.checks import check_choice, check_number, check_optional, refused
 from tactile_bayes.contact_fit import Reading
 from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES, TANGENTIAL
 from tactile_bayes.load_cell import LoadCell
@@ -148,6 +148,9 @@ def reconstruct(
     check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     measured = with_rod(validate(measured), rod)
     check_number("suspension_compliance", suspension_compliance, "give a number from 0 up", least=0.0)
+    if suspension_compliance * float(np.abs(np.nan_to_num(measured.holding_moment.values)).max()) > 2.0 * np.pi:
+        remedy = "with such moments the pivot would give way by more than a turn: give radians per moment"
+        raise refused("suspension_compliance", suspension_compliance, remedy)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     samples = samples_of(measured, cell, suspension_compliance)
     estimate = _METHODS[method](samples, np.full(samples.side.size, np.arctan(friction)))

@@ -88,7 +88,8 @@ def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Fl
     """Heights at x of up to `most` contours, evenly picked from the posterior's draws; shape (contours, x)."""
     contours = contours_drawn(posterior, most)
     every = np.arange(contours.shape[0])[:, None]
-    return np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
+    with np.errstate(over="ignore"):  # far out, where no contour is
+        return np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
 
 
 def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:

@@ -182,9 +182,8 @@ def compare_families(
     length = rod_of(measured).length
     seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
     tried: dict[str, _Tried] = {}
-    # What fits anything comes first: others that are far from fitting need not be sampled then.
-    for name in sorted(names, key=lambda name: name != SHAPE_FREE.name):
-        problem = contour_problem(
+    problems = {
+        name: contour_problem(
             measured,
             family=name,
             load_cell=load_cell,
@@ -194,6 +193,10 @@ def compare_families(
             nuisances=nuisances,
             events=True,
         )
+        for name in names
+    }
+    # What fits anything comes first: others that are far from fitting need not be sampled then.
+    for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
         best = max((one.evidence.log_evidence[_USUAL] for one in tried.values() if one.evidence), default=-np.inf)
         of_family = spawn(seeds[name], 4)
         with threadpool_limits(1):

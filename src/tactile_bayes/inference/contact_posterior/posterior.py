@@ -41,6 +41,8 @@ Floats = NDArray[np.float64]
 _UNLIKELY = 1e-4
 """Probability of a misfit below which the loads are not those of the rod."""
 
+_MOST_DRAWS = 10**6
+
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
 
@@ -184,8 +186,8 @@ def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -
     check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
     if settings is not None and settings.ensembles != CHAINS:
         raise ParameterError(f"{settings.ensembles} ensembles: give {CHAINS}, one for each chain of the result")
-    remedy = f"give a multiple of {CHAINS}, one share for each chain"
-    if check_whole_number("draws", draws, CHAINS, remedy) % CHAINS:
+    remedy = f"give a multiple of {CHAINS}, one share for each chain, and at most {_MOST_DRAWS}"
+    if check_whole_number("draws", draws, CHAINS, remedy, most=_MOST_DRAWS) % CHAINS:
         raise refused("draws", draws, remedy)
     check_choice("method", method, ("auto", "importance", "emcee"))
 

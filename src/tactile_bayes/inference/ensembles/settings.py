@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from tactile_bayes.checks import check_number, check_optional, check_positive, refused
+from tactile_bayes.checks import check_number, check_optional, check_positive, check_whole_number
 from tactile_bayes.errors import ParameterError
 
 __all__ = ["SamplerSettings", "refuse_few_walkers", "settings_of"]
+
+_MOST = 10**9
+"""Of ensembles, walkers and steps."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,7 @@ class SamplerSettings:
             value = getattr(self, name)
             if value is None and name == "walkers":
                 continue
-            if isinstance(value, bool) or not isinstance(value, int | np.integer):
-                raise refused(name, value, "give a whole number")
+            check_whole_number(name, value, -_MOST, f"give a whole number, at most {_MOST}", most=_MOST)
         if self.ensembles < 2:
             raise ParameterError(
                 f"{self.ensembles} ensembles: give at least 2 (4 is better), since convergence is judged by comparing "
