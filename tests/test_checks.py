@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import math
-import re
 import warnings
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -15,11 +13,26 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
-from tactile_bayes.checks import as_number, as_numbers, check_names, check_path, check_probability, check_whole_number
+from tactile_bayes.checks import (
+    as_number,
+    as_numbers,
+    check_mapping,
+    check_names,
+    check_path,
+    check_probability,
+    check_whole_number,
+    shown,
+)
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
+from tactile_bayes.inference import contour
+from tactile_bayes.inference.contact_posterior import posterior as contact_posterior
+from tactile_bayes.uncertainty import family_comparison
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-BRIEF = tb.SamplerSettings(ensembles=2, walkers=24, max_steps=2, block_steps=2)
+
+
+class AcceptedError(Exception):
+    """A posterior is about to be sampled: all arguments were accepted."""
 
 
 @functools.cache
@@ -56,7 +69,8 @@ def no_posteriors():
     unnamed.attrs = {}
     other = posterior().copy()
     other.attrs = {**posterior().attrs, "family": "circle"}
-    empty = xr.DataTree.from_dict({name: posterior()[name].to_dataset().isel(draw=[]) for name in ("posterior", "events")})
+    groups = {name: posterior()[name].to_dataset().isel(draw=[]) for name in ("posterior", "events")}
+    empty = xr.DataTree.from_dict(groups)
     empty.attrs = posterior().attrs
     words = posterior().copy()
     words["posterior"] = xr.DataTree(xr.Dataset({k: (("chain", "draw"), [["x"]]) for k in ("a", "q", "x_c")}))
@@ -80,6 +94,8 @@ def no_records():
     ]
 
 
+# --- What is wrong, for one argument or another ---------------------------------------------------------------------
+
 WRONG = [
     None,
     "",
@@ -91,16 +107,14 @@ WRONG = [
     -1,
     -0.5,
     0,
-    0.0,
     1e-320,
     1e308,
     10**400,
     True,
-    False,
+    np.bool_(False),
     1.5,
     2 + 1j,
     np.complex128(1j),
-    np.bool_(True),
     np.datetime64("2020-01-01"),
     [],
     [None],
@@ -109,7 +123,6 @@ WRONG = [
     [1.0, math.inf],
     [True, 1.0],
     [[1.0, 2.0], [3.0]],
-    (),
     {},
     {"left": 1},
     {1: 2.0},
@@ -121,7 +134,6 @@ WRONG = [
     np.zeros((2, 3, 4)),
     np.array(math.nan),
     object(),
-    float,
     xr.Dataset(),
     xr.DataArray([1.0, 2.0]),
     xr.DataTree(),
@@ -130,119 +142,391 @@ WRONG = [
     tb.Rod(),
     tb.Rod(0.1, 1e-5),
     CELL,
-    BRIEF,
+    tb.SamplerSettings(),
     stats.norm(0.0, 1.0),
-    stats.norm,
     np.random.default_rng(1),
 ]
-"""What is wrong for nearly every argument."""
-
 NAMES = [["left"], ["bias", None], ["bias", 1], "bias", ["bias", ["gain"]], {"bias": 1.0}]
 PRIORS = [{"q": 0.5}, {"q": None}, {"q": "norm"}, {"left": stats.norm()}, {"q": stats.norm}, {1: stats.norm()}]
 
 
-def arguments(tmp_path):
-    """Of every name a call that is right, by keyword, and further values that are wrong for one of them."""
+# --- What is right: of these a call may be accepted -----------------------------------------------------------------
+
+
+def number(low=-math.inf, high=math.inf, *, or_infinite=False):
+    """Numbers in [low, high]; to exclude an end, give the next number."""
+
+    def is_right(value):
+        if isinstance(value, bool | np.bool_ | complex) or not isinstance(value, int | float | np.number):
+            return False
+        return low <= value <= high and (or_infinite or abs(value) < 1e309)
+
+    return is_right
+
+
+def numbers(value):
+    """Numbers, or arrays of finite ones; an empty array is one of no contours."""
+    if number()(value):
+        return True
+    is_array = isinstance(value, list | np.ndarray | xr.DataArray) and np.asarray(value).dtype.kind in "iuf"
+    return (
+        is_array and not (isinstance(value, list) and True in [v is True for v in value]) and np.isfinite(value).all()
+    )
+
+
+def whole(low, high=math.inf):
+    return lambda value: type(value) is int and low <= value <= high
+
+
+def kind(of, **attributes):
+    return lambda value: isinstance(value, of) and all(getattr(value, name) == v for name, v in attributes.items())
+
+
+def either(*rights):
+    return lambda value: any(right(value) for right in rights)
+
+
+def one_of(*words):
+    return lambda value: isinstance(value, str) and value in words
+
+
+def empty(*kinds):
+    return lambda value: isinstance(value, kinds) and not isinstance(value, xr.Dataset | xr.DataTree) and not len(value)
+
+
+def nothing(value):
+    return value is None
+
+
+def never(value):
+    return False
+
+
+TINY = math.ulp(0.0)
+AT_LEAST_0, POSITIVE = number(0.0), number(TINY)
+SHARE = number(TINY, math.nextafter(1.0, 0.0))
+FRICTION = number(0.0, 0.85)
+FLAG = kind(bool | np.bool_)
+SEED = whole(0)
+CELL_OR_NONE = either(nothing, kind(tb.LoadCell))
+ROD_OR_NONE = either(nothing, kind(tb.Rod, is_dimensionless=True))
+SETTINGS_OR_NONE = either(nothing, kind(tb.SamplerSettings))
+PROGRESS = either(nothing, callable)
+NONE_NAMED = empty(list, tuple, set)
+NO_PRIORS = either(nothing, empty(dict))
+
+
+def cases(tmp_path):
+    """By name: the function, a call that is right, what is right of each argument, and more that is wrong."""
     good = tmp_path / "good.csv"
     tb.write_record(ideal(), good)
-    contours = tb.contours
-    inference = {"load_cell": CELL, "seed": 1, "rod": None, "friction": 0.0, "settings": BRIEF, "progress": None}
-    contour = {"measured": measured(), **inference, "priors": None, "nuisances": []}
-    records, posteriors = {"measured": no_records()}, {"posterior": no_posteriors()}
-    paths = ["\0", "folder/\0.csv", tmp_path, tmp_path / "record.txt", 3]
-    settings = dict.fromkeys(
-        ("ensembles", "walkers", "block_steps", "max_r_hat", "min_ess", "max_steps", "max_seconds"), None
-    )
-    return {
+    paths = {"path": ["\0", "folder/\0.csv", tmp_path, tmp_path / "record.txt", 3]}
+    of_record, of_posterior = {"measured": no_records()}, {"posterior": no_posteriors()}
+    of_rig = {
+        "measured": (measured(), never),
+        "load_cell": (CELL, CELL_OR_NONE),
+        "seed": (1, SEED),
+        "rod": (None, ROD_OR_NONE),
+        "friction": (0.0, FRICTION),
+        "settings": (None, SETTINGS_OR_NONE),
+        "progress": (None, PROGRESS),
+    }
+    of_contour = {**of_rig, "priors": (None, NO_PRIORS), "nuisances": ([], NONE_NAMED)}
+    place = {"q": (0.5, numbers), "x_c": (0.0, numbers)}
+    contours = {
+        "Parabola": {"a": (0.5, numbers), **place},
+        "Circle": {"r": (0.5, numbers), **place},
+        "Ellipse": {"a": (0.5, numbers), "b": (0.4, numbers), **place},
+        "PowerLaw": {"a": (0.5, numbers), "n": (2.0, numbers), **place},
+    }
+    sheet = dict(vars(tb.LoadCell()))
+    of_sheet = {
+        **dict.fromkeys([name for name in sheet if name.endswith(("noise", "resolution"))], AT_LEAST_0),
+        **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), number(TINY, or_infinite=True)),
+        "drive_angle_offset": number(),
+        "drift": nothing,
+        "frame": nothing,
+    }
+    of_settings = {
+        **dict.fromkeys(("block_steps", "max_steps"), whole(1, 10**9)),
+        "ensembles": whole(2, 10**9),
+        "walkers": nothing,
+        "max_r_hat": number(1.1),
+        "min_ess": POSITIVE,
+        "max_seconds": either(nothing, POSITIVE),
+    }
+    of_rod = {
+        "length": (0.1, number(0.1, 10.0)),
+        "diameter": (0.0, number(0.0, 0.1)),
+        "elastic_strain": (None, either(nothing, POSITIVE)),
+    }
+    made = {
         "scan": (
             tb.scan,
             {
-                "contour": contours.Parabola(0.5, 0.5),
-                "direction": "both",
-                "base": (0.0, 0.0),
-                "drive_step": 0.1,
-                "drive_angles": None,
-                "rod": None,
-                "friction": 0.0,
+                "contour": (tb.contours.Parabola(0.5, 0.5), kind(tb.contours.Circle, shape=())),
+                "direction": ("both", one_of("both", "forward", "backward")),
+                "base": ((0.0, 0.0), never),
+                "drive_step": (0.1, number(1e-6, 0.5)),
+                "drive_angles": (None, either(nothing, lambda value: np.ndim(value) < 2 and numbers(value))),
+                "rod": (None, ROD_OR_NONE),
+                "friction": (0.0, FRICTION),
             },
             {"base": [[(0, 0), (1,)], [0.0, None]], "drive_angles": [["1", "2"], [90.0, 180.0], [[]]]},
         ),
-        "LoadCell": (tb.LoadCell, dict(vars(CELL)), {"gain": [np.zeros((3, 3)), [[1, 2, 3]] * 3], "bias": [[0, 0, "1"]]}),
-        "measure": (CELL.measure, {"record": ideal(), "seed": 1}, {"record": no_records()}),
-        "from_record": (tb.LoadCell.from_record, {"record": measured()}, {}),
-        "from_zero_load": (
+        "LoadCell": (
+            tb.LoadCell,
+            {name: (value, of_sheet.get(name, never)) for name, value in sheet.items()},
+            {"gain": [np.zeros((3, 3)), [[1, 2, 3]] * 3], "bias": [[0, 0, "1"], [0, 0]]},
+        ),
+        "LoadCell.measure": (
+            CELL.measure,
+            {"record": (ideal(), never), "seed": (1, either(SEED, kind(np.random.Generator)))},
+            {"record": no_records()},
+        ),
+        "LoadCell.from_record": (tb.LoadCell.from_record, {"record": (measured(), never)}, {"record": no_records()}),
+        "LoadCell.from_zero_load": (
             tb.LoadCell.from_zero_load,
-            {"record": measured(), "false_alarm": 1e-3},
+            {"record": (measured(), never), "false_alarm": (1e-3, number(TINY, 0.499))},
             {"record": no_records()},
         ),
         "read_record": (
             tb.read_record,
             {
-                "path": good,
-                "columns": None,
-                "split_sweeps": False,
-                "rod": None,
-                "missing": (),
-                "load_cell_frame": None,
+                "path": (good, never),
+                "columns": (None, NO_PRIORS),
+                "split_sweeps": (False, lambda value: FLAG(value) and not value),
+                "rod": (None, ROD_OR_NONE),
+                "missing": ((), NONE_NAMED),
+                "load_cell_frame": (None, nothing),
             },
-            {"path": paths, "columns": [{"force_x": 1}, {"force_x": None}, {"left": "Fx"}], "missing": NAMES},
+            {**paths, "columns": [{"force_x": 1}, {"force_x": None}, {"left": "Fx"}], "missing": NAMES},
         ),
         "write_record": (
             tb.write_record,
-            {"record": ideal(), "path": tmp_path / "out.csv"},
-            {"record": no_records(), "path": paths},
+            {"record": (ideal(), never), "path": (tmp_path / "out.csv", never)},
+            {**paths, "record": no_records()},
         ),
         "reconstruct": (
             tb.reconstruct,
             {
-                "measured": measured(),
-                "method": "constrained",
-                "load_cell": CELL,
-                "rod": None,
-                "friction": 0.0,
-                "suspension_compliance": 0.0,
+                "measured": (measured(), never),
+                "method": ("constrained", one_of("raw", "constrained")),
+                "load_cell": (CELL, CELL_OR_NONE),
+                "rod": (None, ROD_OR_NONE),
+                "friction": (0.0, FRICTION),
+                "suspension_compliance": (0.0, number(0.0, 2.0)),
             },
-            records,
+            of_record,
         ),
         "infer_contour": (
             tb.infer_contour,
-            {**contour, "family": "parabola", "events": True, "checkpoint": None},
-            {**records, "priors": PRIORS, "nuisances": NAMES, "checkpoint": ["\0"]},
+            {
+                **of_contour,
+                "family": ("parabola", never),
+                "events": (True, FLAG),
+                "checkpoint": (None, either(nothing, one_of("left"))),
+            },
+            {**of_record, "priors": PRIORS, "nuisances": NAMES, "checkpoint": ["\0"]},
         ),
-        "SamplerSettings": (tb.SamplerSettings, {**vars(tb.SamplerSettings()), **{n: 4 for n in settings}}, {}),
+        "SamplerSettings": (
+            tb.SamplerSettings,
+            {name: (value, of_settings[name]) for name, value in vars(tb.SamplerSettings()).items()},
+            {},
+        ),
         "contour_band": (
             tb.contour_band,
-            {"posterior": posterior(), "x": [0.0, 0.1], "probability": 0.9, "simultaneous": False},
-            posteriors,
+            {
+                "posterior": (posterior(), never),
+                "x": ([0.0, 0.1], lambda value: np.ndim(value) < 2 and (numbers(value) or empty(list)(value))),
+                "probability": (0.9, SHARE),
+                "simultaneous": (False, FLAG),
+            },
+            of_posterior,
         ),
         "gap": (
             tb.gap,
-            {"posterior": posterior(), "probability": 0.9, "without_events": None},
-            {**posteriors, "without_events": no_posteriors()},
+            {"posterior": (posterior(), never), "probability": (0.9, SHARE), "without_events": (None, nothing)},
+            {**of_posterior, "without_events": no_posteriors()},
         ),
-        "Parabola": (contours.Parabola, {"a": 0.5, "q": 0.5, "x_c": 0.0}, {}),
-        "Circle": (contours.Circle, {"r": 0.5, "q": 0.5, "x_c": 0.0}, {}),
-        "Ellipse": (contours.Ellipse, {"a": 0.5, "b": 0.4, "q": 0.5, "x_c": 0.0}, {}),
-        "PowerLaw": (contours.PowerLaw, {"a": 0.5, "n": 2.0, "q": 0.5, "x_c": 0.0}, {}),
-        "Rod": (tb.Rod, dict(vars(tb.Rod())), {}),
+        **{name: (getattr(tb.contours, name), arguments, {}) for name, arguments in contours.items()},
+        "Rod": (tb.Rod, {**of_rod, "flexural_rigidity": (1.0, POSITIVE)}, {}),
         "Rod.circular": (
             tb.Rod.circular,
-            {"length": 0.1, "diameter": 1e-3, "youngs_modulus": 2e11, "elastic_strain": None},
+            {**of_rod, "diameter": (1e-3, number(1e-3, 0.1)), "youngs_modulus": (2e11, number(1.0, 1e12))},
             {},
         ),
         "compare_families": (
             tb.compare_families,
-            {**contour, "families": ["parabola", "circle"], "leave_one_out": False, "false_alarm": 1e-3},
             {
-                **records,
+                **of_contour,
+                "families": (["parabola", "circle"], never),
+                "leave_one_out": (False, FLAG),
+                "false_alarm": (1e-3, SHARE),
+            },
+            {
+                **of_record,
                 "families": [["parabola"], ["parabola", 1], ["parabola", "left"], ["circle"] * 2],
-                "priors": [{"circle": priors} for priors in PRIORS] + [{"circle": 1}],
+                "priors": [*({"circle": priors} for priors in PRIORS), {"circle": 1}],
                 "nuisances": NAMES,
             },
         ),
         "infer_contacts": (
             tb.infer_contacts,
-            {"measured": measured(), **inference, "settings": None, "prior": "flat", "draws": 4, "method": "importance"},
-            records,
+            {
+                **of_rig,
+                "prior": ("flat", one_of("flat", "polar")),
+                "draws": (4, lambda value: whole(4, 10**6)(value) and value % 4 == 0),
+                "method": ("importance", one_of("auto", "importance", "emcee")),
+            },
+            of_record,
         ),
     }
+    assert set(made) == set(CASES)
+    return made
+
+
+CASES = (
+    "scan",
+    "LoadCell",
+    "LoadCell.measure",
+    "LoadCell.from_record",
+    "LoadCell.from_zero_load",
+    "read_record",
+    "write_record",
+    "reconstruct",
+    "infer_contour",
+    "SamplerSettings",
+    "contour_band",
+    "gap",
+    "Parabola",
+    "Circle",
+    "Ellipse",
+    "PowerLaw",
+    "Rod",
+    "Rod.circular",
+    "compare_families",
+    "infer_contacts",
+)
+
+
+@pytest.fixture
+def before_sampling(monkeypatch, tmp_path):
+    """Have calls that would sample end where they would begin to."""
+
+    def reach(*args, **options):
+        raise AcceptedError
+
+    monkeypatch.setattr(contour, "sampled", reach)
+    monkeypatch.setattr(family_comparison, "walk_of", reach)
+    monkeypatch.setattr(contact_posterior, "draw_contacts", reach)
+    monkeypatch.chdir(tmp_path)
+
+
+def is_accepted(call, **options):
+    """Whether a call is accepted; any other error than one of the package, or a foreign warning, fails the test."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TactileBayesWarning)
+        try:
+            call(**options)
+        except AcceptedError:
+            return True
+        except FileNotFoundError:  # as `read_record` says
+            return False
+        except TactileBayesError as error:
+            said = str(error)
+        else:
+            return True
+    assert 20 < len(said) < 600
+    return False
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_wrong_argument_is_refused_in_words(name, before_sampling, tmp_path):
+    call, arguments, more = cases(tmp_path)[name]
+    usual = {argument: value for argument, (value, _) in arguments.items()}
+    assert is_accepted(call, **usual)
+    rng = np.random.default_rng(CASES.index(name))
+    for argument, (_, is_right) in arguments.items():
+        some = [WRONG[k] for k in rng.choice(len(WRONG), size=20, replace=False)]
+        for value in [None, *some, *more.get(argument, [])]:
+            if is_accepted(call, **{**usual, argument: value}):
+                assert is_right(value), f"{name}({argument}={shown(value)}) was accepted"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_wrong_arguments_alone_and_in_pairs_are_refused_in_words(name, before_sampling, tmp_path):
+    """All wrong values of each argument, and a thousand pairs of them, for each name."""
+    rng = np.random.default_rng(CASES.index(name))
+    call, arguments, more = cases(tmp_path)[name]
+    usual = {argument: value for argument, (value, _) in arguments.items()}
+    values = {argument: [*WRONG, *more.get(argument, [])] for argument in arguments}
+    tried = [{argument: value} for argument, wrong in values.items() for value in wrong]
+    for _ in range(1000):
+        chosen = map(str, rng.choice(list(arguments), size=min(2, len(arguments)), replace=False))
+        tried.append({argument: values[argument][rng.integers(len(values[argument]))] for argument in chosen})
+    for wrong in tried:
+        if is_accepted(call, **{**usual, **wrong}):
+            for argument, value in wrong.items():
+                assert arguments[argument][1](value), f"{name}({argument}={shown(value)}) was accepted"
+
+
+def test_an_unknown_keyword_is_python_s_to_refuse(tmp_path):
+    for call, arguments, _ in cases(tmp_path).values():
+        with pytest.raises(TypeError, match="unexpected keyword argument 'left'"):
+            call(**{argument: value for argument, (value, _) in arguments.items()}, left=1)
+
+
+# --- The checks themselves ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [1, 0.5, np.float32(0.5), np.int8(3), np.array(2.0), xr.DataArray(2.0), math.inf])
+def test_numbers_are_numbers(value):
+    assert as_number(value) == float(value)
+    assert as_numbers(value) == float(value)
+
+
+@pytest.mark.parametrize("value", [None, True, np.bool_(True), "1", b"1", 1j, np.complex128(1), [1.0], np.ones(1)])
+def test_what_is_no_number(value):
+    assert as_number(value) is None
+
+
+def test_a_whole_number_is_neither_a_truth_value_nor_a_fraction():
+    assert check_whole_number("draws", np.uint8(2), 2) == 2
+    for value in (True, 2.0, "2", None, 1):
+        with pytest.raises(ParameterError, match=r"draws is .*: give a whole number from 2 up"):
+            check_whole_number("draws", value, 2)
+
+
+def test_a_probability_is_none_of_its_ends():
+    assert check_probability("share", 0.4, below=0.5) == 0.4
+    for value in (0.0, 0.5, math.nan):
+        with pytest.raises(ParameterError, match="share is"):
+            check_probability("share", value, below=0.5)
+
+
+def test_names_in_any_order_and_form():
+    for values in (["a", "b"], ("a", "b"), np.array(["a", "b"]), {"a": 1, "b": 2}.keys()):
+        assert check_names("nuisances", values) == ["a", "b"]
+    for values in ("a", b"ab", {"a": 1}, ["a", 1], None, iter("ab")):
+        with pytest.raises(ParameterError, match=r"nuisances is .*: .*give a list of names"):
+            check_names("nuisances", values)
+
+
+def test_a_dataset_is_no_mapping_of_options():
+    assert isinstance(xr.Dataset(), Mapping)
+    with pytest.raises(ParameterError, match="columns is a Dataset"):
+        check_mapping("columns", xr.Dataset(), "give names")
+
+
+def test_a_path_has_letters(tmp_path):
+    check_path("path", tmp_path)
+    for value in ("", "\0", b"record.csv", 3, None):
+        with pytest.raises(ParameterError, match=r"path is .*: give a path"):
+            check_path("path", value)
+
+
+def test_what_is_long_is_shown_by_its_kind():
+    assert shown(xr.Dataset()) == "a Dataset"
+    assert shown(np.zeros((50, 50))) == "a ndarray of shape (50, 50)"

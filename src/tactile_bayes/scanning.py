@@ -31,7 +31,7 @@ _MARGIN = 15
 """Steps of the drive before first contact and after snap-off."""
 
 _FINEST = 1e-6
-"""Steps of the drive [rad] below this would make tens of millions of samples."""
+"""Steps of the drive [rad] below this would make millions of samples."""
 
 _COARSEST = 0.5
 """Steps of the drive [rad] above this are taken for degrees: a sweep would have a handful of samples."""
@@ -211,7 +211,8 @@ def scan(
     check_number(
         "drive_step",
         drive_step,
-        f"give a positive angle in radians, from {_FINEST:g} to {_COARSEST}; one in degrees is converted by np.radians",
+        f"give a positive angle in radians, at most {_COARSEST}; one in degrees is converted by np.radians, and below "
+        f"{_FINEST:g} there would be millions of samples",
         least=_FINEST,
         most=_COARSEST,
     )

@@ -13,7 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tactile_bayes.checks import as_number, check_choice, check_function, check_optional, check_whole_number, refused
+from tactile_bayes.checks import check_choice, check_function, check_number, check_optional, check_whole_number, refused
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
 from tactile_bayes.inference.contact_posterior.draws import (
@@ -150,8 +151,9 @@ def infer_contacts(
     _refuse_options(draws, method, settings)
     check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     check_function("progress", progress)
-    if as_number(friction) is None:
-        raise refused("friction", friction, "give Coulomb's coefficient, a number from 0 up")
+    most = float(np.tan(MAX_FRICTION_ANGLE))
+    remedy = f"the friction angle is that of no sliding rod, give Coulomb's coefficient from 0 to {most:.2f}"
+    check_number("friction", friction, remedy, least=0.0, most=most)
     cell = load_cell or LoadCell.from_record(measured)
     if cell is None:
         raise ParameterError(
