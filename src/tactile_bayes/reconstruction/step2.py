@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 
 from tactile_bayes.checks import check_choice, check_number, check_optional, refused
 from tactile_bayes.contact_fit import Reading
-from tactile_bayes.elastica import PHASE_NAMES, TANGENTIAL
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES, TANGENTIAL
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction.constrained import constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
@@ -19,7 +19,6 @@ from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
 from tactile_bayes.record import COLUMNS, validate, with_rod
 from tactile_bayes.rod import Rod
-from tactile_bayes.sweep_path import friction_angle_of
 from tactile_bayes.touching import PLACE
 
 __all__ = ["AXIAL_ALARM", "reconstruct"]
@@ -144,7 +143,8 @@ def reconstruct(
     constrained 0.0033
     """
     check_choice("method", method, _METHODS)
-    friction_angle = friction_angle_of(friction)
+    most = float(np.tan(MAX_FRICTION_ANGLE))
+    check_number("friction", friction, f"give Coulomb's coefficient, from 0 to {most:.2f}", least=0.0, most=most)
     check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     measured = with_rod(validate(measured), rod)
     check_number("suspension_compliance", suspension_compliance, "give a number from 0 up", least=0.0)
@@ -153,7 +153,7 @@ def reconstruct(
         raise refused("suspension_compliance", suspension_compliance, remedy)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     samples = samples_of(measured, cell, suspension_compliance)
-    estimate = _METHODS[method](samples, np.full(samples.side.size, friction_angle))
+    estimate = _METHODS[method](samples, np.full(samples.side.size, np.arctan(friction)))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     return kept.assign(_variables(estimate, samples, measured)).assign_attrs(
         method=method, friction=friction, units=measured.attrs["units"], **_check(estimate, samples, cell, friction)
