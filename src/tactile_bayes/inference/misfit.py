@@ -13,7 +13,7 @@ CHECK_RIG = (
 """What to do where loads contradict one another whatever the contour: it is the rig."""
 
 _SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance")
-"""Nuisance parameters, or groups of them, that are not inferred by default."""
+"""Nuisance parameters, or groups of them, that misfit may be due to."""
 
 _SMOOTH = "shape-free"
 
