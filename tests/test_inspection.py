@@ -8,6 +8,7 @@ import pytest
 import tactile_bayes as tb
 from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inspection import known_cell
 from tactile_bayes.inspection.samples import outliers, repeat_chance, stuck, uneven_steps
 from tactile_bayes.inspection.stretches import autocorrelation, rows_of_sweeps, unloaded_stretches
@@ -232,7 +233,7 @@ def test_wrong_units_come_first(coarse):
 
 def test_a_wrong_rod_is_told_with_what_to_check(coarse):
     stiffer = coarse.assign_attrs(rod_flexural_rigidity=1.2 * ROD.flexural_rigidity)
-    remedies = "check the rod, the units, signs and axes of the loads, the zero of the drive angle, and the friction."
+    remedies = f"{CHECK_RIG}."
     assert words(stiffer)[0].endswith(f"fit no contact of such a rod: {remedies}")
 
 

@@ -274,7 +274,7 @@ def test_a_contour_is_known_to_within_its_band_only_where_all_is_well(told):
         assert "known to within" not in words
         assert "the posterior has a 90\u00a0% band whose median width is" in words
     assert "What it is worth depends on what is said above" in doubtful
-    assert "That would hold if the contour were of this family and the rig as it was taken" in rejected
+    assert "if the contour were of this family and the rig as assumed, and the record says that one of" in rejected
 
 
 def test_of_a_contour_that_is_rejected_nothing_is_said_but_with_an_if(told):

@@ -41,11 +41,15 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     short = SamplerSettings(ensembles=2, walkers=24, max_steps=40)
     found = verdicts(infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=short))
     assert re.match(
-        "The family parabola does not describe the record: none of [0-9]+ records that the posterior predicts is so "
-        "far off. Worst is (holding_moment|force_x|force_y), whose ",
+        "The family parabola and the rig as assumed do not describe the record: none of [0-9]+ records that the "
+        "posterior predicts is so far off. Worst is (holding_moment|force_x|force_y), whose ",
         found[0],
     )
-    assert "Do not use this contour: try another family" in found[0]
+    assert found[0].endswith(
+        "Do not use this contour. It may be the family or the rig. Try another family (--family shape-free, or "
+        "compare), or infer more of the rig (--nuisance friction, gain, drift, lever, backlash, "
+        "suspension_compliance); a rod that is not straight or not uniform looks like this, too."
+    )
     assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 40 steps")
     assert found[2].startswith("The noise is ")
     assert found[2].endswith(" as stated: the rest is misfit, no noise.")
@@ -56,7 +60,7 @@ def test_a_forgotten_tare_is_told_with_its_size():
     found = verdicts(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
     assert found[0].startswith("Without load the cell does not read what is stated: force_y is off by 0.3")
     assert found[0].endswith("or give LoadCell.from_zero_load(record).")
-    assert found[1].startswith("The family parabola does not describe the record")
+    assert found[1].startswith("The family parabola and the rig as assumed do not describe the record")
     assert "sweep" in found[1]
 
 
@@ -65,7 +69,7 @@ def test_forces_in_another_unit_come_first():
     thousandfold = {name: 1e3 * readings(tree)[name] for name in ("force_x", "force_y")}
     found = verdicts(with_readings(tree, **thousandfold))
     assert found[0].startswith("Forces reach 1.1")
-    assert found[1].startswith("The family parabola does not describe the record")
+    assert found[1].startswith("The family parabola and the rig as assumed do not describe the record")
 
 
 def test_a_flipped_moment_comes_first():
@@ -107,7 +111,11 @@ def test_loads_that_contradict_one_another_unless_noise_does_it():
     assert "below 1e-99" in found[0]
     assert "friction makes it" not in found[0]
     dragged = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
-    assert "too small by 20 standard errors, as friction makes it" in dragged[0]
+    assert dragged[0].endswith("too small by 20 standard errors, as friction makes it: infer it (--nuisance friction).")
+    sought = predicted()
+    sought.attrs |= {"nuisances": '["friction"]'}
+    dragged = verdicts(sought, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
+    assert dragged[0].endswith("too small by 20 standard errors, as more friction than was found makes it.")
 
 
 def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():

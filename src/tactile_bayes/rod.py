@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
-from typing import TypeGuard
 
+from tactile_bayes.checks import check_number, check_positive
 from tactile_bayes.errors import ParameterError
 
 __all__ = ["LARGEST_STRAIN", "Rod"]
@@ -56,14 +55,20 @@ class Rod:
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
-            value = getattr(self, name)
-            if not _is_positive(value):
-                raise ParameterError(f"the rod's {name} is {value!r}: give a positive number [{unit}]")
-        if not (_is_number(self.diameter) and self.diameter >= 0.0):
-            raise ParameterError(f"the rod's diameter is {self.diameter!r}: give zero or a positive number [m]")
-        if self.elastic_strain is not None and not _is_positive(self.elastic_strain):
+            check_positive(f"the rod's {name}", getattr(self, name), f"give a positive number [{unit}]")
+        check_number("the rod's diameter", self.diameter, "give zero or a positive number [m]", least=0.0)
+        if self.elastic_strain is not None:
+            check_positive("the rod's elastic strain", self.elastic_strain, "give a positive number, or none")
+        if self.diameter > self.length:
             raise ParameterError(
-                f"the rod's elastic strain is {self.elastic_strain!r}: give a positive number, or none"
+                f"the rod's diameter is {self.diameter!r} and its length {self.length!r}: a rod is longer than it is "
+                "thick, give both in metres"
+            )
+        square = float(self.length) * float(self.length)
+        if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
+            raise ParameterError(
+                f"the rod's length is {self.length!r} and its flexural_rigidity {self.flexural_rigidity!r}, so that "
+                "its unit of force EI/L² is beyond what numbers hold: are they in metres and N m²?"
             )
 
     def __repr__(self) -> str:
@@ -95,9 +100,9 @@ class Rod:
         0.002428
         """
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
-            if not _is_positive(value):
-                raise ParameterError(f"the rod's {name} is {value!r}: give a positive number")
-        return cls(length, youngs_modulus * math.pi * diameter**4 / 64, diameter, elastic_strain)
+            check_positive(f"the rod's {name}", value)
+        square = float(diameter) * float(diameter)
+        return cls(length, youngs_modulus * math.pi * (square * square) / 64, diameter, elastic_strain)
 
     @property
     def is_dimensionless(self) -> bool:
@@ -118,11 +123,3 @@ class Rod:
     def force_unit(self) -> float:
         """What a dimensionless force of one is, EI/L² [N]."""
         return self.flexural_rigidity / self.length**2
-
-
-def _is_positive(value: object) -> bool:
-    return _is_number(value) and value > 0.0
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

@@ -6,13 +6,13 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from numbers import Real
 from typing import Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import as_numbers, check_choice, check_number, refused
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.elastica import wrench_from_contact
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
@@ -29,6 +29,9 @@ Floats = NDArray[np.float64]
 
 _MARGIN = 15
 """Steps of the drive before first contact and after snap-off."""
+
+_FINEST = 1e-6
+"""Steps of the drive [rad] below this would make millions of samples."""
 
 _COARSEST = 0.5
 """Steps of the drive [rad] above this are taken for degrees: a sweep would have a handful of samples."""
@@ -202,15 +205,20 @@ def scan(
     >>> round(result.events["forward"].snap_off.drive_angle, 6)
     3.154275
     """
+    check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
     directions: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
     rod = Rod() if rod is None else rod
-    if not (isinstance(drive_step, Real) and 0.0 < drive_step <= _COARSEST):
-        raise ParameterError(
-            f"drive_step is {drive_step!r}: give a positive angle in radians, at most {_COARSEST}; one in degrees is "
-            "converted by np.radians"
-        )
-    grid = None if drive_angles is None else np.unique(_floats(drive_angles))
-    if grid is not None and not (grid.size and np.all(np.isfinite(grid)) and np.all(np.abs(grid) <= 2.0 * np.pi)):
+    check_number(
+        "drive_step",
+        drive_step,
+        f"give a positive angle in radians, at most {_COARSEST}; one in degrees is converted by np.radians, and below "
+        f"{_FINEST:g} there would be millions of samples",
+        least=_FINEST,
+        most=_COARSEST,
+    )
+    given = None if drive_angles is None else _floats(drive_angles)
+    grid = None if given is None else np.unique(given)
+    if given is not None and not (given.ndim < 2 and given.size and np.all(np.abs(given) <= 2.0 * np.pi)):
         raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
 
     columns: list[dict[str, NDArray[np.generic]]] = []
@@ -243,10 +251,8 @@ def scan(
 
 def _floats(values: ArrayLike) -> Floats:
     """Numbers as an array, NaN if they are none."""
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        return np.asarray(np.nan)
+    numbers = as_numbers(values)
+    return np.asarray(np.nan) if numbers is None else numbers
 
 
 def _pivots(base: tuple[float, float] | Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -254,7 +260,7 @@ def _pivots(base: tuple[float, float] | Sequence[tuple[float, float]]) -> list[t
     if pivots.shape == (2,):
         pivots = pivots[None]
     if pivots.ndim != 2 or pivots.shape[1] != 2 or not pivots.size or not np.all(np.isfinite(pivots)):
-        raise ParameterError(f"base is {base!r}: give a pivot (x, y), or several: [(x, y), (x, y)]")
+        raise refused("base", base, "give a pivot (x, y), or several: [(x, y), (x, y)]")
     return [(float(x), float(y)) for x, y in pivots]
 
 

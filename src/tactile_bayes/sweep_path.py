@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from typing import Literal
 
 import numpy as np
 
+from tactile_bayes.checks import check_choice, check_kind, check_number
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.elastica import MAX_FRICTION_ANGLE
@@ -87,12 +87,9 @@ def seen_from(contour: Contour, base: tuple[float, float], direction: Direction,
     ParameterError
         If one of them is none, or there are several contours.
     """
-    if not isinstance(contour, Contour):
-        raise ParameterError(f"the contour is {contour!r}: give one, such as tb.contours.Parabola(a=0.5, q=0.5)")
-    if not isinstance(rod, Rod):
-        raise ParameterError(f"the rod is {rod!r}: give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
-    if direction not in ("forward", "backward"):
-        raise ParameterError(f"direction is {direction!r}: choose 'forward' or 'backward'")
+    check_kind("the contour", contour, Contour, "give one, such as tb.contours.Parabola(a=0.5, q=0.5)")
+    check_kind("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
+    check_choice("direction", direction, ("forward", "backward"))
     if contour.shape != ():
         raise ParameterError(
             f"one contour is wanted here, not an array of shape {contour.shape}: scan_many takes those of shape (n,)"
@@ -105,8 +102,6 @@ def seen_from(contour: Contour, base: tuple[float, float], direction: Direction,
 
 def friction_angle_of(friction: float) -> float:
     """The angle arctan μ [rad] by which friction turns the contact force, refused where the rod's map would fold."""
-    if not isinstance(friction, Real) or not 0.0 <= friction <= np.tan(MAX_FRICTION_ANGLE):
-        raise ParameterError(
-            f"friction is {friction!r}: give Coulomb's coefficient, a number from 0 to {np.tan(MAX_FRICTION_ANGLE):.2f}"
-        )
-    return float(np.arctan(friction))
+    most = float(np.tan(MAX_FRICTION_ANGLE))
+    remedy = f"give Coulomb's coefficient, a number from 0 to {most:.2f}"
+    return float(np.arctan(check_number("friction", friction, remedy, least=0.0, most=most)))

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError, TaskError
 
 __all__ = ["run_tasks"]
@@ -75,8 +76,8 @@ def run_tasks(
     >>> sorted(run_tasks(abs, [-1, 2], workers=1))
     [(-1, 1), (2, 2)]
     """
-    if workers is not None and (not isinstance(workers, int) or isinstance(workers, bool) or workers < 1):
-        raise ParameterError(f"workers is {workers!r}: give a positive number")
+    if workers is not None:
+        check_whole_number("workers", workers, 1, "give a positive number")
     if scheduler is not None:
         yield from _on_cluster(function, tasks, scheduler)
         return

@@ -44,7 +44,8 @@ def made_up(probability, *, fits=True, sampled=True, converged=True, elpd=None, 
         }
     result = xr.Dataset(variables, coords={"family": list(NAMES[:size]), "prior_width": [0.5, 1.0, 2.0]})
     known = not np.isnan(probability).any()
-    result.attrs = {
+    result.attrs = {"nuisances": "[]", "friction": 0.0}
+    result.attrs |= {
         "verdict": verdict_on(result),
         "most_probable": NAMES[int(np.argmax(probability))] if known else "",
         "none_fits": int(not result.fits.any()),

@@ -17,6 +17,7 @@ from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.calibration.world import World
+from tactile_bayes.checks import check_seed, check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior
@@ -156,8 +157,7 @@ def calibrate(
     >>> found.attrs["verdict"].partition(":")[0]
     'Too few replicates to judge'
     """
-    if isinstance(replicates, bool) or not isinstance(replicates, int | np.integer) or replicates < 1:
-        raise ParameterError(f"replicates is {replicates!r}: give a whole number from 1 up")
+    check_whole_number("replicates", replicates, 1)
     experiment = experiment_of(
         seed=seed,
         family=family,
@@ -265,8 +265,7 @@ def experiment_of(
     for name, value in {"probability": probability, "friction": friction}.items():
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
             raise ParameterError(f"{name} is {value!r}: give a number")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up")
+    check_seed(seed)
     experiment = Experiment(
         family=family,
         load_cell=cell,

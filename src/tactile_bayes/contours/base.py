@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import as_numbers, shown
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
 from tactile_bayes.roots import falling_root
@@ -270,13 +271,10 @@ def alike(*arrays: Floats) -> tuple[Floats, ...]:
 
 def as_parameter(family: str, name: str, given: Any) -> Parameter:
     """A parameter as a number, or a copy of it as an array of numbers."""
-    try:
-        values = np.array(given)
-    except ValueError:  # a list of lists of unlike lengths
-        values = np.array(None)
-    if values.dtype.kind not in "iuf":
-        raise ContourError(f"{family}: {name} is {given!r}: give a number, or an array of numbers")
-    return values.astype(float) if values.ndim else float(values)
+    values = as_numbers(given)
+    if values is None:
+        raise ContourError(f"{family}: {name} is {shown(given)}: give a number, or an array of numbers")
+    return values if values.ndim else float(values)
 
 
 def common_shape(family: str, **shapes: tuple[int, ...]) -> tuple[int, ...]:

@@ -10,14 +10,26 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_groups import groups_of, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
-from tactile_bayes.inference.ensembles import Coordinates, Draws, Progress, SamplerSettings, Seed, sample, spawn
+from tactile_bayes.inference.ensembles import (
+    Coordinates,
+    Draws,
+    Progress,
+    SamplerSettings,
+    Seed,
+    sample,
+    seed_sequence,
+    settings_of,
+    spawn,
+)
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.load_cell import LoadCell
@@ -142,11 +154,11 @@ def infer_contour(
     >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
-    settings = settings or SamplerSettings()
-    if not isinstance(settings, SamplerSettings):
-        raise ParameterError(f"settings is {settings!r}: give SamplerSettings(min_ess=400) and the like")
-    if checkpoint is not None and (not isinstance(checkpoint, str | os.PathLike) or not os.fspath(checkpoint)):
-        raise ParameterError(f"checkpoint is {checkpoint!r}: give the path of a folder, or None")
+    settings = settings_of(settings)
+    if checkpoint is not None:
+        check_path("checkpoint", checkpoint, "give the path of a folder, or None")
+    check_function("progress", progress)
+    seed_sequence(seed)
     problem = contour_problem(
         measured,
         family=family,
@@ -187,7 +199,8 @@ def sampled(
             walk = walk_of(model, seeds[0], settings)
             if walk.beyond:
                 raise InferenceError(
-                    f"the record wants {walk.beyond}: give a wider prior, or are units, rod, base and family right?"
+                    f"the record wants {walk.beyond}: give a wider prior, or are units, rod and base right? "
+                    + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
                 )
         draws = sample(
             model.log_probability,

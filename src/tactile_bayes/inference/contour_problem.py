@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.stats import rv_histogram
 
+from tactile_bayes.checks import check_mapping, check_optional, check_switch
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.families import Family, Prior, refuse_no_prior
@@ -65,10 +66,9 @@ def contour_problem(
 ) -> ContourProblem:
     """What `infer_contour` is asked for, as it says."""
     measured = with_rod(validate(measured), rod)
-    if load_cell is not None and not isinstance(load_cell, LoadCell):
-        raise ParameterError(f"load_cell is {load_cell!r}: give LoadCell(force_noise=0.05, moment_noise=0.02), or None")
-    if not isinstance(events, bool | np.bool_):
-        raise ParameterError(f"events is {events!r}: give True or False")
+    check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
+    check_switch("events", events)
+    check_mapping("priors", priors, "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}")
     chosen = family_named(family)
     noise = noise_of(measured, load_cell)
     rig = nuisances_of(measured, nuisances, priors or {}, noise.cell, friction)

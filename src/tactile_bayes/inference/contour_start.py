@@ -21,6 +21,7 @@ from tactile_bayes.inference.ensembles import (
     in_coordinates,
     scatter_walkers,
 )
+from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
@@ -148,7 +149,8 @@ def _scattered(
         best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
         raise InferenceError(
             f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, "
-            "signs, drive angle, rod, base and family right? tactile-bayes inspect may tell"
+            "signs, drive angle, rod and base right? tactile-bayes inspect may tell. "
+            + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
         ) from error
     walked = _walked(model)
     return Walk(walked.of(start), Logarithms(walked.positive, proposal), modes[0].optimum.beyond)

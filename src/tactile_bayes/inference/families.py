@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.optimize import least_squares
 
+from tactile_bayes.checks import shown
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 
@@ -42,7 +43,7 @@ def refuse_no_prior(name: str, prior: Any) -> None:
     """Refuse what is no distribution, or one whose parameters are not fixed."""
     if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
         raise ParameterError(
-            f"the prior of {name} is {prior!r}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            f"the prior of {name} is {shown(prior)}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
         )
 
 

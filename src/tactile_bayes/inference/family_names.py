@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import FAMILIES, FLANKS, Family
 from tactile_bayes.inference.shape_free_posterior.family import SHAPE_FREE
@@ -24,11 +25,11 @@ def family_named(name: str) -> Family:
     >>> family_named("parabola/power-law").parameters
     ('left_a', 'right_w', 'right_n', 'q', 'x_c')
     """
-    if name == SHAPE_FREE.name:
+    if isinstance(name, str) and name == SHAPE_FREE.name:
         return SHAPE_FREE
-    if name not in FAMILIES:
+    if not isinstance(name, str) or name not in FAMILIES:
         raise ParameterError(
-            f"there is no family {name!r}: choose {', '.join(FLANKS)}, one for each flank, like parabola/power-law, or "
-            "shape-free"
+            f"there is no family {shown(name)}: choose {', '.join(FLANKS)}, one for each flank, like "
+            "parabola/power-law, or shape-free"
         )
     return FAMILIES[name]

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import stats
 
+from tactile_bayes.checks import check_names, check_number
 from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import Prior
@@ -160,8 +161,7 @@ def nuisances_of(
     ParameterError
         If a name is none of a nuisance parameter, or cannot be identified.
     """
-    if isinstance(chosen, str):
-        raise ParameterError(f"nuisances is {chosen!r}: give a list of names, like [{chosen!r}]")
+    chosen = check_names("nuisances", chosen)
     present = [_SHORT[name] for name in present_channels(measured)]
     uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
     names: list[str] = []
@@ -186,8 +186,7 @@ def nuisances_of(
             names.append(member)
     names = list(dict.fromkeys(names))
     most = _KINDS["friction"].high
-    if not 0.0 <= friction < most:
-        raise ParameterError(f"friction is {friction!r}: give a coefficient from 0 to {most:.2f}")
+    check_number("friction", friction, f"give a coefficient from 0 to {most:.2f}", least=0.0, most=most)
     if "friction" in names and friction:
         raise ParameterError(f"friction is {friction!r} and to be inferred as well: leave one of the two")
     every_gain = [f"{name}_gain" for name in present]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
@@ -16,10 +17,13 @@ import xarray as xr
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
+from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.netcdf import read_netcdf, write_netcdf
 
 __all__ = [
     "contact_draws",
+    "contour_draws",
+    "contour_events",
     "posterior_draws",
     "provenance",
     "read_result",
@@ -32,6 +36,10 @@ __all__ = [
 
 _SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")
 """What a posterior is computed and stored with, beside Python."""
+
+_EVENTS = ("first_contact_x", "snap_off_contact_x", "snap_off_drive_angle")
+
+_NO_CONTOUR = "this is no result of infer_contour: give the tree that it returned, or that read_result reads"
 
 
 def sample_stats(draws: Draws) -> xr.Dataset:
@@ -110,6 +118,34 @@ def contact_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
     if not {"chain", "draw", "sample"} <= set(draws.dims) or "contact_x" not in draws:
         raise InferenceError("this is no result of infer_contacts: give what it returned, or its group 'posterior'")
     return draws
+
+
+def contour_draws(result: xr.DataTree) -> xr.Dataset:
+    """Return the posterior group of a result of `infer_contour`."""
+    is_tree = isinstance(result, xr.DataTree) and {"family", "units"} <= set(result.attrs)
+    if not is_tree or "posterior" not in result.children:
+        raise InferenceError(_NO_CONTOUR)
+    draws = posterior_draws(result)
+    _refuse_absent(draws, family_named(result.attrs["family"]).parameters, ("chain", "draw"))
+    return draws
+
+
+def contour_events(result: xr.DataTree) -> xr.Dataset:
+    """Return the group of first contacts and snap-offs of a result of `infer_contour`."""
+    if not isinstance(result, xr.DataTree) or "events" not in result.children:
+        raise InferenceError(_NO_CONTOUR)
+    events = result["events"].to_dataset()
+    _refuse_absent(events, _EVENTS, ("chain", "draw", "stroke"))
+    return events
+
+
+def _refuse_absent(group: xr.Dataset, names: Sequence[str], dims: Sequence[str]) -> None:
+    """Refuse a group that lacks numbers by these names along these dimensions."""
+    for name in names:
+        if name not in group or not set(dims) <= set(group[name].dims) or group[name].dtype.kind not in "iuf":
+            raise InferenceError(f"{_NO_CONTOUR} (it has no numbers {name!r} by {', '.join(dims)})")
+        if not group[name].size:
+            raise InferenceError(f"this posterior has no draws of {name!r}: infer it again")
 
 
 def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:

@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.nuisances import BIAS
 from tactile_bayes.inspection.fit import Fit
 from tactile_bayes.inspection.remedies import OTHER_ANGLE
@@ -108,7 +109,7 @@ def _of_loads(suspected: Sequence[str], fit: Fit) -> list[str]:
     if not fit.share > UNFIT:
         against = f"Of the {fit.loaded} loaded samples {fit.below:.0%} touch something below the pivot, not above"
         would = "would touch something above"
-    remedy = "check the rod, the units, signs and axes of the loads, the zero of the drive angle, and the friction"
+    remedy = CHECK_RIG
     if fit.remedy:
         remedy = f"nearly all {would} if {fit.remedy}"
     told.insert(0 if fit.remedy.startswith(OTHER_ANGLE) else len(told), f"{against}: {remedy}.")

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.correction import corrected
 from tactile_bayes.load_cell.corruption import corrupted_loads
@@ -21,7 +22,7 @@ from tactile_bayes.load_cell.likelihood import approximations, checked_noise_sca
 from tactile_bayes.load_cell.measurement import measured, stated_entries
 from tactile_bayes.load_cell.surprise import surprise
 from tactile_bayes.load_cell.zero_load import found_cell
-from tactile_bayes.record import CHANNELS, frame_of
+from tactile_bayes.record import CHANNELS, frame_of, validate
 
 __all__ = ["LoadCell"]
 
@@ -117,7 +118,7 @@ class LoadCell(DataSheet):
         >>> LoadCell.from_record(make_record(columns, attrs=attrs, missing=("force_x", "force_y"))).moment_noise
         0.02
         """
-        entries = stated_entries(record)
+        entries = stated_entries(validate(record))
         return cls.from_entries(entries) if entries else None
 
     @classmethod
@@ -446,6 +447,4 @@ class LoadCell(DataSheet):
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:
     if isinstance(seed, np.random.Generator):
         return seed
-    if not isinstance(seed, int | np.integer) or seed < 0:
-        raise ParameterError(f"seed={seed!r}: give a nonnegative integer or a numpy.random.Generator")
-    return np.random.default_rng(seed)
+    return np.random.default_rng(check_seed(seed, "give a nonnegative integer or a numpy.random.Generator"))

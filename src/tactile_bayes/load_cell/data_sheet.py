@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
@@ -114,10 +115,10 @@ class DataSheet:
             )
         if self.drift is not None and not isinstance(self.drift, RandomWalk | OrnsteinUhlenbeck):
             raise ParameterError(
-                f"the load cell's drift is {self.drift!r}: give RandomWalk(...) or OrnsteinUhlenbeck(...)"
+                f"the load cell's drift is {shown(self.drift)}: give RandomWalk(...) or OrnsteinUhlenbeck(...)"
             )
         if self.frame is not None and not (isinstance(self.frame, str) and self.frame in FRAMES):
-            raise ParameterError(f"the load cell's frame is {self.frame!r}: choose 'fixed' or 'turning', or None")
+            raise ParameterError(f"the load cell's frame is {shown(self.frame)}: choose 'fixed' or 'turning', or None")
         if math.isfinite(self.degrees_of_freedom) and any(self.correlation):
             raise ParameterError(
                 "noise with outliers (degrees_of_freedom) and noise that is correlated between channels go together in "
@@ -290,17 +291,18 @@ class DataSheet:
 
 
 def _scalar(name: str, value: Any) -> float:
-    number = _number(value)
+    number = as_number(value)
     if number is None:
-        raise ParameterError(f"the load cell's {name} is {value!r}: give a number")
+        raise ParameterError(f"the load cell's {name} is {shown(value)}: give a number")
     return number
 
 
 def _triple(name: str, values: Any) -> Triple:
-    numbers = [_number(value) for value in values] if np.iterable(values) and not isinstance(values, str) else []
+    is_listed = np.iterable(values) and not isinstance(values, str | bytes)
+    numbers = [as_number(value) for value in values] if is_listed else []
     one, two, three = numbers if len(numbers) == 3 else (None, None, None)
     if one is None or two is None or three is None or not all(map(math.isfinite, (one, two, three))):
-        raise ParameterError(f"the load cell's {name} is {values!r}: give three finite numbers ({_MEANING[name]})")
+        raise ParameterError(f"the load cell's {name} is {shown(values)}: give three finite numbers ({_MEANING[name]})")
     return one, two, three
 
 
@@ -308,19 +310,8 @@ def _rows(gain: Any) -> tuple[Triple, Triple, Triple]:
     rows = tuple(gain) if np.iterable(gain) else ()
     if len(rows) != 3 or not all(np.iterable(row) and not isinstance(row, str) for row in rows):
         raise ParameterError(
-            f"the load cell's gain is {gain!r}: give three rows of three numbers, ((1, 0, 0), (0, 1, 0), (0, 0, 1)) "
-            "being that of an ideal cell"
+            f"the load cell's gain is {shown(gain)}: give three rows of three numbers, ((1, 0, 0), (0, 1, 0), "
+            "(0, 0, 1)) being that of an ideal cell"
         )
     one, two, three = (_triple("row of gain", row) for row in rows)
     return one, two, three
-
-
-def _number(value: Any) -> float | None:
-    """A number as such, and neither in words nor a truth value."""
-    if isinstance(value, str | bytes):
-        return None
-    try:
-        array = np.asarray(value)
-        return float(value) if array.ndim == 0 and array.dtype.kind != "b" else None
-    except (TypeError, ValueError):
-        return None

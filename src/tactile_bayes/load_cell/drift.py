@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from tactile_bayes.checks import check_number
 from tactile_bayes.errors import ParameterError
 
 __all__ = ["Drift", "OrnsteinUhlenbeck", "RandomWalk"]
@@ -25,15 +26,8 @@ class _Law:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            try:
-                number = math.nan if isinstance(value, str | bool | np.bool_) else float(value)
-            except (TypeError, ValueError):
-                number = math.nan
-            if not (math.isfinite(number) and number >= 0.0):
-                raise ParameterError(
-                    f"{type(self).__name__}: {field.name} is {value!r}: give zero or a positive number"
-                )
+            name, value = f"{type(self).__name__}: {field.name}", getattr(self, field.name)
+            number = check_number(name, value, "give zero or a positive number", least=0.0)
             object.__setattr__(self, field.name, number)
 
     @property

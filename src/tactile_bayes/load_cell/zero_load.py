@@ -11,7 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from tactile_bayes.errors import DriftWarning, ParameterError, RecordError
+from tactile_bayes.checks import check_probability
+from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell.contact_bounds import FEWEST, ContactBounds, contact_bounds
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, present_channels, validate
 
@@ -121,8 +122,7 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     >>> bool(abs(found.bias[0] - 0.1) < 3 * found.bias_uncertainty[0])
     True
     """
-    if not 0.0 < false_alarm < 0.5:
-        raise ParameterError(f"false_alarm is {false_alarm!r}: give a probability between 0 and 0.5, such as 1e-3")
+    check_probability("false_alarm", false_alarm, "give a probability between 0 and 0.5, such as 1e-3", below=0.5)
     record = validate(record)
     channels = present_channels(record)
     readings = np.stack([record[name].values for name in channels], axis=-1)

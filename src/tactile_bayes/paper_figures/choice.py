@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
@@ -89,8 +90,7 @@ def choice_of(
         q = np.empty(0)
     if q.ndim != 1 or not q.size or not np.all(np.isfinite(q) & (q > 0.0)):
         raise ParameterError(f"distances are {distances!r}: give rod lengths above 0, like [0.3, 0.5]")
-    if isinstance(rods, bool) or not isinstance(rods, int | np.integer) or rods < 1:
-        raise ParameterError(f"rods is {rods!r}: give a whole number from 1 up, like 15")
+    check_whole_number("rods", rods, 1, "give a whole number from 1 up, like 15")
     if not (isinstance(width, Real) and 3.0 <= width <= 12.0):
         raise ParameterError(f"width is {width!r}: give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}")
     if load_cell is not None and not isinstance(load_cell, LoadCell):

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.checks import check_probability, check_seed, check_whole_number
 from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.families import Prior
@@ -144,12 +145,9 @@ def design(
     """
     if criterion not in CRITERIA:
         raise ParameterError(f"criterion is {criterion!r}: choose {', '.join(CRITERIA)}")
-    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 2:
-        raise ParameterError(f"draws is {draws!r}: give a whole number from 2 up")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up")
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    check_whole_number("draws", draws, 2)
+    check_seed(seed)
+    check_probability("probability", probability)
     rng = np.random.default_rng([int(seed), 1])
     if isinstance(known, str):
         told = known_from_prior(

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.checks import check_probability, check_seed, check_whole_number
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import ParameterError, StudyError
 from tactile_bayes.inference.contour_problem import prior_in_words
@@ -148,12 +149,9 @@ def error_map(
     counts = {"replicates": (replicates, 1), "posterior_cells": (posterior_cells, 0)}
     counts["posterior_replicates"] = posterior_replicates, 1
     for name, (count, least) in counts.items():
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
-            raise ParameterError(f"{name} is {count!r}: give a whole number from {least} up")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up")
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+        check_whole_number(name, count, least)
+    check_seed(seed)
+    check_probability("probability", probability)
     cells = tuple(
         MapCell(name, float(distance) * rod_taken.length, float(factor))
         for name, distance, factor in product(objects, distances, noise_factors)

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import stats
 
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
@@ -73,10 +74,9 @@ def noise_shares(
     -----
     By scrambled Sobol' sequences and the estimators of Saltelli et al. (2010), in `scipy.stats.sobol_indices`.
     """
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 2 or samples & (samples - 1):
+    if check_whole_number("samples", samples, 2, "give a power of two, like 1024") & (samples - 1):
         raise ParameterError(f"samples is {samples!r}: give a power of two, like 1024")
-    if isinstance(places, bool) or not isinstance(places, int | np.integer) or places < 2:
-        raise ParameterError(f"places is {places!r}: give a whole number from 2 up")
+    check_whole_number("places", places, 2)
     chosen = _places(plan, int(places))
     quiet = plan.certain(chosen)
     noises = {**plan.cell.standard_deviations, "drive_angle": plan.cell.drive_angle_deviation}

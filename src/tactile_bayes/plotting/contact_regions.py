@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from scipy.special import chdtri
 
+from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, legend_entry, single_axes
 from tactile_bayes.plotting.maps import finish_map, fit_height, outline
@@ -179,8 +180,7 @@ def radius_of(probability: float) -> float:
 
 
 def refuse_probability(probability: float) -> None:
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.9")
+    check_probability("probability", probability, "give a number between 0 and 1, like 0.9")
 
 
 def _spread(candidates: np.ndarray[Any, np.dtype[np.intp]], samples: Sequence[int] | None) -> Any:

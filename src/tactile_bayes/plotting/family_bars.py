@@ -10,6 +10,7 @@ import xarray as xr
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import PALETTE, AxesArray, number
+from tactile_bayes.uncertainty.family_verdict import NONE_FITS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -217,7 +218,7 @@ def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:
     """Above the panels, from the left edge of the first one."""
     words, style, letters = str(comparison.attrs["verdict"]), {"fontsize": "medium"}, 10.5
     if not comparison["fits"].any():
-        words, letters = "None fits: the record does not look like one of any of these shapes", 6.5
+        words, letters = NONE_FITS, 6.5
         style = {"fontsize": "x-large", "fontweight": "bold", "color": _WARNING}
     width = float(panels[0].figure.get_figwidth())
     wrapped = textwrap.fill(words, max(20, int(letters * width)), break_on_hyphens=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.plotting.axes import PALETTE, Floats, legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, outline
 
@@ -113,5 +113,4 @@ def refuse_count(contours: int) -> None:
     ------
     ParameterError
     """
-    if isinstance(contours, bool) or not isinstance(contours, int | np.integer) or contours < 1:
-        raise ParameterError(f"contours is {contours!r}: give a whole number from 1 up, like 40")
+    check_whole_number("contours", contours, 1, "give a whole number from 1 up, like 40")

@@ -9,9 +9,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from tactile_bayes.checks import check_choice, check_number, check_optional, refused
 from tactile_bayes.contact_fit import Reading
 from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES, TANGENTIAL
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction.constrained import constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
@@ -142,15 +142,15 @@ def reconstruct(
     raw 0.0062
     constrained 0.0033
     """
-    if method not in _METHODS:
-        raise ParameterError(f"method is {method!r}: choose 'raw' or 'constrained'")
-    if not 0.0 <= friction <= np.tan(MAX_FRICTION_ANGLE):
-        raise ParameterError(
-            f"friction is {friction!r}: give Coulomb's coefficient, from 0 to {np.tan(MAX_FRICTION_ANGLE):.2f}"
-        )
+    check_choice("method", method, _METHODS)
+    most = float(np.tan(MAX_FRICTION_ANGLE))
+    check_number("friction", friction, f"give Coulomb's coefficient, from 0 to {most:.2f}", least=0.0, most=most)
+    check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     measured = with_rod(validate(measured), rod)
-    if not 0.0 <= suspension_compliance < np.inf:
-        raise ParameterError(f"suspension_compliance is {suspension_compliance!r}: give a number from 0 up")
+    check_number("suspension_compliance", suspension_compliance, "give a number from 0 up", least=0.0)
+    if suspension_compliance * float(np.abs(np.nan_to_num(measured.holding_moment.values)).max()) > 2.0 * np.pi:
+        remedy = "with such moments the pivot would give way by more than a turn: give radians per moment"
+        raise refused("suspension_compliance", suspension_compliance, remedy)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     samples = samples_of(measured, cell, suspension_compliance)
     estimate = _METHODS[method](samples, np.full(samples.side.size, np.arctan(friction)))

@@ -7,6 +7,7 @@ import operator
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.checks import check_optional
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod
 from tactile_bayes.record.schema import LOAD_CELL_UNITS, column_of
@@ -42,6 +43,7 @@ def rod_of(record: xr.Dataset) -> Rod:
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
     """The record as measured with another rod than the one it states."""
+    check_optional("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
     if rod is None:
         return record
     if record.attrs["units"] == "dimensionless" and not rod.is_dimensionless:

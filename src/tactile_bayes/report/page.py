@@ -111,7 +111,7 @@ def _answer(findings: Findings) -> str:
     if findings.is_rejected:
         return (
             f"{reach} the posterior has a {share} band {widths} That would hold if the contour were of this family and "
-            "the rig as it was taken, and the record says that they are not: how far off the band is, is not known."
+            "the rig as assumed, and the record says that one of the two is not: how far off the band is, is not known."
         )
     if not _is_well(findings):
         return f"{reach} the posterior has a {share} band {widths} What it is worth depends on what is said above."

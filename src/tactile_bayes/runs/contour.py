@@ -13,8 +13,9 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
@@ -111,8 +112,7 @@ def analyse(
     RecordError, ParameterError, InferenceError
         As `infer_contour`; where no contour is found, with what speaks for a wrong unit or sign.
     """
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    check_probability("probability", probability)
     measured = with_rod(validate(measured), rod)
     origin = _origin(measured, probability, record_file, command)
     folder = Path(out)

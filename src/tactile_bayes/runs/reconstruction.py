@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.files import write_atomically
+from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inspection import CellSource, known_cell
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
@@ -145,8 +146,7 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
         elif chance < _CONTRADICTION:
             against.append(
                 f"The loads of single samples contradict one another, {words[0].lower()}{words[1:]} (noise explains it "
-                f"with probability {chance:.1g}): check the rod, unit, sign and axes of each load, the zero of the "
-                "drive angle, and the friction."
+                f"with probability {chance:.1g}): {CHECK_RIG}."
             )
         else:
             told.append(f"{words}, which noise explains with probability {chance:.2g}.")

@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import as_numbers, check_probability, check_switch
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 __all__ = ["contour_band", "contour_heights", "contours_drawn", "length_unit", "places"]
@@ -63,6 +64,8 @@ def contour_band(
     array([0.3, 0.8])
     """
     at = places(x)
+    check_probability("probability", probability)
+    check_switch("simultaneous", simultaneous)
     heights = contour_heights(posterior, at)
     share = np.isfinite(heights).mean(axis=0)
     lower, median, upper = quantile_band(heights, probability, simultaneous)
@@ -85,12 +88,13 @@ def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Fl
     """Heights at x of up to `most` contours, evenly picked from the posterior's draws; shape (contours, x)."""
     contours = contours_drawn(posterior, most)
     every = np.arange(contours.shape[0])[:, None]
-    return np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
+    with np.errstate(over="ignore"):  # far out, where no contour is
+        return np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
 
 
 def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
     """Up to `most` contours, evenly picked from the posterior's draws."""
-    contours = contours_of(posterior_draws(posterior), posterior.attrs["family"])
+    contours = contours_of(contour_draws(posterior), posterior.attrs["family"])
     count = contours.shape[0]
     return contours.take(np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp)))
 
@@ -103,10 +107,10 @@ def places(x: ArrayLike) -> Floats:
     ParameterError
         If they are not, or not finite.
     """
-    at = np.atleast_1d(np.asarray(x, dtype=float))
-    if at.ndim != 1 or not np.all(np.isfinite(at)):
+    numbers = as_numbers(x)
+    if numbers is None or numbers.ndim > 1 or not np.all(np.isfinite(numbers)):
         raise ParameterError("x must be a list of finite numbers")
-    return at
+    return np.atleast_1d(numbers)
 
 
 def length_unit(posterior: xr.DataTree) -> dict[str, Any]:

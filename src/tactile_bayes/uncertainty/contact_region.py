@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import contact_draws
 
@@ -100,8 +101,7 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
     >>> region.contains([0.0, 1.8, 2.6], 0.0)  # the circle has a radius of 2.15
     array([ True,  True, False])
     """
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.9")
+    check_probability("probability", probability, "give a number between 0 and 1, like 0.9")
     draws = contact_draws(posterior)
     if sample not in draws["sample"].values:
         low, high = draws["sample"].values.min(), draws["sample"].values.max()

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.checks import check_function, check_mapping, check_names, check_probability, check_switch
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
-from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, spawn
+from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.matched_priors import matched_priors
@@ -139,7 +140,8 @@ def compare_families(
             Of the posterior.
 
         And `log_density` (family, sample), leave-one-out. Attributes: `verdict` in words, `most_probable`, `none_fits`
-        (1 if no family passes the check), `data_sha256` of the record.
+        (1 if no family passes the check), `nuisances` that were inferred (JSON), `friction` as stated, `data_sha256`
+        of the record.
 
     Raises
     ------
@@ -171,15 +173,17 @@ def compare_families(
     >>> found.attrs["most_probable"], found.fits.values.tolist()
     ('circle', [True, True, False])
     """
-    settings = settings or SamplerSettings()
-    names = _checked(families, priors or {})
+    settings = settings_of(settings)
+    check_switch("leave_one_out", leave_one_out)
+    check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
+    check_function("progress", progress)
+    names = _checked(families, priors)
     measured = with_rod(validate(measured), rod)
     length = rod_of(measured).length
     seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
     tried: dict[str, _Tried] = {}
-    # What fits anything comes first: others that are far from fitting need not be sampled then.
-    for name in sorted(names, key=lambda name: name != SHAPE_FREE.name):
-        problem = contour_problem(
+    problems = {
+        name: contour_problem(
             measured,
             family=name,
             load_cell=load_cell,
@@ -189,6 +193,10 @@ def compare_families(
             nuisances=nuisances,
             events=True,
         )
+        for name in names
+    }
+    # What fits anything comes first: others that are far from fitting need not be sampled then.
+    for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
         best = max((one.evidence.log_evidence[_USUAL] for one in tried.values() if one.evidence), default=-np.inf)
         of_family = spawn(seeds[name], 4)
         with threadpool_limits(1):
@@ -208,7 +216,8 @@ def compare_families(
         check = check_record(found.tree, false_alarm=false_alarm)
         p_value, passed = float(check.overall_p_value), bool(check.attrs["passed"])
         tried[name] = _Tried(ceiling, found.draws, evidence, foretold, p_value, passed)
-    return _labelled({name: tried[name] for name in names}).assign_attrs(data_sha256=record_hash(measured))
+    asked = {name: problem.about[name] for name in ("nuisances", "friction")}
+    return _labelled({name: tried[name] for name in names}, asked).assign_attrs(data_sha256=record_hash(measured))
 
 
 def _ceiling(model: ContourModel, walk: Walk) -> float:
@@ -217,19 +226,21 @@ def _ceiling(model: ContourModel, walk: Walk) -> float:
     return float(np.max(model.log_probability(points) - model.log_prior(points)))
 
 
-def _checked(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]]) -> list[str]:
+def _checked(families: Sequence[str], priors: Mapping[str, Mapping[str, Prior]] | None) -> list[str]:
     if isinstance(families, str):
         raise ParameterError(f"families is {families!r}: give several, like ['parabola', {families!r}]")
-    names = [family_named(name).name for name in families]
+    names = [family_named(name).name for name in check_names("families", families)]
     if len(set(names)) < 2 or len(set(names)) < len(names):
         raise ParameterError(f"families are {', '.join(names) or 'none'}: give two or more different ones")
-    for name in priors:
+    check_mapping("priors", priors, "give those of each family by its name, {'circle': {'r': ...}}")
+    for name, of_family in (priors or {}).items():
         if name not in names:
             raise ParameterError(f"there are priors for {name!r}, which is not among the families {', '.join(names)}")
+        check_mapping(f"priors[{name!r}]", of_family, "give distributions by name of a parameter")
     return names
 
 
-def _labelled(tried: Mapping[str, _Tried]) -> xr.Dataset:
+def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Dataset:
     evidences = np.full((len(tried), len(WIDTHS)), np.nan)
     errors = np.full(len(tried), np.nan)
     for i, one in enumerate(tried.values()):
@@ -257,8 +268,8 @@ def _labelled(tried: Mapping[str, _Tried]) -> xr.Dataset:
     foretold = [one.foretold for one in tried.values()]
     if any(of_family is not None for of_family in foretold):
         variables |= _left_out(foretold)
-    result = xr.Dataset(variables, coords={"family": list(tried), "prior_width": list(WIDTHS)})
-    result.attrs = {
+    result = xr.Dataset(variables, coords={"family": list(tried), "prior_width": list(WIDTHS)}, attrs=asked)
+    result.attrs |= {
         "verdict": verdict_on(result),
         "most_probable": str(result.family.values[np.argmax(result.probability.values)]) if complete else "",
         "none_fits": int(not result.fits.any()),

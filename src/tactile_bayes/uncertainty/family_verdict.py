@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import xarray as xr
 
-__all__ = ["verdict_on"]
+from tactile_bayes.inference.misfit import what_to_try
+
+__all__ = ["NONE_FITS", "verdict_on"]
+
+NONE_FITS = "None fits: with the rig as assumed, the record does not look like one of any of these shapes"
+"""How the verdict begins where no family passes the check."""
 
 _LIKELY = 0.05
 """Probability from which on a family is named."""
@@ -16,9 +23,8 @@ def verdict_on(result: xr.Dataset) -> str:
     names = [str(name) for name in result.family.values]
     fits = result.fits.values
     if not fits.any():
-        return (
-            f"None fits: the record does not look like one of any of these shapes ({', '.join(names)}). Probabilities "
-            "say which of them is the least wrong"
+        return f"{NONE_FITS} ({', '.join(names)}). Probabilities say which of them is the least wrong. " + what_to_try(
+            names, json.loads(result.attrs["nuisances"]), friction=result.attrs["friction"]
         )
     words = []
     probability = result.probability.values

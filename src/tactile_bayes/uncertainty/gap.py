@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.inference.result import contour_draws, contour_events
 from tactile_bayes.uncertainty.band import contour_band, length_unit
 from tactile_bayes.uncertainty.certificate import triangle
 from tactile_bayes.uncertainty.quantiles import central_levels
@@ -91,12 +91,13 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     (0.3, 0.0225, 'ok')
     """
     levels = central_levels(probability)
-    events = posterior["events"].to_dataset().transpose("chain", "draw", "stroke", ...)
+    draws = contour_draws(posterior)
+    events = contour_events(posterior).transpose("chain", "draw", "stroke", ...)
     missing = [name for name in ("forward", "backward") if name not in events.stroke.values]
     if missing:
         raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
     left_x, right_x, gaps = _ends(events)
-    draws = posterior_draws(posterior).sel(chain=events["chain"], draw=events["draw"])
+    draws = draws.sel(chain=events["chain"], draw=events["draw"])
     contours = contours_of(draws, posterior.attrs["family"])
     left, right = (contours.locate(contours.parameter_of_x(x)) for x in (left_x, right_x))
     certificate = triangle(left, right)

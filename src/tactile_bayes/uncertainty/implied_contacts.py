@@ -11,9 +11,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.elastica import TANGENTIAL
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.nuisances import Nuisances
@@ -99,8 +100,7 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     >>> [round(float(implied["posterior"][name][..., 20].mean()), 2) for name in ("contact_x", "contact_y")]
     [0.66, 0.72]
     """
-    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 1:
-        raise ParameterError(f"draws is {draws!r}: give a whole number from 1 up, of draws of each chain")
+    check_whole_number("draws", draws, 1, "give a whole number from 1 up, of draws of each chain")
     record = _checked_record(posterior)
     every = posterior_draws(posterior)
     count = every.sizes["draw"]

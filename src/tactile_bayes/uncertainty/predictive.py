@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import check_probability
 
 __all__ = ["predictive_interval"]
 
@@ -40,8 +40,7 @@ def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr
     >>> round(interval.force_x_lower.item(), 6), round(interval.force_x_upper.item(), 6)
     (5.0, 95.0)
     """
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    check_probability("probability", probability)
     levels = {"lower": 0.5 * (1.0 - probability), "upper": 0.5 * (1.0 + probability)}
     out = {}
     for name, values in posterior["posterior_predictive"].to_dataset().items():

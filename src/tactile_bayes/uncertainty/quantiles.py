@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import check_probability
 
 __all__ = ["central_levels", "quantile_band"]
 
@@ -28,8 +28,7 @@ def central_levels(probability: float) -> tuple[float, float, float]:
     >>> central_levels(0.5)
     (0.25, 0.5, 0.75)
     """
-    if not 0.0 < probability < 1.0:
-        raise ParameterError(f"probability is {probability!r}: give a number between 0 and 1, like 0.95")
+    check_probability("probability", probability)
     return 0.5 * (1.0 - probability), 0.5, 0.5 * (1.0 + probability)
 
 

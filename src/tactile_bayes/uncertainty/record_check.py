@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.checks import check_probability
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.result import record_of
 from tactile_bayes.load_cell import LoadCell, rough_noise
@@ -128,8 +129,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     II True
     IV False
     """
-    if not 0.0 < false_alarm < 1.0:
-        raise ParameterError(f"false_alarm is {false_alarm!r}: give a probability between 0 and 1, such as 1e-3")
+    check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     residuals = residuals_of(posterior)
     channels = list(residuals)
     predictions = len(residuals[channels[0]].values) - 1

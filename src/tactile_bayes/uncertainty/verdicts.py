@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
@@ -81,7 +82,7 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     >>> quick = SamplerSettings(ensembles=2, walkers=20, max_steps=50)
     >>> found = verdicts(infer_contour(measured, family="parabola", load_cell=cell, seed=1, settings=quick))
     >>> print(found[0].split(":")[0])
-    The family parabola does not describe the record
+    The family parabola and the rig as assumed do not describe the record
     """
     record = record_of(posterior)
     residuals = residuals_of(posterior)
@@ -99,13 +100,20 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
         against.append(posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1) + ".")
     noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
     beyond = _beyond_prior(posterior)
-    against += [*_noise(posterior, noisier), *_contradictions(record, contacts, noisier), *_told_beyond(beyond)]
+    against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
+    against += _told_beyond(beyond)
     if not against:
         p_value = math.nan if check is None else float(check.overall_p_value)
         against.append(
             f"All is well: the ensembles agree, and the record looks like what they predict (p = {p_value:.2g})."
         )
     return (*against, *_prior_dominated(posterior, known=beyond))
+
+
+def _inferred(posterior: xr.DataTree) -> list[str]:
+    """Nuisance parameters of a run."""
+    names: list[str] = json.loads(posterior.attrs.get("nuisances", "[]"))
+    return names
 
 
 def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
@@ -132,7 +140,7 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
 def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[str]:
     """Channels whose zero wandered, where nothing was said of that, nor asked."""
     cell = LoadCell.from_record(record)
-    inferred = json.loads(posterior.attrs.get("nuisances", "[]"))
+    inferred = _inferred(posterior)
     level = found.attrs["false_alarm"] / max(int(np.isfinite(found.same_bias_p_value).sum()), 1)
     moved = [
         f"{name} (p = {p_value:.1g} if it had not)"
@@ -157,11 +165,12 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
     # The share of predictions alone: the record itself is no prediction.
     like = round(float(check.overall_p_value) * (predictions + 1)) - 1
     return (
-        f"The family {family} does not describe the record: {like or 'none'} of {predictions} records that the "
-        f"posterior predicts {'are' if like > 1 else 'is'} so far off. Worst is {channel}, {_CAUSES[cause]}; in sweep "
-        f"{int(worst.worst_sweep)} from {float(worst.worst_from):.3g} to {float(worst.worst_to):.3g} rad it reads "
-        f"{float(worst.worst_residual):+.2g}{unit} beside what is predicted. Do not use this contour: try another "
-        "family, and check the rod, the friction and the load cell."
+        f"The family {family} and the rig as assumed do not describe the record: {like or 'none'} of {predictions} "
+        f"records that the posterior predicts {'are' if like > 1 else 'is'} so far off. Worst is {channel}, "
+        f"{_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {float(worst.worst_from):.3g} to "
+        f"{float(worst.worst_to):.3g} rad it reads {float(worst.worst_residual):+.2g}{unit} beside what is predicted. "
+        "Do not use this contour. "
+        + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
     )
 
 
@@ -194,7 +203,9 @@ def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
     return [f"{said}, and neighbouring samples scatter alike: state the noise that it has, or are the units right?"]
 
 
-def _contradictions(record: xr.Dataset, contacts: xr.Dataset | None, noisier: float) -> list[str]:
+def _contradictions(
+    posterior: xr.DataTree, record: xr.Dataset, contacts: xr.Dataset | None, noisier: float
+) -> list[str]:
     """Of normal noise: outliers make the misfits larger than the probability knows of."""
     cell = LoadCell.from_record(record) or LoadCell()
     if contacts is None or math.isfinite(cell.degrees_of_freedom):
@@ -205,19 +216,18 @@ def _contradictions(record: xr.Dataset, contacts: xr.Dataset | None, noisier: fl
     words = f"{chance:.1g}" if chance > 1e-99 else "below 1e-99"
     return [
         "The loads of single samples contradict one another, whatever the contour (noise explains it with probability "
-        f"{words}): check length and flexural rigidity of the rod, the friction, the zero of the drive angle, and "
-        f"unit, sign and axes of each load.{_dragging(float(contacts.attrs.get('axial_score', math.nan)))}"
+        f"{words}): {CHECK_RIG}.{_dragging(posterior, float(contacts.attrs.get('axial_score', math.nan)))}"
     ]
 
 
-def _dragging(axial_score: float) -> str:
+def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
     """What friction would do to the force along the rod."""
     if not axial_score < -AXIAL_ALARM:
         return ""
-    return (
-        f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
-        "friction makes it: infer it (--nuisance friction)."
-    )
+    words = f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
+    if is_inferred("friction", _inferred(posterior)):
+        return f"{words}more friction than was found makes it."
+    return f"{words}friction makes it: infer it (--nuisance friction)."
 
 
 def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:

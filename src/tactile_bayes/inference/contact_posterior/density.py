@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.checks import shown
 from tactile_bayes.elastica import TANGENTIAL, TIP
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
@@ -64,7 +65,7 @@ class ContactDensity:
     ) -> None:
         if not (callable(prior) or (isinstance(prior, str) and prior in ("flat", "polar"))):
             raise ParameterError(
-                f"prior is {prior!r}: choose 'flat' or 'polar', or give a function of contact_x, contact_y and "
+                f"prior is {shown(prior)}: choose 'flat' or 'polar', or give a function of contact_x, contact_y and "
                 "slope_angle that returns a log-density"
             )
         self.samples = samples

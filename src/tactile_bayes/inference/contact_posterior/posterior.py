@@ -13,6 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.checks import check_choice, check_function, check_number, check_optional, check_whole_number, refused
+from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
 from tactile_bayes.inference.contact_posterior.draws import (
@@ -39,6 +41,8 @@ Floats = NDArray[np.float64]
 
 _UNLIKELY = 1e-4
 """Probability of a misfit below which the loads are not those of the rod."""
+
+_MOST_DRAWS = 10**6
 
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
@@ -145,6 +149,11 @@ def infer_contacts(
     """
     measured = with_rod(validate(measured), rod)
     _refuse_options(draws, method, settings)
+    check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
+    check_function("progress", progress)
+    most = float(np.tan(MAX_FRICTION_ANGLE))
+    remedy = f"the friction angle is that of no sliding rod, give Coulomb's coefficient from 0 to {most:.2f}"
+    check_number("friction", friction, remedy, least=0.0, most=most)
     cell = load_cell or LoadCell.from_record(measured)
     if cell is None:
         raise ParameterError(
@@ -176,12 +185,13 @@ def _chance_of_misfit(measured: xr.Dataset, cell: LoadCell, friction: float) -> 
 
 
 def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -> None:
+    check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
     if settings is not None and settings.ensembles != CHAINS:
         raise ParameterError(f"{settings.ensembles} ensembles: give {CHAINS}, one for each chain of the result")
-    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < CHAINS or draws % CHAINS:
-        raise ParameterError(f"draws is {draws!r}: give a multiple of {CHAINS}, one share for each chain")
-    if method not in ("auto", "importance", "emcee"):
-        raise ParameterError(f"method is {method!r}: choose 'auto', 'importance' or 'emcee'")
+    remedy = f"give a multiple of {CHAINS}, one share for each chain, and at most {_MOST_DRAWS}"
+    if check_whole_number("draws", draws, CHAINS, remedy, most=_MOST_DRAWS) % CHAINS:
+        raise refused("draws", draws, remedy)
+    check_choice("method", method, ("auto", "importance", "emcee"))
 
 
 def _density(

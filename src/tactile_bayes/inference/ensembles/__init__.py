@@ -28,8 +28,8 @@ from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.places import Place
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
-from tactile_bayes.inference.ensembles.settings import SamplerSettings
-from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, spawn
+from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
+from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, seed_sequence, spawn
 
 __all__ = [
     "Coordinates",
@@ -46,6 +46,8 @@ __all__ = [
     "in_coordinates",
     "sample",
     "scatter_walkers",
+    "seed_sequence",
+    "settings_of",
     "spawn",
     "whitened_moves",
 ]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
+from tactile_bayes.checks import check_number, check_optional, check_positive, check_whole_number
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["SamplerSettings", "refuse_few_walkers"]
+__all__ = ["SamplerSettings", "refuse_few_walkers", "settings_of"]
+
+_MOST = 10**9
+"""Of ensembles, walkers and steps."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,7 @@ class SamplerSettings:
             value = getattr(self, name)
             if value is None and name == "walkers":
                 continue
-            if isinstance(value, bool) or not isinstance(value, int | np.integer):
-                raise ParameterError(f"{name} is {value!r}: give a whole number")
+            check_whole_number(name, value, -_MOST, f"give a whole number, at most {_MOST}", most=_MOST)
         if self.ensembles < 2:
             raise ParameterError(
                 f"{self.ensembles} ensembles: give at least 2 (4 is better), since convergence is judged by comparing "
@@ -78,12 +79,11 @@ class SamplerSettings:
             raise ParameterError(f"block_steps is {self.block_steps}: give at least 1")
         if self.max_steps < 1:
             raise ParameterError(f"max_steps is {self.max_steps}: give at least 1")
-        if not self.max_r_hat > 1.0:
-            raise ParameterError(f"max_r_hat is {self.max_r_hat!r}: R̂ is 1 at best, give a little more, like 1.01")
-        if not (math.isfinite(self.min_ess) and self.min_ess > 0.0):
-            raise ParameterError(f"min_ess is {self.min_ess!r}: give a positive number")
-        if self.max_seconds is not None and not self.max_seconds > 0.0:
-            raise ParameterError(f"max_seconds is {self.max_seconds!r}: give a positive time [s], or None for no limit")
+        remedy = "R̂ is 1 at best, give a little more, like 1.01"
+        check_number("max_r_hat", self.max_r_hat, remedy, least=math.nextafter(1.0, 2.0))
+        check_positive("min_ess", self.min_ess)
+        if self.max_seconds is not None:
+            check_positive("max_seconds", self.max_seconds, "give a positive time [s], or None for no limit")
 
     def walkers_for(self, parameters: int) -> int:
         """Number of walkers of each ensemble for a target of this many parameters."""
@@ -91,6 +91,12 @@ class SamplerSettings:
             return max(48, 6 * parameters)
         refuse_few_walkers(self.walkers, parameters)
         return self.walkers
+
+
+def settings_of(settings: SamplerSettings | None) -> SamplerSettings:
+    """Return the settings that are given, or the usual ones."""
+    check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
+    return SamplerSettings() if settings is None else settings
 
 
 def refuse_few_walkers(walkers: int, parameters: int) -> None:

@@ -9,6 +9,7 @@ import emcee
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.inference.ensembles.target import LogProbability
@@ -51,9 +52,7 @@ def seed_sequence(seed: Seed) -> np.random.SeedSequence:
     """The seed as a sequence of which nothing has been spawned."""
     if isinstance(seed, np.random.SeedSequence):
         return np.random.SeedSequence(seed.entropy, spawn_key=seed.spawn_key, pool_size=seed.pool_size)
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ParameterError(f"seed is {seed!r}: give a whole number from 0 up, or a numpy.random.SeedSequence")
-    return np.random.SeedSequence(int(seed))
+    return np.random.SeedSequence(check_seed(seed, "give a whole number from 0 up, or a numpy.random.SeedSequence"))
 
 
 def spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:

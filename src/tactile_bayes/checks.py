@@ -1,0 +1,230 @@
+"""Checks of arguments: each refuses what is none of a kind, and says what was given and what to give instead."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Collection, Mapping, Sequence, Set
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import ParameterError
+
+__all__ = [
+    "as_number",
+    "as_numbers",
+    "check_choice",
+    "check_function",
+    "check_kind",
+    "check_mapping",
+    "check_names",
+    "check_number",
+    "check_optional",
+    "check_path",
+    "check_positive",
+    "check_probability",
+    "check_seed",
+    "check_switch",
+    "check_whole_number",
+    "refused",
+    "shown",
+]
+
+_SHOWN = 120
+"""Characters of a value that a message shows."""
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: as it is written, or its kind where that is long.
+
+    Examples
+    --------
+    >>> shown("left"), shown(np.zeros((100, 100)))
+    ("'left'", 'a ndarray of shape (100, 100)')
+    """
+    written = repr(value)
+    if len(written) <= _SHOWN and "\n" not in written:
+        return written
+    shape = getattr(value, "shape", None)
+    return f"a {type(value).__name__}" + (f" of shape {shape}" if isinstance(shape, tuple) else "")
+
+
+def refused(name: str, value: object, remedy: str) -> ParameterError:
+    """Return the error that refuses an argument."""
+    return ParameterError(f"{name} is {shown(value)}: {remedy}")
+
+
+def as_number(value: Any) -> float | None:
+    """Return a real number as such; None of a truth value, of words, of complex numbers, and of several numbers.
+
+    Examples
+    --------
+    >>> as_number(np.float32(0.5)), as_number(True), as_number("1"), as_number([1.0]), as_number(math.nan)
+    (0.5, None, None, None, nan)
+    """
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if kind and (kind not in "iuf" or getattr(value, "shape", None) != ()):
+        return None
+    if not kind and (not isinstance(value, Real) or isinstance(value, bool)):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return None
+
+
+def as_numbers(values: Any) -> NDArray[np.float64] | None:
+    """Return real numbers as an array of their shape; None if one of them is something else.
+
+    Examples
+    --------
+    >>> as_numbers([1, 2.5]), as_numbers([1, "2"]), as_numbers([[1, 2], [3]]), as_numbers([True, 1.0])
+    (array([1. , 2.5]), None, None, None)
+    """
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "iuf":
+            return None
+        if isinstance(values, list | tuple) and any(
+            isinstance(value, bool | np.bool_) for value in np.asarray(values, dtype=object).ravel()
+        ):
+            return None
+    except (TypeError, ValueError):
+        return None
+    return array.astype(float)
+
+
+def check_number(
+    name: str, value: Any, remedy: str = "give a finite number", *, least: float = -math.inf, most: float = math.inf
+) -> float:
+    """Return a finite number from `least` to `most`.
+
+    Examples
+    --------
+    >>> check_number("friction", "0.2", "give a number from 0 up", least=0.0)
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.ParameterError: friction is '0.2': give a number from 0 up
+    """
+    number = as_number(value)
+    if number is None or not (math.isfinite(number) and least <= number <= most):
+        raise refused(name, value, remedy)
+    return number
+
+
+def check_positive(name: str, value: Any, remedy: str = "give a positive number") -> float:
+    """Return a finite number above zero."""
+    return check_number(name, value, remedy, least=math.ulp(0.0))
+
+
+def check_probability(
+    name: str, value: Any, remedy: str = "give a number between 0 and 1, like 0.95", *, below: float = 1.0
+) -> float:
+    """Return a number between 0 and `below`, neither of which it is."""
+    return check_number(name, value, remedy, least=math.ulp(0.0), most=math.nextafter(below, 0.0))
+
+
+def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, most: float = math.inf) -> int:
+    """Return a whole number from `least` to `most`, which no truth value is.
+
+    Examples
+    --------
+    >>> check_whole_number("draws", np.int64(4), 1)
+    4
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise refused(name, value, remedy or f"give a whole number from {least} up")
+    return int(value)
+
+
+def check_seed(value: Any, remedy: str = "") -> int:
+    """Return a whole number from 0 up, by which random numbers are drawn."""
+    return check_whole_number("seed", value, 0, remedy)
+
+
+def check_choice(name: str, value: Any, choices: Collection[str], remedy: str = "") -> str:
+    """Return one of several words.
+
+    Examples
+    --------
+    >>> check_choice("method", ["raw"], ["raw", "constrained"])
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.ParameterError: method is ['raw']: choose 'raw' or 'constrained'
+    """
+    if isinstance(value, str) and value in choices:
+        return value
+    *others, last = map(repr, choices)
+    raise refused(name, value, remedy or f"choose {', '.join(others)} or {last}")
+
+
+def check_kind(name: str, value: Any, kind: type, remedy: str) -> None:
+    """Refuse what is no object of a class."""
+    if not isinstance(value, kind):
+        raise refused(name, value, remedy)
+
+
+def check_optional(name: str, value: Any, kind: type, remedy: str) -> None:
+    """Refuse what is neither an object of a class nor None."""
+    if value is not None:
+        check_kind(name, value, kind, f"{remedy}, or None")
+
+
+def check_switch(name: str, value: Any) -> bool:
+    """Return a truth value."""
+    if not isinstance(value, bool | np.bool_):
+        raise refused(name, value, "give True or False")
+    return bool(value)
+
+
+def check_function(name: str, value: Any) -> None:
+    """Refuse what cannot be called, except None."""
+    if value is not None and not callable(value):
+        raise refused(name, value, "give a function, or None")
+
+
+def check_names(name: str, values: Any) -> list[str]:
+    """Return several names.
+
+    Examples
+    --------
+    >>> check_names("nuisances", "bias")
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.ParameterError: nuisances is 'bias': give a list of names, like ['bias']
+    """
+    listed = values.tolist() if isinstance(values, np.ndarray) and values.dtype.kind in "UO" else values
+    if isinstance(listed, str):
+        raise refused(name, values, f"give a list of names, like [{listed!r}]")
+    if not isinstance(listed, Sequence | Set) or isinstance(listed, bytes | bytearray):
+        raise refused(name, values, "give a list of names")
+    for one in listed:
+        if not isinstance(one, str):
+            raise refused(name, values, f"{shown(one)} in it is no name: give a list of names")
+    return list(listed)
+
+
+def check_mapping(name: str, values: Any, remedy: str) -> None:
+    """Refuse what is no mapping from names, except None."""
+    is_dataset = hasattr(values, "data_vars")  # which maps names, too, but to columns
+    is_mapping = isinstance(values, Mapping) and not is_dataset and all(isinstance(key, str) for key in values)
+    if values is not None and not is_mapping:
+        raise refused(name, values, remedy)
+
+
+def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.csv'") -> None:
+    """Refuse what names no file and no folder.
+
+    Examples
+    --------
+    >>> check_path("path", 3)
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.ParameterError: path is 3: give a path, like 'record.csv'
+    """
+    words = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
+    if not isinstance(words, str) or not words or "\0" in words:
+        raise refused(name, value, remedy)

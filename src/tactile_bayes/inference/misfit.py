@@ -1,0 +1,60 @@
+"""Misfit: what may be at fault where a record is not as family and rig predict, and what to try."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+__all__ = ["CHECK_RIG", "is_inferred", "what_to_try"]
+
+CHECK_RIG = (
+    "check the rod (length, flexural rigidity; straight, uniform), unit, sign and axes of each load, the zero of the "
+    "drive angle and its backlash, the point where the load cell takes its moment, and the friction"
+)
+"""What to do where loads contradict one another whatever the contour: it is the rig."""
+
+_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance")
+"""Nuisance parameters, or groups of them, that misfit may be due to."""
+
+_SMOOTH = "shape-free"
+
+
+def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
+    """Return whether a nuisance parameter, or one of its group, is among those that a run infers.
+
+    Examples
+    --------
+    >>> is_inferred("gain", ["force_x_gain"]), is_inferred("lever", ["lever_x", "lever_y"]), is_inferred("drift", [])
+    (True, True, False)
+    """
+    return any(name == suspect or name.startswith(f"{suspect}_") or name.endswith(f"_{suspect}") for name in nuisances)
+
+
+def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, friction: float = 0.0) -> str:
+    """Return the sentences that name both whom a misfit may be due to, family and rig, and what to try.
+
+    Parameters
+    ----------
+    families : collection of str
+        That were tried.
+    nuisances : collection of str
+        That were inferred: they are not suggested again.
+    friction : float
+        That was stated: it is not inferred as well.
+
+    Examples
+    --------
+    >>> print(what_to_try(["circle"], ["friction", "drift", "lever_x", "lever_y", "backlash"]))
+    It may be the family or the rig. Try another family (--family shape-free, or compare), or infer more of the rig \
+(--nuisance gain, suspension_compliance); a rod that is not straight or not uniform looks like this, too.
+    """
+    left = [name for name in _SUSPECTS if not is_inferred(name, nuisances)]
+    if friction and "friction" in left:
+        left.remove("friction")
+    instead = " in place of rigidity_scale"  # which measures the same as all gains
+    named = [f"{name}{instead}" if name == "gain" and "rigidity_scale" in nuisances else name for name in left]
+    more = f", or infer more of the rig (--nuisance {', '.join(named)})" if named else ""
+    others = "another family (compare)" if _SMOOTH in families else "another family (--family shape-free, or compare)"
+    return (
+        f"It may be the family or the rig. Try {others}{more}; a rod that is not straight or not uniform looks like "
+        "this, too."
+    )

@@ -1,0 +1,537 @@
+"""Wrong arguments of the names that are used first: each is refused, in words, before anything is computed."""
+
+from __future__ import annotations
+
+import functools
+import math
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+import tactile_bayes as tb
+from tactile_bayes.checks import (
+    as_number,
+    as_numbers,
+    check_mapping,
+    check_names,
+    check_path,
+    check_probability,
+    check_whole_number,
+    shown,
+)
+from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
+from tactile_bayes.inference import contour
+from tactile_bayes.inference.contact_posterior import posterior as contact_posterior
+from tactile_bayes.uncertainty import family_comparison
+
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+
+
+class AcceptedError(Exception):
+    """A posterior is about to be sampled: all arguments were accepted."""
+
+
+@functools.cache
+def ideal():
+    return tb.scan(tb.contours.Parabola(0.5, 0.5), drive_step=0.1).record
+
+
+@functools.cache
+def measured():
+    return CELL.measure(ideal(), seed=1)
+
+
+@functools.cache
+def posterior():
+    """A tree as `infer_contour` returns it, of a few draws."""
+    draws = {"a": 0.5, "q": 0.3, "x_c": 0.0}
+    ends = {"first_contact_x": [0.9, -0.9], "snap_off_contact_x": [0.2, -0.1], "snap_off_drive_angle": [3.2, -0.1]}
+    groups = {
+        "posterior": xr.Dataset({k: (("chain", "draw"), np.full((2, 3), v)) for k, v in draws.items()}),
+        "events": xr.Dataset(
+            {k: (("chain", "draw", "stroke"), np.broadcast_to(v, (2, 3, 2))) for k, v in ends.items()},
+            coords={"stroke": ["forward", "backward"]},
+        ),
+    }
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = {"family": "parabola", "units": "dimensionless"}
+    return tree
+
+
+@functools.cache
+def no_posteriors():
+    """Trees that lack something."""
+    unnamed = posterior().copy()
+    unnamed.attrs = {}
+    other = posterior().copy()
+    other.attrs = {**posterior().attrs, "family": "circle"}
+    groups = {name: posterior()[name].to_dataset().isel(draw=[]) for name in ("posterior", "events")}
+    empty = xr.DataTree.from_dict(groups)
+    empty.attrs = posterior().attrs
+    words = posterior().copy()
+    words["posterior"] = xr.DataTree(xr.Dataset({k: (("chain", "draw"), [["x"]]) for k in ("a", "q", "x_c")}))
+    return [xr.DataTree(), xr.DataTree.from_dict({"posterior": xr.Dataset()}), unnamed, other, empty, words]
+
+
+def no_records():
+    bare = ideal().drop_vars("drive_angle")
+    return [
+        xr.Dataset(),
+        xr.Dataset({"force_x": ("time", [1.0, 2.0])}),
+        bare,
+        ideal().isel(sample=[]),
+        ideal().isel(sample=0),
+        ideal().drop_attrs(),
+        ideal().assign(force_x=("sample", ["a"] * ideal().sizes["sample"])),
+        ideal().assign_attrs(rod_length="long"),
+        ideal().assign_attrs(units=None),
+        ideal().to_dataframe(),
+        ideal()["force_x"],
+    ]
+
+
+# --- What is wrong, for one argument or another ---------------------------------------------------------------------
+
+WRONG = [
+    None,
+    "",
+    "left",
+    b"raw",
+    math.nan,
+    math.inf,
+    -math.inf,
+    -1,
+    -0.5,
+    0,
+    1e-320,
+    1e308,
+    10**400,
+    True,
+    np.bool_(False),
+    1.5,
+    2 + 1j,
+    np.complex128(1j),
+    np.datetime64("2020-01-01"),
+    [],
+    [None],
+    ["left", 1],
+    [math.nan, 1.0],
+    [1.0, math.inf],
+    [True, 1.0],
+    [[1.0, 2.0], [3.0]],
+    {},
+    {"left": 1},
+    {1: 2.0},
+    set(),
+    np.array([]),
+    np.array([1j, 2.0]),
+    np.array(["a", "b"]),
+    np.array([None, 1.0]),
+    np.zeros((2, 3, 4)),
+    np.array(math.nan),
+    object(),
+    xr.Dataset(),
+    xr.DataArray([1.0, 2.0]),
+    xr.DataTree(),
+    tb.contours.Circle(0.5, 0.5),
+    tb.contours.Circle([0.5, 0.6], 0.5),
+    tb.Rod(),
+    tb.Rod(0.1, 1e-5),
+    CELL,
+    tb.SamplerSettings(),
+    stats.norm(0.0, 1.0),
+    np.random.default_rng(1),
+]
+NAMES = [["left"], ["bias", None], ["bias", 1], "bias", ["bias", ["gain"]], {"bias": 1.0}]
+PRIORS = [{"q": 0.5}, {"q": None}, {"q": "norm"}, {"left": stats.norm()}, {"q": stats.norm}, {1: stats.norm()}]
+
+
+# --- What is right: of these a call may be accepted -----------------------------------------------------------------
+
+
+def number(low=-math.inf, high=math.inf, *, or_infinite=False):
+    """Numbers in [low, high]; to exclude an end, give the next number."""
+
+    def is_right(value):
+        if isinstance(value, bool | np.bool_ | complex) or not isinstance(value, int | float | np.number):
+            return False
+        return low <= value <= high and (or_infinite or abs(value) < 1e309)
+
+    return is_right
+
+
+def numbers(value):
+    """Numbers, or arrays of finite ones; an empty array is one of no contours."""
+    if number()(value):
+        return True
+    is_array = isinstance(value, list | np.ndarray | xr.DataArray) and np.asarray(value).dtype.kind in "iuf"
+    return (
+        is_array and not (isinstance(value, list) and True in [v is True for v in value]) and np.isfinite(value).all()
+    )
+
+
+def whole(low, high=math.inf):
+    return lambda value: type(value) is int and low <= value <= high
+
+
+def kind(of, **attributes):
+    return lambda value: isinstance(value, of) and all(getattr(value, name) == v for name, v in attributes.items())
+
+
+def either(*rights):
+    return lambda value: any(right(value) for right in rights)
+
+
+def one_of(*words):
+    return lambda value: isinstance(value, str) and value in words
+
+
+def empty(*kinds):
+    return lambda value: isinstance(value, kinds) and not isinstance(value, xr.Dataset | xr.DataTree) and not len(value)
+
+
+def vacuous(wrong):
+    """Whether an empty array stands beside what is wrong, so that of no contours at all it holds."""
+    return len(wrong) > 1 and any(empty(list)(value) or getattr(value, "size", 1) == 0 for value in wrong.values())
+
+
+def nothing(value):
+    return value is None
+
+
+def never(value):
+    return False
+
+
+TINY = math.ulp(0.0)
+AT_LEAST_0, POSITIVE = number(0.0), number(TINY)
+SHARE = number(TINY, math.nextafter(1.0, 0.0))
+FRICTION = number(0.0, 0.85)
+FLAG = kind(bool | np.bool_)
+SEED = whole(0)
+CELL_OR_NONE = either(nothing, kind(tb.LoadCell))
+ROD_OR_NONE = either(nothing, kind(tb.Rod, is_dimensionless=True))
+SETTINGS_OR_NONE = either(nothing, kind(tb.SamplerSettings))
+PROGRESS = either(nothing, callable)
+NONE_NAMED = empty(list, tuple, set)
+NO_PRIORS = either(nothing, empty(dict))
+
+
+def cases(tmp_path):
+    """By name: the function, a call that is right, what is right of each argument, and more that is wrong."""
+    good = tmp_path / "good.csv"
+    tb.write_record(ideal(), good)
+    paths = {"path": ["\0", "folder/\0.csv", tmp_path, tmp_path / "record.txt", 3]}
+    of_record, of_posterior = {"measured": no_records()}, {"posterior": no_posteriors()}
+    of_rig = {
+        "measured": (measured(), never),
+        "load_cell": (CELL, CELL_OR_NONE),
+        "seed": (1, SEED),
+        "rod": (None, ROD_OR_NONE),
+        "friction": (0.0, FRICTION),
+        "settings": (None, SETTINGS_OR_NONE),
+        "progress": (None, PROGRESS),
+    }
+    of_contour = {**of_rig, "priors": (None, NO_PRIORS), "nuisances": ([], NONE_NAMED)}
+    place = {"q": (0.5, numbers), "x_c": (0.0, numbers)}
+    contours = {
+        "Parabola": {"a": (0.5, numbers), **place},
+        "Circle": {"r": (0.5, numbers), **place},
+        "Ellipse": {"a": (0.5, numbers), "b": (0.4, numbers), **place},
+        "PowerLaw": {"a": (0.5, numbers), "n": (2.0, numbers), **place},
+    }
+    sheet = dict(vars(tb.LoadCell()))
+    of_sheet = {
+        **dict.fromkeys([name for name in sheet if name.endswith(("noise", "resolution"))], AT_LEAST_0),
+        **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), number(TINY, or_infinite=True)),
+        "drive_angle_offset": number(),
+        "drift": nothing,
+        "frame": nothing,
+    }
+    of_settings = {
+        **dict.fromkeys(("block_steps", "max_steps"), whole(1, 10**9)),
+        "ensembles": whole(2, 10**9),
+        "walkers": nothing,
+        "max_r_hat": number(1.1),
+        "min_ess": POSITIVE,
+        "max_seconds": either(nothing, POSITIVE),
+    }
+    of_rod = {
+        "length": (0.1, number(0.1, 10.0)),
+        "diameter": (0.0, number(0.0, 0.1)),
+        "elastic_strain": (None, either(nothing, POSITIVE)),
+    }
+    made = {
+        "scan": (
+            tb.scan,
+            {
+                "contour": (tb.contours.Parabola(0.5, 0.5), kind(tb.contours.Circle, shape=())),
+                "direction": ("both", one_of("both", "forward", "backward")),
+                "base": ((0.0, 0.0), never),
+                "drive_step": (0.1, number(1e-6, 0.5)),
+                "drive_angles": (None, either(nothing, lambda value: np.ndim(value) < 2 and numbers(value))),
+                "rod": (None, ROD_OR_NONE),
+                "friction": (0.0, FRICTION),
+            },
+            {"base": [[(0, 0), (1,)], [0.0, None]], "drive_angles": [["1", "2"], [90.0, 180.0], [[]]]},
+        ),
+        "LoadCell": (
+            tb.LoadCell,
+            {name: (value, of_sheet.get(name, never)) for name, value in sheet.items()},
+            {"gain": [np.zeros((3, 3)), [[1, 2, 3]] * 3], "bias": [[0, 0, "1"], [0, 0]]},
+        ),
+        "LoadCell.measure": (
+            CELL.measure,
+            {"record": (ideal(), never), "seed": (1, either(SEED, kind(np.random.Generator)))},
+            {"record": no_records()},
+        ),
+        "LoadCell.from_record": (tb.LoadCell.from_record, {"record": (measured(), never)}, {"record": no_records()}),
+        "LoadCell.from_zero_load": (
+            tb.LoadCell.from_zero_load,
+            {"record": (measured(), never), "false_alarm": (1e-3, number(TINY, 0.499))},
+            {"record": no_records()},
+        ),
+        "read_record": (
+            tb.read_record,
+            {
+                "path": (good, never),
+                "columns": (None, NO_PRIORS),
+                "split_sweeps": (False, lambda value: FLAG(value) and not value),
+                "rod": (None, ROD_OR_NONE),
+                "missing": ((), NONE_NAMED),
+                "load_cell_frame": (None, nothing),
+            },
+            {**paths, "columns": [{"force_x": 1}, {"force_x": None}, {"left": "Fx"}], "missing": NAMES},
+        ),
+        "write_record": (
+            tb.write_record,
+            {"record": (ideal(), never), "path": (tmp_path / "out.csv", never)},
+            {**paths, "record": no_records()},
+        ),
+        "reconstruct": (
+            tb.reconstruct,
+            {
+                "measured": (measured(), never),
+                "method": ("constrained", one_of("raw", "constrained")),
+                "load_cell": (CELL, CELL_OR_NONE),
+                "rod": (None, ROD_OR_NONE),
+                "friction": (0.0, FRICTION),
+                "suspension_compliance": (0.0, number(0.0, 2.0)),
+            },
+            of_record,
+        ),
+        "infer_contour": (
+            tb.infer_contour,
+            {
+                **of_contour,
+                "family": ("parabola", never),
+                "events": (True, FLAG),
+                "checkpoint": (None, either(nothing, one_of("left"))),
+            },
+            {**of_record, "priors": PRIORS, "nuisances": NAMES, "checkpoint": ["\0"]},
+        ),
+        "SamplerSettings": (
+            tb.SamplerSettings,
+            {name: (value, of_settings[name]) for name, value in vars(tb.SamplerSettings()).items()},
+            {},
+        ),
+        "contour_band": (
+            tb.contour_band,
+            {
+                "posterior": (posterior(), never),
+                "x": ([0.0, 0.1], lambda value: np.ndim(value) < 2 and (numbers(value) or empty(list)(value))),
+                "probability": (0.9, SHARE),
+                "simultaneous": (False, FLAG),
+            },
+            of_posterior,
+        ),
+        "gap": (
+            tb.gap,
+            {"posterior": (posterior(), never), "probability": (0.9, SHARE), "without_events": (None, nothing)},
+            {**of_posterior, "without_events": no_posteriors()},
+        ),
+        **{name: (getattr(tb.contours, name), arguments, {}) for name, arguments in contours.items()},
+        "Rod": (tb.Rod, {**of_rod, "flexural_rigidity": (1.0, POSITIVE)}, {}),
+        "Rod.circular": (
+            tb.Rod.circular,
+            {**of_rod, "diameter": (1e-3, number(1e-3, 0.1)), "youngs_modulus": (2e11, number(1.0, 1e12))},
+            {},
+        ),
+        "compare_families": (
+            tb.compare_families,
+            {
+                **of_contour,
+                "families": (["parabola", "circle"], never),
+                "leave_one_out": (False, FLAG),
+                "false_alarm": (1e-3, SHARE),
+            },
+            {
+                **of_record,
+                "families": [["parabola"], ["parabola", 1], ["parabola", "left"], ["circle"] * 2],
+                "priors": [*({"circle": priors} for priors in PRIORS), {"circle": 1}],
+                "nuisances": NAMES,
+            },
+        ),
+        "infer_contacts": (
+            tb.infer_contacts,
+            {
+                **of_rig,
+                "prior": ("flat", one_of("flat", "polar")),
+                "draws": (4, lambda value: whole(4, 10**6)(value) and value % 4 == 0),
+                "method": ("importance", one_of("auto", "importance", "emcee")),
+            },
+            of_record,
+        ),
+    }
+    assert set(made) == set(CASES)
+    return made
+
+
+CASES = (
+    "scan",
+    "LoadCell",
+    "LoadCell.measure",
+    "LoadCell.from_record",
+    "LoadCell.from_zero_load",
+    "read_record",
+    "write_record",
+    "reconstruct",
+    "infer_contour",
+    "SamplerSettings",
+    "contour_band",
+    "gap",
+    "Parabola",
+    "Circle",
+    "Ellipse",
+    "PowerLaw",
+    "Rod",
+    "Rod.circular",
+    "compare_families",
+    "infer_contacts",
+)
+
+
+@pytest.fixture
+def before_sampling(monkeypatch, tmp_path):
+    """Have calls that would sample end where they would begin to."""
+
+    def reach(*args, **options):
+        raise AcceptedError
+
+    monkeypatch.setattr(contour, "sampled", reach)
+    monkeypatch.setattr(family_comparison, "walk_of", reach)
+    monkeypatch.setattr(contact_posterior, "draw_contacts", reach)
+    monkeypatch.chdir(tmp_path)
+
+
+def is_accepted(call, **options):
+    """Whether a call is accepted; any other error than one of the package, or a foreign warning, fails the test."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TactileBayesWarning)
+        try:
+            call(**options)
+        except AcceptedError:
+            return True
+        except FileNotFoundError:  # as `read_record` says
+            return False
+        except TactileBayesError as error:
+            said = str(error)
+        else:
+            return True
+    assert 20 < len(said) < 600
+    return False
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_wrong_argument_is_refused_in_words(name, before_sampling, tmp_path):
+    call, arguments, more = cases(tmp_path)[name]
+    usual = {argument: value for argument, (value, _) in arguments.items()}
+    assert is_accepted(call, **usual)
+    rng = np.random.default_rng(CASES.index(name))
+    for argument, (_, is_right) in arguments.items():
+        some = [WRONG[k] for k in rng.choice(len(WRONG), size=20, replace=False)]
+        for value in [None, *some, *more.get(argument, [])]:
+            if is_accepted(call, **{**usual, argument: value}):
+                assert is_right(value), f"{name}({argument}={shown(value)}) was accepted"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_wrong_arguments_alone_and_in_pairs_are_refused_in_words(name, before_sampling, tmp_path):
+    """All wrong values of each argument, and a thousand pairs of them, for each name."""
+    rng = np.random.default_rng(CASES.index(name))
+    call, arguments, more = cases(tmp_path)[name]
+    usual = {argument: value for argument, (value, _) in arguments.items()}
+    values = {argument: [*WRONG, *more.get(argument, [])] for argument in arguments}
+    tried = [{argument: value} for argument, wrong in values.items() for value in wrong]
+    for _ in range(1000):
+        chosen = map(str, rng.choice(list(arguments), size=min(2, len(arguments)), replace=False))
+        tried.append({argument: values[argument][rng.integers(len(values[argument]))] for argument in chosen})
+    for wrong in tried:
+        if is_accepted(call, **{**usual, **wrong}) and not vacuous(wrong):
+            for argument, value in wrong.items():
+                assert arguments[argument][1](value), f"{name}({argument}={shown(value)}) was accepted"
+
+
+def test_an_unknown_keyword_is_python_s_to_refuse(tmp_path):
+    for call, arguments, _ in cases(tmp_path).values():
+        with pytest.raises(TypeError, match="unexpected keyword argument 'left'"):
+            call(**{argument: value for argument, (value, _) in arguments.items()}, left=1)
+
+
+# --- The checks themselves ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [1, 0.5, np.float32(0.5), np.int8(3), np.array(2.0), xr.DataArray(2.0), math.inf])
+def test_numbers_are_numbers(value):
+    assert as_number(value) == float(value)
+    assert as_numbers(value) == float(value)
+
+
+@pytest.mark.parametrize("value", [None, True, np.bool_(True), "1", b"1", 1j, np.complex128(1), [1.0], np.ones(1)])
+def test_what_is_no_number(value):
+    assert as_number(value) is None
+
+
+def test_a_whole_number_is_neither_a_truth_value_nor_a_fraction():
+    assert check_whole_number("draws", np.uint8(2), 2) == 2
+    for value in (True, 2.0, "2", None, 1):
+        with pytest.raises(ParameterError, match=r"draws is .*: give a whole number from 2 up"):
+            check_whole_number("draws", value, 2)
+
+
+def test_a_probability_is_none_of_its_ends():
+    assert check_probability("share", 0.4, below=0.5) == 0.4
+    for value in (0.0, 0.5, math.nan):
+        with pytest.raises(ParameterError, match="share is"):
+            check_probability("share", value, below=0.5)
+
+
+def test_names_in_any_order_and_form():
+    for values in (["a", "b"], ("a", "b"), np.array(["a", "b"]), {"a": 1, "b": 2}.keys()):
+        assert check_names("nuisances", values) == ["a", "b"]
+    for values in ("a", b"ab", {"a": 1}, ["a", 1], None, iter("ab")):
+        with pytest.raises(ParameterError, match=r"nuisances is .*: .*give a list of names"):
+            check_names("nuisances", values)
+
+
+def test_a_dataset_is_no_mapping_of_options():
+    assert isinstance(xr.Dataset(), Mapping)
+    with pytest.raises(ParameterError, match="columns is a Dataset"):
+        check_mapping("columns", xr.Dataset(), "give names")
+
+
+def test_a_path_has_letters(tmp_path):
+    check_path("path", tmp_path)
+    for value in ("", "\0", b"record.csv", 3, None):
+        with pytest.raises(ParameterError, match=r"path is .*: give a path"):
+            check_path("path", value)
+
+
+def test_what_is_long_is_shown_by_its_kind():
+    assert shown(xr.Dataset()) == "a Dataset"
+    assert shown(np.zeros((50, 50))) == "a ndarray of shape (50, 50)"
