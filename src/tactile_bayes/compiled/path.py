@@ -104,18 +104,23 @@ def nodes() -> Nodes:
 def work(samples: int, known: tuple[Tables, Tables]) -> Work:
     """For strokes of so many samples at most, and for tables."""
     small, large = known
-    row, of_samples = np.empty(_ORDER), np.empty(samples)
+    row = np.empty(_ORDER)
+    wanted, twice, rate, now, before = np.empty((5, samples))
     return Work(
-        np.empty((4, _ORDER)),
-        row.copy(),
-        row.copy(),
-        np.empty((4, _ORDER)),
-        np.empty((4, _ORDER)),
-        (room_for(small), room_for(large)),
-        np.empty(2 * _ORDER + 1),
-        np.empty(samples, dtype=np.intp),
-        *(of_samples.copy() for _ in range(5)),
-        np.empty((_MOST, 6)),
+        series=np.empty((4, _ORDER)),
+        slope=row.copy(),
+        bend=row.copy(),
+        values=np.empty((4, _ORDER)),
+        over_angle=np.empty((4, _ORDER)),
+        tables=(room_for(small), room_for(large)),
+        on_grid=np.empty(2 * _ORDER + 1),
+        there=np.empty(samples, dtype=np.intp),
+        wanted=wanted,
+        twice=twice,
+        rate=rate,
+        now=now,
+        before=before,
+        waiting=np.empty((_MOST, 6)),
     )
 
 

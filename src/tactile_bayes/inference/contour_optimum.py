@@ -203,11 +203,8 @@ def _zeroed_cell(model: ContourModel) -> LoadCell:
     """The load cell, its zeros and noise those of the record's unloaded samples where they are inferred."""
     rod = model.likelihood.rod
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
-    moment, *forces = model.deviation * units
-    noise = (
-        {"moment_noise": float(moment), "force_noise": float(max(forces))} if model.noise.stated_cell is None else {}
-    )
     inferred = [name in model.nuisances.names for name in BIASES]
-    known = inferred & np.isfinite(model.zero)
-    bias = np.where(known, model.zero * units, model.noise.cell.bias)
-    return replace(model.noise.cell, bias=tuple(bias.tolist()), **noise)
+    cell = model.noise.cell
+    bias = np.where(inferred & np.isfinite(model.zero), model.zero * units, cell.bias)
+    moment, *forces = (cell.moment_noise, cell.force_noise) if model.noise.stated_cell else model.deviation * units
+    return replace(cell, bias=tuple(bias.tolist()), moment_noise=float(moment), force_noise=float(max(forces)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +115,7 @@ def _descend(
         slopes = central_slopes(lambda points: residuals(points * spread), point, 1e-4)
         return np.concatenate([slopes, np.eye(point.size)])
 
-    def loss(squares: Floats) -> Floats:
+    def loss(squares: Floats) -> Any:
         """Outliers are the record's: to be far from where a parameter lies a priori costs its square."""
         root = np.sqrt(1.0 + squares)
         found = np.stack([2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3])
@@ -128,7 +128,9 @@ def _descend(
     while scale > _BRAVE:  # far off, residuals all pull by their squares, or the way would be long
         typical = float(np.sqrt(np.mean(np.square(one(point)))))
         scale = max(_BRAVE, min(typical, _CLOSER * scale))
-        solution = least_squares(one, point, jacobian, bounds, loss=loss, f_scale=scale, max_nfev=_MOST_STEPS)
+        solution = least_squares(
+            one, point, jacobian, bounds, loss=cast(Any, loss), f_scale=scale, max_nfev=_MOST_STEPS
+        )
         point = solution.x
     _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
     axes = axes / sizes[:, None] * spread

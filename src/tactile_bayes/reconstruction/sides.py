@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -35,13 +34,6 @@ _WANDER = 0.2
 
 _FALSE_ALARM = 1e-3
 _ALL_BUT_OUTLIERS = 0.98
-
-
-class _Zero(NamedTuple):
-    """Of unloaded samples."""
-
-    total: float
-    count: int
 
 
 def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
@@ -116,19 +108,17 @@ def _scores(record: xr.Dataset, load_cell: LoadCell | None) -> list[tuple[int, I
     if CHANNELS[0] not in present:
         return [(int(sweep[rows[0]]), rows, np.inf) for rows in parts]
     readings = np.stack([record[name].values for name in present], axis=-1)
-    loaded, zeros = [], []
+    loaded, unloaded = [], []
     for rows in parts:
         bounds = contact_bounds(readings[rows], _FALSE_ALARM, np.full(len(present), np.finfo(float).tiny))
-        inside = np.s_[bounds.before : len(rows) - bounds.after] if bounds.found else np.s_[:]
-        unloaded = np.concatenate([rows[: bounds.before], rows[len(rows) - bounds.after :]])
-        loaded.append(rows[inside])
-        zeros.append(_Zero(float(moment[unloaded].sum()), unloaded.size))
-    every = _Zero(sum(zero.total for zero in zeros), sum(zero.count for zero in zeros))
+        end = len(rows) - bounds.after
+        loaded.append(rows[bounds.before : end] if bounds.found else rows)
+        unloaded.append(np.concatenate([rows[: bounds.before], rows[end:]]))
     found = []
-    for rows, inside, own in zip(parts, loaded, zeros, strict=True):
+    for rows, inside, own in zip(parts, loaded, unloaded, strict=True):
         noise = max(rough_noise(moment[rows]), known, np.finfo(float).tiny)
-        zero = own if own.count >= FEWEST and inside.size < rows.size else every
-        mean, error = (zero.total / zero.count, noise / np.sqrt(zero.count)) if zero.count >= FEWEST else (0.0, unknown)
+        zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else np.concatenate(unloaded)]
+        mean, error = (zeros.mean(), noise / np.sqrt(zeros.size)) if zeros.size >= FEWEST else (0.0, unknown)
         apart = moment[inside] - mean
         most = np.quantile(np.abs(apart), _ALL_BUT_OUTLIERS)
         error = np.sqrt(error**2 + noise**2 / inside.size + (_WANDER * noise) ** 2)

@@ -9,7 +9,8 @@ from typing import Any
 
 import xarray as xr
 
-from tactile_bayes import netcdf
+from tactile_bayes.netcdf import read_netcdf as read_dataset
+from tactile_bayes.netcdf import write_netcdf as write_dataset
 from tactile_bayes.record.table import Source, Table, table_of
 
 __all__ = ["read_netcdf", "write_netcdf"]
@@ -21,7 +22,7 @@ def read_netcdf(path: Path, columns: Mapping[str, str]) -> Table:
     The dimension of the samples may have any name, if all columns lie along it.
     """
     source = Source(str(path))
-    record = netcdf.read_netcdf(
+    record = read_dataset(
         path,
         xr.open_dataset,
         lambda what: source.error(f"the file {what}: write it again, or put a copy of it back"),
@@ -48,4 +49,4 @@ def write_netcdf(record: xr.Dataset, path: Path) -> None:
             encoding[name] = {"dtype": "S1", "char_dim_name": dimension}
         elif variable.dtype.kind != "O":  # objects are texts of different lengths
             encoding[name] = {"_FillValue": None}
-    netcdf.write_netcdf(record, path, encoding)
+    write_dataset(record, path, encoding)
