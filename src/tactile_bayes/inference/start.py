@@ -124,7 +124,7 @@ def _descend(
         return found
 
     bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
-    point, scale = start / spread, np.inf
+    point, scale, robust = start / spread, np.inf, cast(Any, loss)
     while scale > _BRAVE:  # far off, residuals all pull by their squares, or the way would be long
         typical = float(np.sqrt(np.mean(np.square(one(point)))))
         scale = max(_BRAVE, min(typical, _CLOSER * scale))
