@@ -74,8 +74,8 @@ Nuisances = Annotated[
     list[str] | None,
     typer.Option(
         help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset and "
-        "bias: one of these, or drift, gain, friction, suspension_compliance, base (where further pivots "
-        "stand); give it again for another."
+        "bias: one of these, or lever, backlash, drift, gain, friction, suspension_compliance, base (where further "
+        "pivots stand); give it again for another."
     ),
 ]
 AsStated = Annotated[
