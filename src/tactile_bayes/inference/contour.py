@@ -75,11 +75,11 @@ def infer_contour(
         its axes, or "lever_x", "lever_y"), "backlash" (what the encoder reads more in forward than in backward motion
         [rad]), "drift" (of all, or "moment_drift" and so on: by how much a zero moves evenly from the first sample to
         the last; a bias is that in the middle), "gain" (likewise), "friction" (Coulomb's coefficient; several times
-        slower), "suspension_compliance" (turn of the pivot per holding moment). By default the first three; an empty
-        list takes all as stated. A record without the moment tells no lever, and one of a single direction no backlash.
-        "base": how much the second and further pivots of a record are off, as "base_2_x", "base_2_y", "base_3_x" and so
-        on. The first one's place cannot be inferred, since a shift of pivots and object together changes nothing that
-        is measured: results are relative to it.
+        slower), "suspension_compliance" (turn of the pivot per holding moment). By default the first five, but no lever
+        of a record without the moment, and no backlash of one in a single direction, which cannot tell them; an empty
+        list takes all as stated. "base": how much the second and further pivots of a record are off, as "base_2_x",
+        "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred, since a shift of pivots and object
+        together changes nothing that is measured: results are relative to it.
     events : bool
         Whether the samples without load count, which tell where contact begins and ends. Without them only those count
         whose load noise does not explain: what a method knows that looks at contacts alone.

@@ -24,8 +24,8 @@ __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_o
 
 Floats = NDArray[np.float64]
 
-STANDARD = ("rigidity_scale", "drive_angle_offset", "bias")
-"""What is inferred unless something else is asked for."""
+STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash")
+"""What is inferred unless something else is asked for, as far as the record can tell it."""
 
 MAY_VANISH = ("friction", "suspension_compliance")
 """What is not negative, and likely none."""
