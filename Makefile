@@ -11,7 +11,7 @@ PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification designs efficiency samplers images docs lint clean
+.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification designs efficiency nuisances samplers images docs lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -55,6 +55,9 @@ designs: $(READY)
 
 efficiency: $(READY)
 	$(BIN)/python -m benchmarks.efficiency
+
+nuisances: $(READY)
+	$(BIN)/python -m benchmarks.nuisances
 
 samplers: $(READY)
 	$(BIN)/python -m pip install --quiet --target $(PEERS) --upgrade --no-deps \

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import signal
+from dataclasses import replace
 
 import pytest
 import typer.testing
@@ -67,7 +68,7 @@ def quick(monkeypatch):
     infer = run.infer_contour
 
     def infer_quickly(*arguments, settings=None, **options):
-        return infer(*arguments, settings=QUICK, **options)
+        return infer(*arguments, settings=replace(QUICK, walkers=24), **options)  # enough for all that is standard
 
     monkeypatch.setattr(run, "infer_contour", infer_quickly)
     monkeypatch.setattr(run, "_draw", lambda *arguments, **options: {})

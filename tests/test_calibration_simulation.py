@@ -103,6 +103,37 @@ def test_what_is_drawn_of_the_rig():
     )
 
 
+def read_with(made, lever, backlash):
+    """What a cell with these flaws would read of the same truth, at the angles at which the rod was."""
+    contour = Parabola(a=made.truth["a"], q=made.truth["q"], x_c=made.truth["x_c"])
+    parts = [
+        tb.scan(contour, direction=direction, drive_angles=ANGLES - sense * backlash).record
+        for direction, sense in (("forward", 0.5), ("backward", -0.5))
+    ]
+    loads = np.concatenate([loads_of(part) for part in parts])
+    loads[:, 0] += lever[1] * loads[:, 1] - lever[0] * loads[:, 2]
+    return loads
+
+
+def test_a_lever_and_a_backlash_that_are_drawn():
+    made = simulated(nuisances=("lever", "backlash"))
+    lever, backlash = (made.truth["lever_x"], made.truth["lever_y"]), made.truth["backlash"]
+    assert min(map(abs, (*lever, backlash))) > 1e-4
+    np.testing.assert_allclose(loads_of(made.measured), read_with(made, lever, backlash), atol=1e-7)
+
+
+@pytest.mark.parametrize("told", [0.0, 0.5])
+def test_a_lever_and_a_backlash_of_the_cell_that_measures(told):
+    """The readings are the same, whatever is told of them; what the encoder reads is known where it is told."""
+    true, known = (
+        replace(QUIET, lever=(0.03 * share, -0.02 * share), drive_angle_backlash=0.02 * share) for share in (1.0, told)
+    )
+    made = simulated(load_cell=known, world=World(load_cell=true))
+    way = np.where(made.measured.direction == "forward", 0.5, -0.5)
+    np.testing.assert_allclose(made.measured.drive_angle - 0.02 * told * way, np.r_[ANGLES, ANGLES[::-1]], atol=1e-12)
+    np.testing.assert_allclose(loads_of(made.measured), read_with(made, (0.03, -0.02), 0.02 * (1.0 - told)), atol=1e-7)
+
+
 def test_the_world_has_the_same_on_top():
     world = World(
         rigidity_scale=1.1,

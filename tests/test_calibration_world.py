@@ -118,7 +118,7 @@ def test_flat_spot_leaves_the_lowest_point_where_it_was():
 
 
 def test_by_default_the_rig_is_what_was_drawn():
-    drawn = Rig(np.array([0.02]), np.array([1.1]), np.array([0.01]), np.array([0.2]), np.full((1, 2, 2), 0.03))
+    drawn = Rig(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), np.full((1, 2, 2), 0.03))
     rig = World().rig(drawn, 2)
     for mine, theirs in zip(rig, drawn, strict=True):
         np.testing.assert_array_equal(mine, theirs)
@@ -134,10 +134,11 @@ def test_what_differs_comes_on_top_of_what_was_drawn():
     )
     shifts = np.zeros((1, 2, 2))
     shifts[0, 1] = [0.5, 0.0]
-    rig = world.rig(Rig(np.array([0.02]), np.array([1.1]), np.array([0.01]), np.array([0.2]), shifts), 3)
+    rig = world.rig(Rig(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), shifts), 3)
     np.testing.assert_allclose(rig.drive_angle_offset, [0.05])
     np.testing.assert_allclose(rig.rigidity_scale, [1.65])
     np.testing.assert_allclose(rig.suspension_compliance, [0.01])
     np.testing.assert_allclose(rig.friction, [0.3])
+    np.testing.assert_allclose(rig.drive_angle_backlash, [0.03])
     np.testing.assert_allclose(rig.base_shifts, [[[0.01, -0.02], [0.61, 0.18], [0.11, 0.18]]], atol=1e-15)
     assert shifts[0, 0, 0] == 0.0  # what was drawn is as it was

@@ -177,7 +177,9 @@ def test_every_flaw_arrives(ideal, tmp_path):
         "--moment-range": 2,
         "--force-resolution": 0.01,
         "--moment-resolution": 0.005,
+        "--lever": "0.01,-0.02",
         "--drive-angle-offset": 1,
+        "--drive-angle-backlash": 0.2,
         "--drive-angle-resolution": 0.5,
         "--load-cell-frame": "turning",
     }
@@ -193,7 +195,9 @@ def test_every_flaw_arrives(ideal, tmp_path):
         moment_range=2.0,
         force_resolution=0.01,
         moment_resolution=0.005,
+        lever=(0.01, -0.02),
         drive_angle_offset=math.radians(1.0),
+        drive_angle_backlash=math.radians(0.2),
         drive_angle_resolution=math.radians(0.5),
         gain=((1.0, 0.0, 0.0), (0.0, 1.01, 0.02), (0.0, 0.0, 1.0)),
     )

@@ -170,6 +170,13 @@ CELLS = {
         "moment_resolution": 0.01,
         "drive_angle_noise": {"uniform": [1e-3, 2e-3]},
         "drive_angle_offset": {"normal": [0.0, 1e-2]},
+        "drive_angle_backlash": {"normal": [0.0, 1e-3]},
+        "lever_y": {"normal": [0.0, 1e-2]},
+    },
+    "slack": {
+        "drive_angle_noise": 1e-3,
+        "drive_angle_backlash": {"each": [0.0, 1e-2]},
+        "lever_x": {"each": [0.0, 0.1]},
     },
     "outliers": {"moment_noise": 0.02, "force_noise": 0.05, "degrees_of_freedom": {"uniform": [3, 8]}},
     "correlated": {"moment_noise": 0.02, "force_noise": {"each": [0.05, 0.1]}, "correlation_force_x_force_y": 0.5},
@@ -205,7 +212,7 @@ def test_readings_are_those_of_the_load_cell_that_the_record_states(cell, frame)
         readings = np.stack([one[name].values for name in LOADS], axis=-1)
         np.testing.assert_array_equal(readings, stated.simulate(truth, seed=rng))
         if "drive_angle_noise" in cell:
-            wrong = one.drive_angle.values - one.truth_drive_angle.values - stated.drive_angle_offset
+            wrong = one.drive_angle.values - one.truth_drive_angle.values - stated.misread(one.direction.values)
             expected = stated.drive_angle_noise * rng.standard_normal(wrong.reshape(2, -1).shape).ravel()
             np.testing.assert_allclose(wrong, expected, atol=1e-14)
         else:

@@ -20,6 +20,9 @@ CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 FAULTS = {
     "rigidity_scale": 1.07,
     "drive_angle_offset": 0.03,
+    "lever_x": 0.02,
+    "lever_y": -0.03,
+    "backlash": 0.02,
     "moment_bias": 0.1,
     "force_x_bias": -0.2,
     "force_y_bias": 0.3,
@@ -57,16 +60,18 @@ def read_with(faults, *, stated=None, frame="fixed"):
     if frame == "turning":
         cos, sin = np.cos(slope), np.sin(slope)
         loads[:, 1:] = np.stack([cos * loads[:, 1] + sin * loads[:, 2], cos * loads[:, 2] - sin * loads[:, 1]], axis=1)
+    known = tb.LoadCell() if stated is None else stated
+    x, y = (own + faults.get(f"lever_{axis}", 0.0) for own, axis in zip(known.lever, "xy", strict=True))
+    loads[:, 0] += y * loads[:, 1] - x * loads[:, 2]
     loads = loads * [faults.get(f"{name}_gain", 1.0) for name in short]
-    if stated is not None:
-        loads = loads @ np.array(stated.gain).T + np.array(stated.bias)
+    loads = loads @ np.array(known.gain).T + np.array(known.bias)
     loads += [faults.get(f"{name}_bias", 0.0) for name in short]
     way = np.linspace(-0.5, 0.5, len(loads))
     loads += way[:, None] * [faults.get(f"{name}_drift", 0.0) for name in short]
     columns = dict(zip(CHANNELS, loads.T, strict=True))
-    columns["drive_angle"] = (
-        slope + faults.get("drive_angle_offset", 0.0) + (stated.drive_angle_offset if stated else 0.0)
-    )
+    backlash = faults.get("backlash", 0.0) + known.drive_angle_backlash
+    offset = faults.get("drive_angle_offset", 0.0) + known.drive_angle_offset
+    columns["drive_angle"] = slope + offset + np.where(truth.direction == "forward", 0.5, -0.5) * backlash
     second = truth.sweep.values >= 2
     for name in ("base_x", "base_y"):
         columns[name] = truth[name].values - second * faults.get(f"base_2_{name[-1]}", 0.0)
@@ -96,7 +101,7 @@ GROUPS = [[name] for name in FAULTS] + [
 ]
 
 
-MATTERS = ("drive_angle_offset", "force_x_bias", "force_x_gain", "suspension_compliance")
+MATTERS = ("drive_angle_offset", "lever_x", "force_x_bias", "force_x_gain", "suspension_compliance")
 """Faults that are another thing where the load cell turns with the drive."""
 
 
@@ -134,9 +139,12 @@ def test_they_come_on_top_of_what_the_load_cell_states():
         moment_noise=0.02,
         bias=(0.05, 0.1, -0.1),
         gain=((1.0, 0.0, 0.02), (0.01, 1.1, 0.0), (0.0, 0.03, 0.95)),
+        lever=(-0.01, 0.04),
         drive_angle_offset=-0.02,
+        drive_angle_backlash=0.01,
     )
-    faults = {name: FAULTS[name] for name in ("rigidity_scale", "drive_angle_offset", "force_x_gain", "force_y_bias")}
+    names = ("rigidity_scale", "drive_angle_offset", "lever_x", "lever_y", "backlash", "force_x_gain", "force_y_bias")
+    faults = {name: FAULTS[name] for name in names}
     read, truth = read_with(faults, stated=stated)
     distance, misfit = off(read, truth, stated, posterior_of(**faults))
     assert distance < 1e-6
@@ -161,7 +169,7 @@ def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
     """Its single samples agree with one another once its stiffness is known."""
     read, _ = read_with({"rigidity_scale": 1.05})
     measured = CELL.measure(read, seed=1)
-    settings = tb.SamplerSettings(ensembles=2, walkers=20, max_r_hat=1.1, min_ess=100.0, max_steps=400)
+    settings = tb.SamplerSettings(ensembles=2, walkers=24, max_r_hat=1.1, min_ess=100.0, max_steps=400)
     posterior = tb.infer_contour(measured, load_cell=CELL, seed=1, settings=settings)
     assert tb.reconstruct(measured, method="constrained", load_cell=CELL).attrs["misfit_probability"] < 1e-6
     contacts = contact_points(measured, CELL, posterior)

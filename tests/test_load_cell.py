@@ -8,7 +8,7 @@ from scipy import stats
 from tests.helpers.load_cells import CELL, GAIN, NORMAL, SHARED, UNKNOWN, WALK, cell, ideal
 
 from tactile_bayes import scan
-from tactile_bayes.contours import paper_profile
+from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
@@ -169,8 +169,10 @@ def test_cross_talk_from_a_channel_that_is_missing_is_refused():
         cell(gain=GAIN).measure(partial, seed=1)
     alone = cell(gain=np.diag([1.1, 1.2, 1.3])).measure(partial, seed=1)
     assert present_channels(alone) == ("holding_moment", "force_y")
-    with pytest.raises(ParameterError, match="has cross-talk from a channel that the record misses: its gain"):
-        cell(gain=GAIN).corrected(partial)
+    for sheet in (cell(gain=GAIN), cell(lever=(0.0, 0.1))):
+        with pytest.raises(ParameterError, match="has cross-talk from a channel that the record misses: its gain"):
+            sheet.corrected(partial)
+    assert cell(lever=(0.1, 0.0)).corrected(partial).holding_moment[-1] == partial.holding_moment[-1] + 0.1 * 2.0
 
 
 # --- The frame --------------------------------------------------------------------------------------------------
@@ -226,13 +228,28 @@ def test_an_encoder_that_shows_no_sweep_is_refused():
 
 @pytest.mark.parametrize("rod", [Rod(), Rod(0.1, 1.2e-5)])
 @pytest.mark.parametrize("frame", ["fixed", "turning"])
+def test_a_cell_beside_the_pivot_takes_the_moment_of_the_contact_force_there(frame, rod):
+    """By equilibrium of the rod between the contact and the lever's end."""
+    record = scan(Parabola(0.5 / rod.length, 0.5 * rod.length), drive_step=0.1, rod=rod).record
+    lever = np.array([0.03, -0.02]) * rod.length
+    measured = LoadCell(lever=tuple(lever), frame=frame).measure(record, seed=1)
+    cos, sin = np.cos(record.drive_angle.values), np.sin(record.drive_angle.values)
+    x, y = lever if frame == "fixed" else (lever[0] * cos - lever[1] * sin, lever[0] * sin + lever[1] * cos)
+    along, across = record.truth_contact_x - record.base_x - x, record.truth_contact_y - record.base_y - y
+    expected = (along * record.force_y - across * record.force_x).fillna(0.0)
+    np.testing.assert_allclose(measured.holding_moment / rod.moment_unit, expected / rod.moment_unit, atol=1e-9)
+
+
+@pytest.mark.parametrize("rod", [Rod(), Rod(0.1, 1.2e-5)])
+@pytest.mark.parametrize("frame", ["fixed", "turning"])
 def test_step_2_of_a_record_with_known_errors_is_that_of_the_ideal_one(frame, rod):
     ideally = scan(paper_profile("II", q=0.5), drive_step=0.02).record
     record = ideally if rod == Rod() else to_si(ideally, rod)
     unit, length = (rod.moment_unit, rod.force_unit), rod.length
     gain = np.array(GAIN) * [[1.0, length, length], [1 / length, 1.0, 1.0], [1 / length, 1.0, 1.0]]
     bias = np.array([0.1, -0.2, 0.3]) * [unit[0], unit[1], unit[1]]
-    sheet = LoadCell(bias=bias, gain=gain, drive_angle_offset=0.02, frame=frame)
+    further = {"lever": (0.03 * length, -0.02 * length), "drive_angle_offset": 0.02, "drive_angle_backlash": 0.01}
+    sheet = LoadCell(bias=bias, gain=gain, **further, frame=frame)
     clean = reconstruct(record)
     measured = sheet.measure(record, seed=1)
     for given in (None, sheet):
@@ -248,13 +265,15 @@ def test_step_2_of_a_record_with_known_errors_is_that_of_the_ideal_one(frame, ro
 
 
 def test_taking_out_leaves_noise_and_what_is_unknown():
-    sheet = cell(bias=(0.1, -0.2, 0.3), gain=GAIN, bias_uncertainty=UNKNOWN, drive_angle_offset=0.02)
+    known = {"lever": (0.1, 0.2), "drive_angle_offset": 0.02, "drive_angle_backlash": 0.01}
+    sheet = cell(bias=(0.1, -0.2, 0.3), gain=GAIN, bias_uncertainty=UNKNOWN, **known)
     measured = sheet.measure(ideal(20), seed=1)
     before = measured.copy(deep=True)
     back = sheet.corrected(measured)
     assert measured.identical(before)
     assert LoadCell.from_record(back) == cell(bias_uncertainty=UNKNOWN)
     readings, loads = (np.stack([r[c].values for c in CHANNELS], axis=-1) for r in (measured, back))
+    loads[:, 0] += 0.2 * loads[:, 1] - 0.1 * loads[:, 2]
     np.testing.assert_allclose(loads @ np.array(GAIN).T + [0.1, -0.2, 0.3], readings, rtol=0, atol=1e-14)
     np.testing.assert_allclose(back.drive_angle, ideal(20).drive_angle, rtol=1e-15)
 

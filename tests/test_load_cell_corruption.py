@@ -147,14 +147,22 @@ def test_steps_are_white_noise_of_a_twelfth_of_their_square():
 def test_the_encoder_has_its_offset_noise_and_steps():
     angles = np.linspace(1.0, 1.2, 20_000)
     noisy = LoadCell(drive_angle_offset=0.3, drive_angle_noise=0.01)
-    made = corrupted_angles(noisy, angles, np.random.default_rng(42))
+    made = corrupted_angles(noisy, angles, "forward", np.random.default_rng(42))
     assert stats.kstest((made - angles - 0.3) / 0.01, "norm").pvalue > 1e-6
     between = np.corrcoef((made - angles)[1:], (made - angles)[:-1])[0, 1]
     assert abs(between) < 5.0 / np.sqrt(20_000)
     stepped = LoadCell(drive_angle_offset=0.3, drive_angle_resolution=0.01)
-    made = corrupted_angles(stepped, angles, np.random.default_rng(43))
+    made = corrupted_angles(stepped, angles, "forward", np.random.default_rng(43))
     np.testing.assert_allclose(made, np.round((angles + 0.3) / 0.01) * 0.01, rtol=1e-15)
     assert np.abs(made - angles - 0.3).max() <= 0.005 + 1e-15
+
+
+def test_an_encoder_with_backlash_reads_more_forward_than_backward():
+    angles = np.linspace(1.0, 1.2, 5)
+    slack = LoadCell(drive_angle_offset=0.3, drive_angle_backlash=0.01)
+    for direction, off in (("forward", 0.305), ("backward", 0.295)):
+        made = corrupted_angles(slack, angles, direction, np.random.default_rng(1))
+        np.testing.assert_allclose(made, angles + off, rtol=1e-15)
 
 
 # --- Seeds, factors, and what is refused ------------------------------------------------------------------------

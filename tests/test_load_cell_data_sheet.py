@@ -51,7 +51,9 @@ def test_an_impossible_range_is_refused(name, value):
         LoadCell(**{name: value})
 
 
-@pytest.mark.parametrize("name", [*SIZES, "force_range", "degrees_of_freedom", "drive_angle_offset"])
+@pytest.mark.parametrize(
+    "name", [*SIZES, "force_range", "degrees_of_freedom", "drive_angle_offset", "drive_angle_backlash"]
+)
 @pytest.mark.parametrize("value", ["0.1", None, (0.1, 0.2), np.ones(1), [[1], [2, 3]], {}, 1j, True, np.False_])
 def test_what_is_no_number_is_refused(name, value):
     with pytest.raises(ParameterError, match=rf"the load cell's {name} is .*: give a number"):
@@ -59,9 +61,16 @@ def test_what_is_no_number_is_refused(name, value):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_an_offset_that_is_no_angle_is_refused(value):
-    with pytest.raises(ParameterError, match=r"drive_angle_offset is .*: give an angle \[rad\]"):
-        LoadCell(drive_angle_offset=value)
+@pytest.mark.parametrize("name", ["drive_angle_offset", "drive_angle_backlash"])
+def test_an_offset_that_is_no_angle_is_refused(name, value):
+    with pytest.raises(ParameterError, match=rf"{name} is .*: give an angle \[rad\]"):
+        LoadCell(**{name: value})
+
+
+@pytest.mark.parametrize("value", [0.1, (0.1,), (0.1, 0.2, 0.3), "12", (0.1, np.nan), None, (True, 0)])
+def test_a_lever_that_is_no_point_is_refused(value):
+    with pytest.raises(ParameterError, match=r"(?s)the load cell's lever is .*: give two finite numbers \(x, y\)"):
+        LoadCell(lever=value)
 
 
 @pytest.mark.parametrize(
@@ -210,6 +219,19 @@ def test_files_keep_the_data_sheet(tmp_path_factory, ending, sheet, rod):
         np.testing.assert_array_equal(read[name], measured[name])
 
 
+@pytest.mark.parametrize("ending", ["csv", "nc"])
+def test_a_lever_and_a_backlash_are_kept_with_their_units(tmp_path, ending):
+    sheet, path = LoadCell(lever=(0.001, -0.002), drive_angle_backlash=-0.003), tmp_path / f"record.{ending}"
+    write_record(sheet.measure(ideal(20, rod=Rod(0.2, 2.4e-3)), seed=1), path)
+    assert LoadCell.from_record(read_record(path)) == sheet
+    if ending == "csv":
+        header = path.read_text(encoding="utf-8")
+        assert "# load_cell_lever_y: -0.002 [m]" in header
+        assert "# load_cell_drive_angle_backlash: -0.003 [rad]" in header
+        path.write_text(header.replace("lever_y: -0.002 [m]", "lever_y: -2.0 [mm]"), encoding="utf-8")
+        assert LoadCell.from_record(read_record(path)) == sheet
+
+
 @pytest.mark.parametrize(("name", "value"), [("noise", 1e3), ("offset", 57.3)])
 def test_an_encoder_in_degrees_is_refused_where_it_measures(name, value):
     with pytest.raises(ParameterError, match=r"the encoder reads .* more than a turn \(2π\): give a smaller .*radians"):
@@ -258,5 +280,5 @@ def test_the_likelihood_is_the_same_in_all_units_but_for_their_jacobian(sheet, r
 
 
 def test_a_rod_without_size_changes_nothing():
-    sheet = cell(gain=np.eye(3) + 0.01, drift=RandomWalk(force=0.1), force_range=1.0, frame="turning")
+    sheet = cell(gain=np.eye(3) + 0.01, lever=(0.1, 0.2), drift=RandomWalk(force=0.1), force_range=1.0, frame="turning")
     assert sheet.dimensionless(Rod()) == sheet

@@ -83,14 +83,21 @@ def test_a_plan_has_the_record_of_its_scan():
 
 def test_the_record_has_errors_that_are_known_and_none_that_are_drawn():
     bias, gain = (0.1, -0.2, 0.3), ((1.1, 0.0, 0.0), (0.0, 0.9, 0.1), (0.0, 0.0, 1.0))
-    cell = replace(
-        CELL, bias=bias, gain=gain, drive_angle_offset=0.05, drive_angle_noise=0.01, bias_uncertainty=(1.0, 1.0, 1.0)
-    )
+    known = {
+        "bias": bias,
+        "gain": gain,
+        "lever": (0.01, 0.02),
+        "drive_angle_offset": 0.05,
+        "drive_angle_backlash": 0.02,
+    }
+    cell = replace(CELL, **known, drive_angle_noise=0.01, bias_uncertainty=(1.0, 1.0, 1.0))
     plan = Plan(PROFILE, cell, drive_step=0.05)
     scanned = tb.scan(PROFILE, drive_step=0.05).record
     loads, read = (np.stack([r[name].values for name in CHANNELS]) for r in (scanned, plan.record))
+    loads[0] += 0.02 * loads[1] - 0.01 * loads[2]
     np.testing.assert_allclose(read, np.array(gain) @ loads + np.array(bias)[:, None], rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(plan.record.drive_angle.values, scanned.drive_angle.values + 0.05, rtol=0.0, atol=1e-12)
+    misread = np.where(scanned.direction.values == "forward", 0.06, 0.04)
+    np.testing.assert_allclose(plan.record.drive_angle, scanned.drive_angle.values + misread, rtol=0.0, atol=1e-12)
 
 
 def test_the_model_shows_the_record_at_the_point():

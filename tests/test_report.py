@@ -362,6 +362,7 @@ def test_the_rig_of_the_likeliest_draw_moves_it(posterior):
     rig = {
         "rigidity_scale": 1.05,
         "drive_angle_offset": 0.01,
+        "backlash": 0.006,
         "suspension_compliance": 0.4,
         "friction": 0.2,
         "base_2_x": 0.002,
@@ -372,7 +373,8 @@ def test_the_rig_of_the_likeliest_draw_moves_it(posterior):
     expected = predicted(tree, rig)[motion.samples]
     largest = np.abs(expected).max(axis=0)
     np.testing.assert_allclose(motion.loads / largest, expected / largest, atol=1e-5)
-    driven = record["drive_angle"].values[motion.samples] - rig["drive_angle_offset"]
+    misread = np.where(record["direction"].values == "forward", 0.013, 0.007)
+    driven = (record["drive_angle"].values - misread)[motion.samples]
     turned = motion.drive_angle + rig["suspension_compliance"] * motion.loads[:, 0]
     np.testing.assert_allclose(turned, driven, atol=1e-9)
     np.testing.assert_allclose(motion.cell_angle, driven, atol=1e-9)

@@ -113,21 +113,21 @@ def test_the_frame_of_the_load_cell_does_not_matter():
     xr.testing.assert_identical(fixed["posterior"].to_dataset(), turning["posterior"].to_dataset())
 
 
-def test_an_inferred_offset_is_taken_off_the_drive_angle_draw_by_draw():
+@pytest.mark.parametrize("name", ["drive_angle_offset", "backlash"])
+def test_an_inferred_offset_is_taken_off_the_drive_angle_draw_by_draw(name):
     contour, offsets = Parabola(0.5, 0.5), np.array([0.0, 0.02, -0.03])
     record = swept(contour, step=STEP)
-    tree = tree_of(
-        record, "parabola", nuisances=["drive_angle_offset"], **parameters(contour), drive_angle_offset=offsets
-    )
+    tree = tree_of(record, "parabola", nuisances=[name], **parameters(contour), **{name: offsets})
     found = implied_contacts(tree)["posterior"].to_dataset().isel(chain=0)
     for k, offset in enumerate(offsets):
         for direction in ("forward", "backward"):
             on = record.direction.values == direction
-            angles = record.drive_angle.values[on] - offset
+            share = {"drive_angle_offset": 1.0, "backlash": 0.5 if direction == "forward" else -0.5}[name]
+            angles = record.drive_angle.values[on] - share * offset
             there = scan(contour, direction=direction, drive_angles=angles).record.sortby("drive_angle")
             draw = found.isel(draw=k, sample=np.flatnonzero(on)[np.argsort(angles)])
-            for name in COLUMNS:
-                np.testing.assert_allclose(draw[name], there[f"truth_{name}"], rtol=0.0, atol=1e-9, equal_nan=True)
+            for column in COLUMNS:
+                np.testing.assert_allclose(draw[column], there[f"truth_{column}"], rtol=0.0, atol=1e-9, equal_nan=True)
             touched = there.truth_contact_phase.values != "none"
             np.testing.assert_allclose(draw.drive_angle, np.where(touched, np.sort(angles), np.nan), atol=1e-15)
 

@@ -33,7 +33,7 @@ def blank_record(
         Of the rod, in any order [rad].
     rod : Rod, optional
     load_cell : LoadCell
-        Its frame, and its encoder's offset.
+        Its frame, and its encoder's offset and backlash.
     """
     angles = np.sort(drive_angles)
     parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}
@@ -47,6 +47,6 @@ def blank_record(
             parts["drive_angle"].append(angles if direction == "forward" else angles[::-1])
             sweep += 1
     columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
-    columns["drive_angle"] = columns["drive_angle"] + load_cell.drive_angle_offset
+    columns["drive_angle"] = columns["drive_angle"] + load_cell.misread(columns["direction"])
     loads = {name: np.zeros(columns["sweep"].size) for name in CHANNELS}
     return make_record(columns | loads, rod=rod, load_cell_frame=load_cell.frame or "fixed")

@@ -24,6 +24,7 @@ def cell(**options) -> LoadCell:
 NORMAL = {
     "white": CELL,
     "gain and bias": cell(gain=GAIN, bias=(0.1, -0.2, 0.3)),
+    "lever": cell(gain=GAIN, lever=(0.1, -0.2), relative_noise=0.2),
     "relative noise": cell(relative_noise=0.2, gain=GAIN, bias=(0.1, -0.2, 0.3)),
     "random walk": cell(drift=WALK),
     "drift of the forces": cell(drift=RandomWalk(force=0.03)),
@@ -46,7 +47,9 @@ NORMAL = {
 def moments(sheet: LoadCell, loads, noise_scale=(1.0, 1.0, 1.0)):
     """Mean, shape (3n,), and covariance of readings of loads (n, 3), sample by sample, written out."""
     n = len(loads)
-    weighed = np.array([np.array(sheet.gain) @ load for load in loads])
+    x, y = sheet.lever
+    at_lever = [(moment - x * force_y + y * force_x, force_x, force_y) for moment, force_x, force_y in loads]
+    weighed = np.array([np.array(sheet.gain) @ load for load in at_lever])
     white = np.array([sheet.moment_noise, sheet.force_noise, sheet.force_noise])
     white = np.sqrt(white**2 + (sheet.relative_noise * weighed) ** 2) * np.asarray(noise_scale)
     between = np.eye(3)
@@ -107,11 +110,13 @@ def load_cells(draw, frames=(None, "fixed", "turning")) -> LoadCell:
         bias_uncertainty=draw(st.one_of(st.just((0.0, 0.0, 0.0)), st.tuples(_sizes, _sizes, _sizes))),
         drift=draw(_drifts),
         gain=np.eye(3) + np.reshape(cross, (3, 3)),
+        lever=draw(st.one_of(st.just((0.0, 0.0)), st.tuples(_signed, _signed))),
         force_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         moment_range=draw(st.one_of(st.just(np.inf), st.floats(1.0, 3.0))),
         force_resolution=draw(_sizes),
         moment_resolution=draw(_sizes),
         drive_angle_offset=draw(st.floats(-0.1, 0.1)),
+        drive_angle_backlash=draw(st.floats(-0.01, 0.01)),
         drive_angle_noise=0.01 * draw(_sizes),
         drive_angle_resolution=0.01 * draw(_sizes),
         frame=draw(st.sampled_from(frames)),

@@ -254,7 +254,8 @@ def _contacts(
 ) -> dict[str, float]:
     """Share of the contacts looked at that lie in their region."""
     likelihood = experiment.model.likelihood
-    read = experiment.template.drive_angle.values - experiment.load_cell.drive_angle_offset
+    known = experiment.load_cell.misread(experiment.template.direction.values)
+    read = experiment.template.drive_angle.values - known
     true = contacts_of(likelihood, simulation.contour, simulation.rig, read)
     chosen: list[int] = []
     for stroke in likelihood.strokes:
@@ -266,7 +267,7 @@ def _contacts(
     draws = samples.reshape(-1, samples.shape[-1])
     points = draws[rng.choice(len(draws), min(_CONTACT_DRAWS, len(draws)), replace=False)]
     asked = np.full(read.size, np.nan)
-    asked[chosen] = (simulation.measured.drive_angle.values - experiment.load_cell.drive_angle_offset)[chosen]
+    asked[chosen] = (simulation.measured.drive_angle.values - known)[chosen]
     found = contacts_of(model.likelihood, model.contours(points), model.rig(points), asked, exact=False)
     dims = ("chain", "draw", "sample")
     columns = {name: (dims, found[name][None][..., chosen]) for name in ("contact_x", "contact_y")}

@@ -54,12 +54,14 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
     likelihood = model.likelihood
     told = experiment.load_cell
     cell = told if world.load_cell is None else world.load_cell
-    misread = cell.drive_angle_offset - told.drive_angle_offset
+    misread = {
+        name: getattr(cell, name) - getattr(told, name) for name in ("drive_angle_offset", "drive_angle_backlash")
+    }
     for _ in range(_TRIALS):
         point, _ = model.draw_prior(rng, 1)
         contour = world.contour(model.contours(point))
         rig = world.rig(model.rig(point), experiment.pivots)
-        rig = rig._replace(drive_angle_offset=rig.drive_angle_offset + misread)
+        rig = rig._replace(**{name: getattr(rig, name) + off for name, off in misread.items()})
         if np.any(np.arctan(rig.friction) > MAX_FRICTION_ANGLE):  # what was drawn, and what the world adds
             continue
         loads, reached = likelihood.predict(contour, rig)
@@ -71,15 +73,17 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
             "large: make it differ less"
         )
     values = model.values(point)
-    sensed = model.nuisances.sensed(loads, values, likelihood.load_cell)[0]
     rod = likelihood.rod
+    measures = cell.dimensionless(rod)
+    sensed = model.nuisances.sensed(loads, values, measures)[0]
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
-    readings = cell.dimensionless(rod).simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
+    readings = measures.simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
     course = model.nuisances.way[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course
     template = experiment.template
     # The template has the angles that are read but for noise and steps; what is misread is in those of the rod.
-    angles = corrupted_angles(cell, template.drive_angle.values - cell.drive_angle_offset, rng)
+    direction = template.direction.values
+    angles = corrupted_angles(cell, template.drive_angle.values - cell.misread(direction), direction, rng)
     columns = {name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)}
     measured = template.assign(columns).assign(drive_angle=("sample", angles, template.drive_angle.attrs))
     events = {name: found[0] for name, found in events_of(likelihood, contour, rig).items()}

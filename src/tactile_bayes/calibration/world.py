@@ -137,6 +137,7 @@ class World:
             rigidity_scale=drawn.rigidity_scale * self.rigidity_scale,
             suspension_compliance=drawn.suspension_compliance,
             friction=drawn.friction + self.friction,
+            drive_angle_backlash=drawn.drive_angle_backlash,
             base_shifts=shifts,
         )
 

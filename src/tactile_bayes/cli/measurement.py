@@ -59,11 +59,18 @@ def measure(
             "give it again for another."
         ),
     ] = None,
+    lever: Annotated[
+        str | None,
+        typer.Option(help="Where the moment is taken, from the pivot, along the axes of the cell: X,Y."),
+    ] = None,
     force_range: Annotated[float, typer.Option(help="Largest force that is read [N, or EI/L²].")] = math.inf,
     moment_range: Annotated[float, typer.Option(help="Largest moment that is read [N m, or EI/L].")] = math.inf,
     force_resolution: Annotated[float, typer.Option(help="Step of the forces [N, or EI/L²].", min=0.0)] = 0.0,
     moment_resolution: Annotated[float, typer.Option(help="Step of the moment [N m, or EI/L].", min=0.0)] = 0.0,
     drive_angle_offset: Annotated[float, typer.Option(help="What the encoder reads at zero [degrees].")] = 0.0,
+    drive_angle_backlash: Annotated[
+        float, typer.Option(help="What it reads more in forward than in backward motion [degrees].")
+    ] = 0.0,
     drive_angle_noise: Annotated[float, typer.Option(help="Of the encoder [degrees].", min=0.0)] = 0.0,
     drive_angle_resolution: Annotated[float, typer.Option(help="Step of the encoder [degrees].", min=0.0)] = 0.0,
     load_cell_frame: Annotated[
@@ -77,7 +84,7 @@ def measure(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Read an ideal record with a load cell that is not: noise, bias, drift, gain, range, steps and encoder.
+    """Read an ideal record with a load cell that is not: noise, bias, drift, gain, lever, range, steps and encoder.
 
     A record whose header states a load cell is refused, as noise would be there twice; one that states none is taken
     to be ideal.
@@ -97,6 +104,7 @@ def measure(
         "force_resolution": force_resolution,
         "moment_resolution": moment_resolution,
         "drive_angle_offset": math.radians(drive_angle_offset),
+        "drive_angle_backlash": math.radians(drive_angle_backlash),
         "drive_angle_noise": math.radians(drive_angle_noise),
         "drive_angle_resolution": math.radians(drive_angle_resolution),
     }
@@ -106,6 +114,7 @@ def measure(
     entries |= _entries("correlation", correlation, "--correlation", pairs)
     entries |= _entries("random_walk", random_walk, "--random-walk", ("moment", "force"))
     entries |= _entries("ornstein_uhlenbeck", ornstein_uhlenbeck, "--ornstein-uhlenbeck", ("moment", "force", "time"))
+    entries |= _entries("lever", lever, "--lever", ("x", "y"))
     entries |= _gains(gain or [])
     cell = LoadCell.from_entries({"frame": load_cell_frame, **entries})
     if not cell.entries():

@@ -73,8 +73,8 @@ Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", m
 Nuisances = Annotated[
     list[str] | None,
     typer.Option(
-        help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset and "
-        "bias: one of these, or drift, gain, friction, suspension_compliance, base (where further pivots "
+        help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset, bias, "
+        "lever and backlash: one of these, or drift, gain, friction, suspension_compliance, base (where further pivots "
         "stand); give it again for another."
     ),
 ]

@@ -59,7 +59,7 @@ def loads_of(
         With parameters of shape (n,), in the same unit as bases and rod.
     rod : (float, float)
         Its length, and half its diameter.
-    rig : ndarray, shape (n, 2)
+    rig : ndarray, shape (n, strokes, 2)
         What the encoder reads too much [rad], and the suspension's compliance [rad/(EI/L)].
     shifts : ndarray, shape (n, strokes, 2)
         By how much the pivot of every stroke is off.
@@ -142,10 +142,11 @@ def _fill(
                 lane, sign = mirrored(lane), -1.0
             of_stroke = slice(strokes.first[k], strokes.first[k + 1])
             angles, samples = strokes.angles[of_stroke], strokes.samples[of_stroke]
+            off, yielding = rig[i, k]
             reach, first, snap = follow(
-                lane, has_knot, angles, samples, sign, rig[i, 0], rig[i, 1], tolerance, known, on, room, out[i]
+                lane, has_knot, angles, samples, sign, off, yielding, tolerance, known, on, room, out[i]
             )
-            events[i, k, 0], events[i, k, 1] = first + sign * rig[i, 0], snap + sign * rig[i, 0]
+            events[i, k, 0], events[i, k, 1] = first + sign * off, snap + sign * off
             if reach != _TOUCHES:
                 usable[i] = False
             elif not is_always_clear:

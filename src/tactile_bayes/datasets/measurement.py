@@ -22,8 +22,17 @@ Index = NDArray[np.intp]
 _HARMLESS: dict[str, tuple[str, int | None]] = {
     **{
         name: (name, None)
-        for name in ("force_noise", "moment_noise", "relative_noise", "drive_angle_offset", "drive_angle_noise")
+        for name in (
+            "force_noise",
+            "moment_noise",
+            "relative_noise",
+            "drive_angle_offset",
+            "drive_angle_backlash",
+            "drive_angle_noise",
+        )
     },
+    "lever_x": ("lever", 0),
+    "lever_y": ("lever", 1),
     **{f"{stem}_{name}": (stem, k) for stem in ("bias", "bias_uncertainty") for k, name in enumerate(CHANNELS)},
 }
 """Entries of a data sheet that are possible or not whatever the others are: field, and place in it."""
@@ -40,6 +49,7 @@ def measure(spec: Specification, index: Index, drawn: Mapping[str, Floats], samp
     laws = spec.load_cell
     cells = _cells(spec, drawn, index.size)
     readings = np.empty_like(loads)
+    direction = np.array([direction for _, direction in spec.sweeps])[:, None]
     encoder = any(name.startswith("drive_angle") for name in laws)
     if encoder:
         sample["truth_drive_angle"], sample["drive_angle"] = angles, np.empty_like(angles)
@@ -47,7 +57,7 @@ def measure(spec: Specification, index: Index, drawn: Mapping[str, Floats], samp
         rng = np.random.default_rng(np.random.SeedSequence(spec.seed, spawn_key=(record, 1)))
         readings[i] = corrupted_loads(cell, loads[i].reshape(-1, 3), rng).reshape(loads[i].shape)
         if encoder:
-            sample["drive_angle"][i] = corrupted_angles(cell, angles[i], rng)
+            sample["drive_angle"][i] = corrupted_angles(cell, angles[i], direction, rng)
     for k, name in enumerate(CHANNELS):
         sample[name] = np.ascontiguousarray(readings[..., k])
 

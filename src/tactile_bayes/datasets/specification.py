@@ -361,7 +361,7 @@ def _load_cell(table: Mapping[str, Any]) -> dict[str, Law]:
             LoadCell.from_entries(entries)
         except ParameterError as error:
             raise SpecificationError(f"load_cell: {error}") from error
-    signed = ("bias_holding", "bias_force", "gain_", "correlation_", "drive_angle_offset")
+    signed = ("bias_holding", "bias_force", "gain_", "lever_", "correlation_", "drive_angle_o", "drive_angle_b")
     unsigned = {name: law for name, law in laws.items() if not name.startswith(signed)}
     _refuse_negative(unsigned, "load_cell.", or_zero=set(unsigned))
     return laws

@@ -83,12 +83,15 @@ def infer_contour(
     nuisances : sequence of str
         What is not known of the rig, and inferred beside the contour: "rigidity_scale" (flexural rigidity over that
         stated), "drive_angle_offset" (what the encoder reads too much [rad]), "bias" (of all channels, or
-        "moment_bias", "force_x_bias", "force_y_bias"), "drift" (of all, or "moment_drift" and so on: by how much a zero
-        moves evenly from the first sample to the last; a bias is that in the middle), "gain" (likewise), "friction"
-        (Coulomb's coefficient; several times slower), "suspension_compliance" (turn of the pivot per holding moment).
-        By default the first three; an empty list takes all as stated. "base": how much the second and further pivots of
-        a record are off, as "base_2_x", "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred,
-        since a shift of pivots and object together changes nothing that is measured: results are relative to it.
+        "moment_bias", "force_x_bias", "force_y_bias"), "lever" (where the cell takes its moment, from the pivot along
+        its axes, or "lever_x", "lever_y"), "backlash" (what the encoder reads more in forward than in backward motion
+        [rad]), "drift" (of all, or "moment_drift" and so on: by how much a zero moves evenly from the first sample to
+        the last; a bias is that in the middle), "gain" (likewise), "friction" (Coulomb's coefficient; several times
+        slower), "suspension_compliance" (turn of the pivot per holding moment). By default the first five, but no lever
+        of a record without the moment, and no backlash of one in a single direction, which cannot tell them; an empty
+        list takes all as stated. "base": how much the second and further pivots of a record are off, as "base_2_x",
+        "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred, since a shift of pivots and object
+        together changes nothing that is measured: results are relative to it.
     events : bool
         Whether the samples without load count, which tell where contact begins and ends. Without them only those count
         whose load noise does not explain: what a method knows that looks at contacts alone.
@@ -139,9 +142,10 @@ def infer_contour(
     log-normal around 1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L
     and EI/L². Of the nuisances: rigidity_scale log-normal around 1 with 5 %,
     drive_angle_offset normal with 1°, biases and drifts normal with 0.1 EI/L and EI/L² (a bias of which the load cell
-    states a bias_uncertainty is integrated out instead), gains normal around 1 with 2 %, friction half-normal with
-    scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, pivots normal with 1 % of L. Contours out of
-    reach, and those that the rod would still cut after snap-off, are excluded on top.
+    states a bias_uncertainty is integrated out instead), lever_x and lever_y normal with 0.5 % of L, backlash normal
+    with 0.2°, gains normal around 1 with 2 %, friction half-normal with scale 0.3, suspension_compliance half-normal
+    with 0.05 rad per EI/L, pivots normal with 1 % of L. Contours out of reach, and those that the rod would still cut
+    after snap-off, are excluded on top.
 
     Examples
     --------

@@ -94,7 +94,7 @@ def _labelled(model: ContourModel, samples: Floats, draw: NDArray[np.intp]) -> x
 def unit_of(model: ContourModel, name: str) -> str:
     """The unit of a parameter, in words."""
     if model.measured.attrs["units"] == "dimensionless":
-        return "rad" if name in ("drive_angle_offset", "length_scale") else "1"
+        return "rad" if name in ("drive_angle_offset", "backlash", "length_scale") else "1"
     if name in model.nuisances.names:
         return model.nuisances.unit(name)
     if name == "length_scale":

@@ -25,7 +25,7 @@ class FoundRig(NamedTuple):
     record: xr.Dataset
     """With pivots as they were found, and without drift."""
     load_cell: LoadCell
-    """Bias, gain (a rod that is stiffer than stated makes it larger) and encoder offset as they were found.
+    """Bias, gain (a rod that is stiffer than stated makes it larger), lever and encoder as they were found.
 
     So is noise that was not stated; else it is as stated, whatever `noise_scale` says, so that misfits tell of it.
     """
@@ -61,8 +61,10 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
     cell = replace(
         stated,
         gain=gain,
+        lever=(stated.lever[0] + rig.get("lever_x", 0.0), stated.lever[1] + rig.get("lever_y", 0.0)),
         bias=tuple(bias.tolist()),
         drive_angle_offset=stated.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
+        drive_angle_backlash=stated.drive_angle_backlash + rig.get("backlash", 0.0),
         **noise,
     )
     way = np.linspace(-0.5, 0.5, measured.sizes["sample"])

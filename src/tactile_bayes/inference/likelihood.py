@@ -44,12 +44,14 @@ _LEAST = 1e-9
 
 @dataclass(frozen=True)
 class _Stroke:
-    """Samples with one pivot, that meet the object from one side."""
+    """Samples with one pivot, that meet the object from one side while the drive moves one way."""
 
     pivot: int
     """Which of the record's pivots, in the order in which they come."""
     base: tuple[float, float]
     backward: bool
+    sense: float
+    """In which the drive moves: +1 forward, −1 backward, whatever side it meets the object from."""
     samples: NDArray[np.intp]
 
 
@@ -64,6 +66,8 @@ class Rig(NamedTuple):
     """Turn of the pivot's suspension per holding moment, in the unit of the record as stated [rad/(EI/L)]."""
     friction: Any = 0.0
     """Coulomb's coefficient."""
+    drive_angle_backlash: Any = 0.0
+    """What the encoder reads more in forward motion than in backward motion, beyond what the data sheet says [rad]."""
     base_shifts: Any = None
     """By how much pivots are off where the record has them, in its unit of length, shape (n, pivots, 2), in the order
     in which they come; those after the last that is given are where they should be."""
@@ -81,7 +85,7 @@ class RecordLikelihood:
     measured : xr.Dataset
         A valid record.
     load_cell : LoadCell
-        In the record's units. Its encoder's offset is taken out of the drive angles.
+        In the record's units. Its encoder's offset and backlash are taken out of the drive angles.
     friction : float
         Coulomb's coefficient μ.
     order : int
@@ -114,15 +118,16 @@ class RecordLikelihood:
             )
         self.measured = np.stack([record[name].values for name in CHANNELS], axis=-1)
         self.noise = self.load_cell.noise
-        angle = record.drive_angle.values - load_cell.drive_angle_offset
+        angle = record.drive_angle.values - load_cell.misread(measured.direction.values)
         self._turn = angle if frame_of(record) == "turning" else None
         backward = contact_sides(_without_errors(measured, load_cell), load_cell) < 0.0
         places = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
         pivots = {base: k for k, base in enumerate(bases_of(measured))}
-        kinds, which = np.unique(np.column_stack([places, backward]), axis=0, return_inverse=True)
+        sense = np.where(measured.direction.values == "backward", -1.0, 1.0)
+        kinds, which = np.unique(np.column_stack([places, backward, sense]), axis=0, return_inverse=True)
         self.strokes = [
-            _Stroke(pivots[float(x), float(y)], (float(x), float(y)), bool(b), np.flatnonzero(which == k))
-            for k, (x, y, b) in enumerate(kinds)
+            _Stroke(pivots[float(x), float(y)], (float(x), float(y)), bool(b), float(s), np.flatnonzero(which == k))
+            for k, (x, y, b, s) in enumerate(kinds)
         ]
         self._pivots = np.array([stroke.pivot for stroke in self.strokes])
         others = [[t.base == s.base and t.backward != s.backward for t in self.strokes] for s in self.strokes]
@@ -170,7 +175,16 @@ class RecordLikelihood:
         rig = self._rig_of(rig, contours.shape[0])
         signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
         ends = self.paths(contours, rig).snap_angle.reshape(len(self.strokes), -1).T
-        return np.asarray(ends + signs * rig.drive_angle_offset[:, None])
+        return np.asarray(ends + signs * self._misread(rig))
+
+    def misread(self, rig: Rig) -> Floats:
+        """What the encoder reads too much, beyond what the data sheet says [rad], shape (n or 1, samples)."""
+        return self._misread(rig)[:, self.stroke_of_sample]
+
+    def _misread(self, rig: Rig) -> Floats:
+        """By stroke, in each of which the drive moves one way."""
+        offset, backlash = (np.atleast_1d(v)[:, None] for v in (rig.drive_angle_offset, rig.drive_angle_backlash))
+        return np.asarray(offset + 0.5 * backlash * np.array([stroke.sense for stroke in self.strokes]))
 
     def event_samples(self, loaded: NDArray[np.bool_]) -> NDArray[np.intp]:
         """Of each stroke the samples between which events lie: the last before contact, the first and the last in it,
@@ -252,7 +266,7 @@ class RecordLikelihood:
         else:
             predicted, reached, events = self._by_compiled(halves, rig, errors)
         if self._turn is not None:
-            turn = self._turn - rig.drive_angle_offset[:, None, None] - errors[:, None]
+            turn = self._turn - self.misread(rig)[:, None] - errors[:, None]
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
         if np.any(rig.rigidity_scale != 1.0):
             predicted *= rig.rigidity_scale[:, None, None, None]
@@ -271,14 +285,13 @@ class RecordLikelihood:
         from tactile_bayes.compiled.loads import loads_of  # numba takes a second to load
 
         rod = self.rod.length, 0.5 * self.rod.diameter
-        offset_and_compliance = np.stack(
-            [rig.drive_angle_offset, rig.suspension_compliance * rig.rigidity_scale], axis=1
-        )
+        misread = self._misread(rig)
+        compliance = np.broadcast_to((rig.suspension_compliance * rig.rigidity_scale)[:, None], misread.shape)
         loads, usable, events = loads_of(
             halves,
             self._strokes_with(errors),
             rod,
-            offset_and_compliance,
+            np.stack([misread, compliance], axis=-1),
             rig.base_shifts[:, self._pivots],
             self._tolerance,
             is_always_clear=self.is_always_clear,
@@ -316,7 +329,7 @@ class RecordLikelihood:
         rig = self._rig_of(rig, count)
         paths = self.paths(contours, rig)
         signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
-        offset = (signs[:, None] * rig.drive_angle_offset).reshape(-1, 1)
+        offset = (signs[:, None] * self._misread(rig).T).reshape(-1, 1)
         angles = self._angles[:, None] - signs[:, None, None] * errors[:, None]  # (stroke, error, sample)
         longest = angles.shape[-1]
         loads = paths.observables(np.repeat(angles.reshape(len(angles), -1), count, axis=0) - offset)

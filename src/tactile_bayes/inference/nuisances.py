@@ -25,14 +25,15 @@ __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_o
 
 Floats = NDArray[np.float64]
 
-STANDARD = ("rigidity_scale", "drive_angle_offset", "bias")
-"""What is inferred unless something else is asked for."""
+STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash")
+"""What is inferred unless something else is asked for, as far as the record can tell it."""
 
 MAY_VANISH = ("friction", "suspension_compliance")
 """What is not negative, and likely none."""
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}
+_GROUPS["lever"] = ("lever_x", "lever_y")
 
 BIASES = _GROUPS["bias"]
 
@@ -40,6 +41,7 @@ BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
 
 _RIGIDITY, _OFFSET, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.02, 0.3, 0.05, 0.01
+_LEVER, _BACKLASH = 0.005, np.radians(0.2)
 """Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; and L."""
 
 
@@ -54,17 +56,22 @@ class _Kind(NamedTuple):
     high: float
     power_of_moment: int = 0
     """Of the unit of moments in its unit; for zeros of forces that of forces stands in for it."""
+    power_of_length: int = 0
 
 
 _KINDS = {
     "rigidity_scale": _Kind(0.0, np.inf),
     "drive_angle_offset": _Kind(-np.pi, np.pi),
+    "backlash": _Kind(-np.pi, np.pi),
     "suspension_compliance": _Kind(0.0, np.inf, power_of_moment=-1),
     "friction": _Kind(0.0, float(np.tan(MAX_FRICTION_ANGLE))),
     **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in (*_GROUPS["bias"], *_GROUPS["drift"])},
     **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
+    **{name: _Kind(-np.inf, np.inf, power_of_length=1) for name in _GROUPS["lever"]},
 }
-_RIG = ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")
+_RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
+_RIG["backlash"] = "drive_angle_backlash"
+"""What changes the path, or where a drive angle is read, by its name in `Rig`."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +100,11 @@ class Nuisances:
     """Of each name, in the record's units, what is one inside."""
 
     def __post_init__(self) -> None:
-        moment, force = self.rod.moment_unit, self.rod.force_unit
-        units = {n: (force if n.startswith("force") else moment) ** k.power_of_moment for n, k in _KINDS.items()}
+        moment, force, length = self.rod.moment_unit, self.rod.force_unit, self.rod.length_unit
+        units = {
+            n: (force if n.startswith("force") else moment) ** k.power_of_moment * length**k.power_of_length
+            for n, k in _KINDS.items()
+        }
         units |= {n: 1.0 for n in self.names if _BASE.fullmatch(n)}  # lengths are the record's inside, too
         object.__setattr__(self, "units", units)
 
@@ -107,9 +117,10 @@ class Nuisances:
         """Of an SI record, in words."""
         if name in (*_GROUPS["bias"], *_GROUPS["drift"]):
             return "N m" if name.startswith("moment") else "N"
-        if _BASE.fullmatch(name):
+        if _BASE.fullmatch(name) or name in _GROUPS["lever"]:
             return "m"
-        return {"drive_angle_offset": "rad", "suspension_compliance": "rad/(N m)"}.get(name, "1")
+        units = {"drive_angle_offset": "rad", "backlash": "rad", "suspension_compliance": "rad/(N m)"}
+        return units.get(name, "1")
 
     def rig(self, values: Mapping[str, Floats]) -> Rig:
         """The rig of every point, from values by name, each of shape (n,)."""
@@ -117,7 +128,7 @@ class Nuisances:
         return Rig(
             base_shifts=self._base_shifts(values),
             **known,
-            **{name: values[name] / self.units[name] for name in _RIG if name in self.names},
+            **{of_rig: values[name] / self.units[name] for name, of_rig in _RIG.items() if name in self.names},
         )
 
     def _base_shifts(self, values: Mapping[str, Floats]) -> Floats | None:
@@ -134,9 +145,14 @@ class Nuisances:
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
         """Loads, shape (n, ..., 3), with errors of calibration, and with what the cell will read as a bias."""
         gains = [values.get(name) for name in _GROUPS["gain"]]
+        levers = [values[name] / self.units[name] if name in self.names else None for name in _GROUPS["lever"]]
+        # Gains are those of what is read at the lever's end, of which the cell's own part comes later.
+        own = cell.lever if any(gain is not None for gain in gains) else (0.0, 0.0)
+        _take_at(loads, *(known if lever is None else known + lever for known, lever in zip(own, levers, strict=True)))
         for channel, gain in enumerate(gains):
             if gain is not None:
                 loads[..., channel] *= gain.reshape(-1, *(1,) * (loads.ndim - 2))
+        _take_at(loads, *(-known for known in own))
         for what, course in (("bias", np.ones(1)), ("drift", self.way)):
             if not set(self.names).isdisjoint(_GROUPS[what]):
                 zeros = self._zeros(_GROUPS[what], values, cell)
@@ -146,7 +162,14 @@ class Nuisances:
     def _zeros(self, names: Sequence[str], values: Mapping[str, Floats], cell: LoadCell) -> Floats:
         """Loads that the cell reads as what is named, by channel, shape (n, 3)."""
         read = [values[name] / self.units[name] if name in self.names else 0.0 for name in names]
-        return np.linalg.solve(np.asarray(cell.gain, dtype=float), np.array(np.broadcast_arrays(*read))).T
+        return np.linalg.solve(cell.gain_matrix, np.array(np.broadcast_arrays(*read))).T
+
+
+def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
+    """Take the moment of loads, shape (n, ..., 3), at points beside the pivot; numbers, or one for each of n."""
+    for channel, arm in ((2, -np.asarray(x)), (1, np.asarray(y))):
+        if np.any(arm):
+            loads[..., 0] += arm.reshape(-1, *(1,) * (loads.ndim - 2)) * loads[..., channel]
 
 
 def nuisances_of(
@@ -154,7 +177,8 @@ def nuisances_of(
 ) -> Nuisances:
     """Nuisance parameters that are asked for by name, or by having a prior; with default priors for the others.
 
-    A bias that the load cell states an uncertainty of is not among them: the likelihood integrates it out already.
+    A bias that the load cell states an uncertainty of is not among them: the likelihood integrates it out already. Of
+    those that are `STANDARD` the ones that the record cannot tell are left out.
 
     Raises
     ------
@@ -162,6 +186,9 @@ def nuisances_of(
         If a name is none of a nuisance parameter, or cannot be identified.
     """
     chosen = check_names("nuisances", chosen)
+    untold = _untold(measured)
+    if tuple(chosen) == STANDARD:
+        chosen = [name for name in chosen if name not in untold]
     present = [_SHORT[name] for name in present_channels(measured)]
     uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
     names: list[str] = []
@@ -173,9 +200,11 @@ def nuisances_of(
             raise ParameterError(
                 f"there is no nuisance parameter {name!r}: choose from {', '.join([*_GROUPS, *_KINDS])}, or base"
             )
-        members = [n for n in _GROUPS[name] if n.rpartition("_")[0] in present] if name in _GROUPS else [name]
+        if name in untold:
+            raise ParameterError(f"{name} cannot be inferred: {untold[name]}")
+        members = [n for n in _GROUPS[name] if _is_measured(n, present)] if name in _GROUPS else [name]
         for member in members:
-            if member.rpartition("_")[0] not in present and any(member in group for group in _GROUPS.values()):
+            if not _is_measured(member, present):
                 raise ParameterError(f"{member} cannot be inferred: the record has no such channel")
             if uncertain.get(member, 0.0) > 0.0:
                 if name in _GROUPS:
@@ -202,6 +231,25 @@ def nuisances_of(
     return replace(nuisances, priors=defaults)
 
 
+def _untold(measured: xr.Dataset) -> dict[str, str]:
+    """What the record cannot tell, whatever is known besides, and why."""
+    untold: dict[str, str] = {}
+    if "holding_moment" not in present_channels(measured):
+        untold |= dict.fromkeys(("lever", *_GROUPS["lever"]), "it shows in the moment, which was not measured")
+    if len(np.unique(measured.direction.values)) == 1:
+        only = str(measured.direction.values[0])
+        untold["backlash"] = (
+            f"every sweep is {only}, and in one direction it cannot be told from drive_angle_offset; infer that"
+        )
+    return untold
+
+
+def _is_measured(name: str, present: Sequence[str]) -> bool:
+    """Whether the channel that a parameter belongs to, if any, is among those measured."""
+    channel, _, what = name.rpartition("_")
+    return channel in present or name not in _GROUPS.get(what, ())
+
+
 def _bases_off(name: str, measured: xr.Dataset) -> list[str]:
     """Names of the pivots' shifts that a name stands for."""
     number, found = len(bases_of(measured)), _BASE.fullmatch(name)
@@ -224,6 +272,10 @@ def _default_prior(name: str, unit: float) -> Prior:
             return stats.lognorm(s=_RIGIDITY)
         case "drive_angle_offset":
             return stats.norm(0.0, _OFFSET)
+        case "backlash":
+            return stats.norm(0.0, _BACKLASH)
+        case "lever_x" | "lever_y":
+            return stats.norm(0.0, _LEVER * unit)
         case "friction":
             return stats.halfnorm(scale=_FRICTION)
         case "suspension_compliance":

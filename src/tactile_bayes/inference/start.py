@@ -128,9 +128,7 @@ def _descend(
     while scale > _BRAVE:  # far off, residuals all pull by their squares, or the way would be long
         typical = float(np.sqrt(np.mean(np.square(one(point)))))
         scale = max(_BRAVE, min(typical, _CLOSER * scale))
-        solution = least_squares(
-            one, point, jacobian, bounds, loss=cast(Any, loss), f_scale=scale, max_nfev=_MOST_STEPS
-        )
+        solution = least_squares(one, point, jacobian, bounds, loss=robust, f_scale=scale, max_nfev=_MOST_STEPS)
         point = solution.x
     _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
     axes = axes / sizes[:, None] * spread

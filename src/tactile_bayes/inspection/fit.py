@@ -114,6 +114,7 @@ def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
         force_range=np.inf,
         moment_range=np.inf,
         drive_angle_offset=0.0,
+        drive_angle_backlash=0.0,
         frame=None,
     )
 

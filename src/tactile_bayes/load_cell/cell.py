@@ -35,8 +35,10 @@ class LoadCell(DataSheet):
 
     With h the loads (holding moment and support reaction, zero out of contact) at the true drive angle φ, it reads
 
-        y = gain · h + bias + drift + ε, cut off at ± range, rounded to steps of the resolution,
-        drive_angle = φ + offset + noise, rounded likewise.
+        y = gain · lever(h) + bias + drift + ε, cut off at ± range, rounded to steps of the resolution,
+        drive_angle = φ + offset ± backlash/2 + noise, rounded likewise,
+
+    where the lever makes the moment m0 − x·force_y + y·force_x, and + is for forward motion, − for backward.
 
     The default is an ideal sensor; every entry adds one flaw. Quantities are in the unit of the record that the cell is
     used on: N and N m, or EI/L² and EI/L (a rod of 0.1 m and 1e-5 N m² has EI/L² = 1 mN, EI/L = 0.1 mN m). Entries in
@@ -70,6 +72,10 @@ class LoadCell(DataSheet):
     gain : three rows of (float, float, float)
         Readings (rows) by loads (columns): errors of the calibration on the diagonal, 1 ± 0.005, cross-talk beside it,
         1 to 2 % of full scale. Between moment and force it has units of length.
+    lever : (float, float)
+        Where the cell takes its moment, from the pivot, along the axes that it measures along [length]: what is beside
+        the axle reads a force as a moment. 0.005 of the rod's length where nobody has measured it. Axes that turn are
+        those along the rod at the pivot, and across it.
     force_range, moment_range : float
         Largest size of a reading: what is beyond is cut off (with a resolution at the last step in the range). A bridge
         is rated to about twice what is wanted of it.
@@ -77,6 +83,9 @@ class LoadCell(DataSheet):
         Step of the reading: of a 16 bit converter, range/32768; mostly below the noise.
     drive_angle_offset : float
         What the encoder reads in zero position [rad]; 0.01 (about 0.5°) after aligning by eye.
+    drive_angle_backlash : float
+        What the encoder reads more while the drive moves forward than while it moves backward [rad], half of it too
+        much and half too little: 0.003 (about 0.2°) of a gear; less where the encoder sits on the axle itself.
     drive_angle_noise, drive_angle_resolution : float
         Standard deviation of the encoder's noise [rad], mostly below a step, and its step [rad]: 2π/4096 = 0.0015 for
         one of 1024 lines. The rod follows the true angle, which is in order all the same, and contact ends once.
@@ -227,7 +236,7 @@ class LoadCell(DataSheet):
         return measured(self, record, _generator(seed))
 
     def corrected(self, record: xr.Dataset) -> xr.Dataset:
-        """The record with what is known of this cell's errors taken out: bias, gain, and the encoder's offset.
+        """The record with what is known of this cell's errors taken out: bias, gain, lever, offset and backlash.
 
         For points of contact, sample by sample. A likelihood wants the record as it is: of what has been taken out, the
         ends of the range can no longer be told.
@@ -246,7 +255,7 @@ class LoadCell(DataSheet):
         Raises
         ------
         ParameterError
-            If the frame is another; if there is cross-talk from a channel that the record misses.
+            If the frame is another; if there is cross-talk, or a lever, from a channel that the record misses.
 
         Examples
         --------

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 def corrupted_loads(sheet: DataSheet, loads: Floats, rng: np.random.Generator, noise_scale: ArrayLike = 1.0) -> Floats:
-    """Readings of loads: gain and bias, drift and noise, then the range, then the steps of the reading.
+    """Readings of loads: lever, gain and bias, drift and noise, then the range, then the steps of the reading.
 
     Parameters
     ----------
@@ -49,10 +49,10 @@ def corrupted_loads(sheet: DataSheet, loads: Floats, rng: np.random.Generator, n
     return rounded(readings, sheet.resolution)
 
 
-def corrupted_angles(sheet: DataSheet, angles: Floats, rng: np.random.Generator) -> Floats:
-    """Readings of drive angles, of any shape: offset and noise, then the steps of the reading."""
+def corrupted_angles(sheet: DataSheet, angles: Floats, direction: ArrayLike, rng: np.random.Generator) -> Floats:
+    """Readings of drive angles, of any shape: offset, backlash by the drive's direction, noise, then the steps."""
     noise = sheet.drive_angle_noise * rng.standard_normal(angles.shape)
-    return rounded(angles + sheet.drive_angle_offset + noise, np.array(sheet.drive_angle_resolution))
+    return rounded(angles + sheet.misread(direction) + noise, np.array(sheet.drive_angle_resolution))
 
 
 def rounded(values: Floats, step: Floats) -> Floats:

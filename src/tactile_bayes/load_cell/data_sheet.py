@@ -9,7 +9,7 @@ from itertools import combinations, product
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.checks import as_number, shown
 from tactile_bayes.errors import ParameterError
@@ -18,10 +18,13 @@ from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.attributes import no_entry
 from tactile_bayes.rod import Rod
 
-__all__ = ["DataSheet"]
+__all__ = ["CERTAIN", "DataSheet"]
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
+
+CERTAIN = ("bias", "gain", "lever", "drive_angle_offset", "drive_angle_backlash")
+"""Entries without chance: errors that are known, and can be taken out."""
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _SCALARS = (
@@ -34,6 +37,7 @@ _SCALARS = (
     "force_resolution",
     "moment_resolution",
     "drive_angle_offset",
+    "drive_angle_backlash",
     "drive_angle_noise",
     "drive_angle_resolution",
 )
@@ -61,11 +65,13 @@ class DataSheet:
     bias_uncertainty: Triple = (0.0, 0.0, 0.0)
     drift: Drift | None = None
     gain: tuple[Triple, Triple, Triple] = _IDENTITY
+    lever: tuple[float, float] = (0.0, 0.0)
     force_range: float = math.inf
     moment_range: float = math.inf
     force_resolution: float = 0.0
     moment_resolution: float = 0.0
     drive_angle_offset: float = 0.0
+    drive_angle_backlash: float = 0.0
     drive_angle_noise: float = 0.0
     drive_angle_resolution: float = 0.0
     frame: Frame | None = None
@@ -76,6 +82,7 @@ class DataSheet:
         for name in ("bias", "bias_uncertainty", "correlation"):
             object.__setattr__(self, name, _triple(name, getattr(self, name)))
         object.__setattr__(self, "gain", _rows(self.gain))
+        object.__setattr__(self, "lever", _pair("lever", self.lever))
         self._refuse_the_impossible()
         if self.drift is not None and not np.any(self.drift.sizes):
             object.__setattr__(self, "drift", None)
@@ -86,7 +93,8 @@ class DataSheet:
                 what = "a standard deviation" if name == "noise" else "a step"
                 self._need(f"{channel}_{name}", f"{what}, zero or positive [{unit}, or dimensionless]", at_least=0.0)
         self._need("relative_noise", "a share, zero or positive", at_least=0.0)
-        self._need("drive_angle_offset", "an angle [rad]")
+        for name in ("drive_angle_offset", "drive_angle_backlash"):
+            self._need(name, "an angle [rad]")
         for name in ("force_range", "moment_range", "degrees_of_freedom"):
             value = getattr(self, name)
             if not value > 0.0:
@@ -108,7 +116,7 @@ class DataSheet:
                 f"the load cell's correlation is {self.correlation!r}: no noise has these coefficients between holding "
                 "moment and force_x, holding moment and force_y, force_x and force_y: give smaller ones"
             )
-        if np.linalg.cond(self.gain_matrix) > 1e9:
+        if np.linalg.cond(np.array(self.gain)) > 1e9:
             raise ParameterError(
                 f"the load cell's gain is {self.gain!r}: such a cell cannot tell three loads apart: give rows "
                 "that are independent, like ((1, 0, 0), (0, 1, 0), (0, 0, 1))"
@@ -169,8 +177,9 @@ class DataSheet:
 
     @property
     def gain_matrix(self) -> Floats:
-        """Reading of each channel (rows) by each load (columns), shape (3, 3)."""
-        return np.array(self.gain)
+        """Reading of each channel (rows) by each load at the pivot (columns), shape (3, 3): gains, and the lever."""
+        x, y = self.lever
+        return np.array(self.gain) @ [[1.0, y, -x], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
     @property
     def correlation_matrix(self) -> Floats:
@@ -181,11 +190,12 @@ class DataSheet:
         return matrix
 
     def expected(self, loads: Floats) -> Floats:
-        """What the cell reads of loads, shape (..., 3), without noise: gain and bias.
+        """What the cell reads of loads, shape (..., 3), without noise: lever, gain and bias.
 
-        A channel that was not measured is NaN throughout, and is felt by the others only if they have cross-talk.
+        A channel that was not measured is NaN throughout, and is felt by the others only if they have cross-talk, or
+        the moment by its lever.
         """
-        if self.gain == _IDENTITY:
+        if self.gain == _IDENTITY and not any(self.lever):
             return loads + np.array(self.bias) if any(self.bias) else loads
         gain = self.gain_matrix
         read = [sum(loads[..., j] * gain[i, j] for j in range(3) if gain[i, j]) for i in range(3)]
@@ -196,6 +206,17 @@ class DataSheet:
         if not self.relative_noise:
             return self.noise
         return np.hypot(self.noise, self.relative_noise * (self.expected(loads) - np.array(self.bias)))
+
+    def misread(self, direction: ArrayLike) -> Floats:
+        """What the encoder reads too much while the drive moves "forward" or "backward", without noise [rad].
+
+        Examples
+        --------
+        >>> DataSheet(drive_angle_offset=0.01, drive_angle_backlash=0.004).misread(["forward", "backward"])
+        array([0.012, 0.008])
+        """
+        sense = np.where(np.asarray(direction) == "backward", -0.5, 0.5)
+        return np.asarray(self.drive_angle_offset + self.drive_angle_backlash * sense)
 
     def cuts_off(self, readings: Floats) -> NDArray[np.bool_]:
         """Which readings, shape (..., 3), are at the end of the range, and stand for anything beyond."""
@@ -244,6 +265,7 @@ class DataSheet:
                 yield from ((f"{law}_{field.name}", float(getattr(self.drift, field.name))) for field in fields(kind))
         for i, j in product(range(3), range(3)):
             yield f"gain_{CHANNELS[i]}_{CHANNELS[j]}", self.gain[i][j]
+        yield from zip(("lever_x", "lever_y"), self.lever, strict=True)
         for (one, other), value in zip(_PAIRS, self.correlation, strict=True):
             yield f"correlation_{one}_{other}", value
         if self.frame is not None:
@@ -279,6 +301,7 @@ class DataSheet:
         for name in ("bias", "bias_uncertainty"):
             options[name] = triple(name, (0.0, 0.0, 0.0))
         options["gain"] = tuple(triple(f"gain_{c}", row) for c, row in zip(CHANNELS, _IDENTITY, strict=True))
+        options["lever"] = triple("lever", (0.0, 0.0), ("x", "y"))
         options["correlation"] = triple("correlation", (0.0, 0.0, 0.0), tuple(f"{a}_{b}" for a, b in _PAIRS))
         laws = [law for law in _DRIFTS if any(name.startswith(f"{law}_") for name in entries)]
         if len(laws) > 1:
@@ -298,12 +321,28 @@ def _scalar(name: str, value: Any) -> float:
 
 
 def _triple(name: str, values: Any) -> Triple:
-    is_listed = np.iterable(values) and not isinstance(values, str | bytes)
-    numbers = [as_number(value) for value in values] if is_listed else []
-    one, two, three = numbers if len(numbers) == 3 else (None, None, None)
-    if one is None or two is None or three is None or not all(map(math.isfinite, (one, two, three))):
+    numbers = _finite(values)
+    if len(numbers) != 3:
         raise ParameterError(f"the load cell's {name} is {shown(values)}: give three finite numbers ({_MEANING[name]})")
+    one, two, three = numbers
     return one, two, three
+
+
+def _pair(name: str, values: Any) -> tuple[float, float]:
+    numbers = _finite(values)
+    if len(numbers) != 2:
+        raise ParameterError(f"the load cell's {name} is {shown(values)}: give two finite numbers (x, y)")
+    one, two = numbers
+    return one, two
+
+
+def _finite(values: Any) -> list[float]:
+    """Numbers; none if one of them is not finite."""
+    numbers = (
+        [as_number(value) for value in values] if np.iterable(values) and not isinstance(values, str | bytes) else []
+    )
+    finite = [number for number in numbers if number is not None and math.isfinite(number)]
+    return finite if len(finite) == len(numbers) else []
 
 
 def _rows(gain: Any) -> tuple[Triple, Triple, Triple]:

@@ -35,15 +35,15 @@ def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> 
                 f"({', '.join(name for name in CHANNELS if name not in present)}): measure the complete record"
             )
         _put(made, channel, readings[:, index])
-    if sheet.drive_angle_offset or sheet.drive_angle_noise or sheet.drive_angle_resolution:
-        angles = corrupted_angles(sheet, made["drive_angle"].values, rng)
+    if any(getattr(sheet, f"drive_angle_{flaw}") for flaw in ("offset", "backlash", "noise", "resolution")):
+        angles = corrupted_angles(sheet, made["drive_angle"].values, made["direction"].values, rng)
         beyond = np.abs(angles) > 2.0 * math.pi
         if beyond.any():
             sample = int(np.argmax(beyond))
             raise ParameterError(
                 f"the encoder reads {float(angles[sample])!r} rad at sample {sample}, more than a turn (2π): give a "
-                "smaller drive_angle_offset, drive_angle_noise or drive_angle_resolution, in radians (numpy.radians "
-                "converts degrees)"
+                "smaller drive_angle_offset, drive_angle_backlash, drive_angle_noise or drive_angle_resolution, in "
+                "radians (numpy.radians converts degrees)"
             )
         _put(made, "drive_angle", angles)
     made.attrs |= {_PREFIX + name: value for name, value in entries.items()}

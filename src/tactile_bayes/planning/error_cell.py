@@ -27,8 +27,10 @@ __all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
 
 Floats = NDArray[np.float64]
 
-_SETTINGS = SamplerSettings(ensembles=2, walkers=24, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
+_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
 """Of posteriors, of which only a band is wanted."""
+
+_FEWEST_WALKERS = 24
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ def _inferred(plan: Plan, measured: list[xr.Dataset], probability: float, seed: 
                 priors=plan.priors,
                 friction=plan.friction,
                 nuisances=plan.nuisances,
-                settings=_SETTINGS,
+                settings=replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * len(plan.model.names))),
                 seed=seed + k,
             )
         except InferenceError:

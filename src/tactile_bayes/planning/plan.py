@@ -21,6 +21,7 @@ from tactile_bayes.inference.likelihood import FINE_ORDER
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.load_cell.data_sheet import CERTAIN
 from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.rod import Rod
@@ -107,10 +108,7 @@ class Plan:
 
     def certain(self, record: xr.Dataset) -> xr.Dataset:
         """An ideal record as the load cell reads it without errors that are drawn."""
-        certain = replace(
-            LoadCell(),
-            **{name: getattr(self.cell, name) for name in ("bias", "gain", "drive_angle_offset", "frame")},
-        )
+        certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "frame")})
         return certain.measure(record, seed=0)
 
     @cached_property

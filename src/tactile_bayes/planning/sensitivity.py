@@ -108,7 +108,7 @@ def sensitivity(
     --------
     >>> found = sensitivity(seed=1, parts=["information", "required_noise"])
     >>> found["information"].bound.sel(parameter="a").item().__round__(4)
-    0.001
+    0.0025
     """
     unknown = [part for part in parts if part not in PARTS]
     if isinstance(parts, str) or unknown or not parts:

@@ -23,7 +23,7 @@ _QUANTITY = re.compile(
     r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"
 )
 
-_SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_offset")
+_SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_offset", "_backlash")
 
 __all__ = [
     "checked_attributes",

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 _BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"} | {
     "degrees_of_freedom",
     "relative_noise",
+    "lever_x",
+    "lever_y",
 }
 """Entries of a load cell's data sheet that hold along the axes it measures along, and along no others; with errors of
 the encoder the angle between the two is not known."""

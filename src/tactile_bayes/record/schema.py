@@ -138,11 +138,14 @@ LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
             f"gain_{to}_{of}": _GAIN_UNITS.get((COLUMNS[to].unit, COLUMNS[of].unit), "1")
             for to, of in product(CHANNELS, CHANNELS)
         },
+        "lever_x": "m",
+        "lever_y": "m",
         "force_range": "N",
         "moment_range": "N m",
         "force_resolution": "N",
         "moment_resolution": "N m",
         "drive_angle_offset": "rad",
+        "drive_angle_backlash": "rad",
         "drive_angle_noise": "rad",
         "drive_angle_resolution": "rad",
     }

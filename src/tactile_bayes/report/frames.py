@@ -51,8 +51,8 @@ class Motion:
     drive_angle : ndarray, shape (n,)
         Slope of the rod at the pivot [rad].
     cell_angle : ndarray, shape (n,)
-        Drive angle as read, without the encoder's offset [rad]: by it a load cell is turned that turns with the drive.
-        A suspension that gives way lies between it and the rod.
+        Drive angle as read, without the encoder's offset and backlash [rad]: by it a load cell is turned that turns
+        with the drive. A suspension that gives way lies between it and the rod.
     loads : ndarray, shape (n, 3)
         Holding moment and support reaction, along the axes of the world, free of noise and of the cell's errors.
     pivots : ndarray, shape (pivots, 2)
@@ -111,8 +111,8 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
         lanes[stroke.samples] = lane
     lane = lanes[samples]
     mirrored = paths.seen.mirrored[lane]
-    offset = cell.drive_angle_offset + float(np.ravel(rig.drive_angle_offset)[0])
-    angle = record.drive_angle.values[samples] - offset
+    misread = cell.misread(record.direction.values) + likelihood.misread(rig)[0]
+    angle = (record.drive_angle.values - misread)[samples]
     seen_angle = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(lane, seen_angle)
     rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])

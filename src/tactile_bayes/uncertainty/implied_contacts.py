@@ -46,7 +46,7 @@ _KEPT = (
 )
 """Attributes of the posterior that hold for the contacts, too."""
 
-_TURNED_BY = ("drive_angle_offset", "suspension_compliance")
+_TURNED_BY = ("drive_angle_offset", "backlash", "suspension_compliance")
 """What makes the slope of the rod at the pivot another one than was read, draw by draw."""
 
 _DIMS = ("chain", "draw", "sample")
@@ -71,8 +71,8 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     xr.DataTree
         In the layout of `infer_contacts`, in the record's units. Group `posterior`, dimensions (chain, draw, sample):
         contact_x, contact_y (on the object's surface), slope_angle, contact_arclength, drive_angle (the rod's slope at
-        the pivot) where the encoder's offset or the suspension's compliance was inferred, and tangential (1 in
-        tangential contact, 0 in tip contact); NaN where the contour of that draw is not in contact. Group
+        the pivot) where the encoder's offset or backlash, or the suspension's compliance was inferred, and tangential
+        (1 in tangential contact, 0 in tip contact); NaN where the contour of that draw is not in contact. Group
         `sample_stats`, by sample: contact_probability, the share of draws in contact, and tangential_probability, the
         share of these in tangential contact. Groups `observed_data` and `constant_data`: the record.
 
@@ -165,7 +165,7 @@ def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> 
     unknown: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in picked}
     cell = replace(LoadCell.from_record(record) or LoadCell(), **unknown)
     likelihood = RecordLikelihood(record, cell, friction)
-    angle = record["drive_angle"].values - cell.drive_angle_offset
+    angle = record["drive_angle"].values - cell.misread(record["direction"].values)
     contours = contours_of(picked, posterior.attrs["family"])
     values = {name: picked[name].values.ravel() for name in inferred}
     every = np.arange(contours.shape[0])
@@ -190,7 +190,7 @@ def contacts_of(
     """
     count, strokes = contours.shape[0], likelihood.strokes
     paths = likelihood.paths(contours, rig, exact_events=exact)
-    read = angle - np.broadcast_to(rig.drive_angle_offset, (count,))[:, None]
+    read = angle - np.broadcast_to(likelihood.misread(rig), (count, angle.size))
     shape = (len(strokes), max(stroke.samples.size for stroke in strokes))
     samples = np.zeros(shape, dtype=np.intp)
     seen = np.full((shape[0], count, shape[1]), np.nan)

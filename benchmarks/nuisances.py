@@ -1,0 +1,51 @@
+"""Prints what it costs not to know each thing of a rig: widths of bands and standard deviations, to first order.
+
+Profile II of the paper at q = 0.5, swept forward and backward in steps of 2°, with the usual load cell. From Fisher's
+information and the priors, as `tb.sensitivity` says them; nothing is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+import tactile_bayes as tb
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.planning.information import information
+from tactile_bayes.planning.plan import Plan
+
+CONTOUR = tb.contours.Parabola(a=0.5, q=0.5)
+CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
+FURTHER = ("friction", "drift", "suspension_compliance")
+PROBABILITY = 0.9
+PARAMETERS = ("a", "q", "x_c")
+
+
+def sets() -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Nuisances, and what they are called."""
+    yield "default", STANDARD
+    yield from ((f"without {name}", tuple(other for other in STANDARD if other != name)) for name in STANDARD)
+    yield from ((f"with {name}", (*STANDARD, name)) for name in FURTHER)
+    yield "gain for rigidity_scale", ("gain", *(name for name in STANDARD if name != "rigidity_scale"))
+    yield "none", ()
+
+
+def row(nuisances: tuple[str, ...]) -> dict[str, float]:
+    """Widths and standard deviations, of which the rod's length is 1000."""
+    plan = Plan(CONTOUR, CELL, drive_step=float(np.radians(2.0)), nuisances=nuisances)
+    told = information(plan, probability=PROBABILITY)
+    deviation = told.bound_with_priors.sel(parameter=list(PARAMETERS)).values
+    widths = {"gap": float(told.gap_width), "beside": float(told.touched_width)}
+    return {name: 1e3 * value for name, value in {**widths, **dict(zip(PARAMETERS, deviation, strict=True))}.items()}
+
+
+def main() -> None:
+    print(f"| inferred | band in the gap | beside it | {' | '.join(f'sd of {name}' for name in PARAMETERS)} |")
+    print("|---|" + "---|" * 5)
+    for name, nuisances in sets():
+        print(f"| {name} | " + " | ".join(f"{value:.2f}" for value in row(nuisances).values()) + " |")
+
+
+if __name__ == "__main__":
+    main()
