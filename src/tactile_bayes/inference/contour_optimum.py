@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.families import support_of
 from tactile_bayes.inference.start import best_optimum
 from tactile_bayes.reconstruction import reconstruct
@@ -37,12 +39,12 @@ class ContourOptimum(NamedTuple):
     """What the record wants and the priors do not allow, where that explains it far better; in words."""
 
 
-def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
+def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
     """The best of several searches, which begin at Step 2's contacts and at draws from the prior."""
     size = len(model.located)
     deviation, present = model.deviation, model.present
     measured = model.likelihood.measured[:, present] / deviation[present]
-    candidates, _ = model.draw_prior(rng, 400)
+    candidates, _ = model.draw_prior(rng, 400, deadline)
 
     def residuals(points: Floats) -> Floats:
         # A prior that ends somewhere is no wall: the way to where it does not may lead through there.
@@ -62,12 +64,13 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
         by_contacts = contact_fit(model)
         if by_contacts is not None:
             yield np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0))
-        costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
+        parts = [candidates[block, :size] for block in blocks(len(candidates), measured.size)]
+        costs = np.concatenate([np.sum(np.minimum(np.abs(residuals(part)), 30.0), axis=1) for part in parts])
         yield from (candidates[i, :size] for i in np.argsort(costs)[:_CANDIDATES])
 
     ends = np.array([support_of(model.priors[name]) for name in model.located])
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
-    optimum = best_optimum(residuals, starts(), percentiles.mean(axis=0), spread, low, high)
+    optimum = best_optimum(residuals, starts(), percentiles.mean(axis=0), spread, low, high, deadline)
 
     noise = fitted_noise(model, optimum.residuals.reshape(measured.shape))
     possible = candidates[:, size:]

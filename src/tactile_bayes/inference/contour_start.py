@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit, fitted_noise, optimum_of
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
     Coordinates,
     Logarithms,
@@ -46,16 +47,25 @@ class Walk(NamedTuple):
     """What the record wants and the priors do not allow, in words."""
 
 
-def walk_of(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Walk:
-    """Walkers scattered more widely than the posterior, around an optimum that is sought without help."""
+def walk_of(
+    model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings, deadline: Deadline = NEVER
+) -> Walk:
+    """Walkers scattered more widely than the posterior, around an optimum that is sought without help.
+
+    Past the deadline every search ends with the step that it is in, and walkers start wherever something is probable.
+    """
     rng = np.random.default_rng(seed)
     if isinstance(model.family, ShapeFreeFamily):
-        return _whitened(model, seed, rng, settings)
-    return _scattered(model, seed, rng, settings)
+        return _whitened(model, seed, rng, settings, deadline)
+    return _scattered(model, seed, rng, settings, deadline)
 
 
 def _whitened(
-    model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
+    model: ContourModel,
+    seed: np.random.SeedSequence,
+    rng: np.random.Generator,
+    settings: SamplerSettings,
+    deadline: Deadline,
 ) -> Walk:
     """Of coordinates that are nearly standard normal it takes no more walkers than span them."""
     by_contacts = contact_fit(model)
@@ -63,18 +73,18 @@ def _whitened(
     whitening = None
     if by_contacts is not None:
         rig = [float(model.priors[name].median()) for name in model.nuisances.names]  # type: ignore[attr-defined]
-        whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng)
-    if whitening is None or _misfit(model, whitening.centre) > _POOR:
-        other = whitening_at(model, optimum_of(model, rng).point, rng)
+        whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng, deadline)
+    if whitening is None or (_misfit(model, whitening.centre) > _POOR and not deadline.has_passed):
+        other = whitening_at(model, optimum_of(model, rng, deadline).point, rng, deadline)
         if whitening is None or _misfit(model, other.centre) < _misfit(model, whitening.centre):
             whitening = other
     log_probability = in_coordinates(model.log_probability, whitening)
     spread = np.full(whitening.middle.size, _OF_REST)
     spread[: whitening.bent] = [_OF_ROUGHNESS] * 2 + [_OF_NOISE] * len(model.noise.names)
-    cloud = gather(log_probability, whitening.middle, np.diag(np.square(spread)), rng)
+    cloud = gather(log_probability, whitening.middle, np.diag(np.square(spread)), rng, deadline)
     count = len(spread)
     start = scatter_walkers(
-        lambda points: np.where(log_probability(points) > cloud.floor, 0.0, -np.inf),
+        lambda points: np.where(log_probability(points) > cloud.floor_by(deadline), 0.0, -np.inf),
         cloud.draw,
         parameters=count,
         seed=seed,
@@ -90,20 +100,24 @@ def _misfit(model: ContourModel, point: Floats) -> float:
 
 
 def _scattered(
-    model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
+    model: ContourModel,
+    seed: np.random.SeedSequence,
+    rng: np.random.Generator,
+    settings: SamplerSettings,
+    deadline: Deadline,
 ) -> Walk:
     """Walkers scattered twice as wide as a normal approximation, which they are then proposed from."""
-    optimum = optimum_of(model, rng)
+    optimum = optimum_of(model, rng, deadline)
     of_noise = np.arange(len(model.names)) >= len(model.located)
     around = Logarithms(of_noise)
 
     def log_probability(coordinates: Floats) -> Floats:
         return model.log_probability(around.parameters(coordinates)[0])
 
-    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng)
+    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng, deadline)
     try:
         start = scatter_walkers(
-            lambda points: np.where(model.log_probability(points) > cloud.floor, 0.0, -np.inf),
+            lambda points: np.where(model.log_probability(points) > cloud.floor_by(deadline), 0.0, -np.inf),
             lambda rng, count: around.parameters(cloud.draw(rng, count))[0],
             parameters=len(model.names),
             seed=seed,
@@ -124,5 +138,6 @@ def _scattered(
         walked.of(centre)[0],
         cloud.narrow_covariance * np.outer(per_unit, per_unit),
         rng,
+        deadline,
     )
     return Walk(walked.of(start), Logarithms(positive, proposal), optimum.beyond)

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.differences import central_slopes
 
 __all__ = ["Cloud", "Optimum", "best_optimum", "gather"]
@@ -57,6 +57,7 @@ def best_optimum(
     spread: Floats,
     low: Floats | float = -np.inf,
     high: Floats | float = np.inf,
+    deadline: Deadline = NEVER,
 ) -> Optimum:
     """Robust least squares from one candidate after the other until one fits; the best of them.
 
@@ -72,20 +73,24 @@ def best_optimum(
         Where each parameter lies a priori, and on which scale it varies there: it is drawn there like by one residual.
     low, high : ndarray, shape (d,), or float
         Between what each parameter can be.
+    deadline : Deadline
+        Past it, the search that is under way ends where it is, and no other begins.
     """
     best: Optimum | None = None
     for candidate in candidates:
-        found = _descend(residuals, candidate, middle, spread)
+        found = _descend(residuals, candidate, middle, spread, deadline=deadline)
         if best is None or found.cost < best.cost:
             best = found
-        if best.cost < _FITS * best.residuals.size:
+        if best.cost < _FITS * best.residuals.size or deadline.has_passed:
             break
     if best is None:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
     if np.all((best.point > low) & (best.point < high)):
         return best
     inside = np.clip(best.point, low + _INSIDE * spread, high - _INSIDE * spread)
-    found = _descend(residuals, inside, middle, spread, low, high)
+    found = _descend(residuals, inside, middle, spread, low, high, deadline)
+    if deadline.has_passed:  # what the record wants is not known
+        return found
     return found._replace(beyond=best.point, excess=found.cost - best.cost)
 
 
@@ -96,6 +101,7 @@ def _descend(
     spread: Floats,
     low: Floats | float = -np.inf,
     high: Floats | float = np.inf,
+    deadline: Deadline = NEVER,
 ) -> Optimum:
     """In units of the spread, so that the record's units do not matter."""
 
@@ -108,7 +114,9 @@ def _descend(
         return np.concatenate([slopes, np.eye(point.size)])
 
     bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
-    solution = least_squares(one, start / spread, jacobian, bounds, loss="soft_l1", f_scale=_BRAVE, max_nfev=60)
+    solution = deadline.least_squares(
+        one, start / spread, jacobian, bounds=bounds, loss="soft_l1", f_scale=_BRAVE, max_nfev=60
+    )
     _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
     axes = axes / sizes[:, None] * spread
     covariance = axes.T @ axes
@@ -129,12 +137,20 @@ class Cloud:
         """Roughly the posterior's."""
         return np.asarray(self.root @ self.root.T / _WIDER**2)
 
+    def floor_by(self, deadline: Deadline) -> float:
+        """The floor; past the deadline there is none, for of what is above it few points may be found."""
+        return -np.inf if deadline.has_passed else self.floor
+
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return self.centre + rng.normal(size=(count, self.centre.size)) @ self.root.T
 
 
 def gather(
-    log_probability: Callable[[Floats], Floats], centre: Floats, covariance: Floats, rng: np.random.Generator
+    log_probability: Callable[[Floats], Floats],
+    centre: Floats,
+    covariance: Floats,
+    rng: np.random.Generator,
+    deadline: Deadline = NEVER,
 ) -> Cloud:
     """A cloud that is wider than the posterior, but of which most is not hopeless.
 
@@ -151,6 +167,8 @@ def gather(
     covariance : ndarray, shape (d, d)
         A guess at the posterior's.
     rng : np.random.Generator
+    deadline : Deadline
+        Past it, a cloud will do in which there is anything possible.
     """
     size = centre.size
     for _ in range(_ROUNDS):
@@ -159,7 +177,7 @@ def gather(
         points = cloud.draw(rng, 60 * size)
         values = log_probability(points)
         floor = values.max() - _DEFICIT * size
-        if np.mean(values > floor) > 0.5:
+        if np.mean(values > floor) > 0.5 or (deadline.has_passed and np.isfinite(values).any()):
             break
         best = np.argsort(values)[-12 * size :]
         best = best[np.isfinite(values[best])]

@@ -90,9 +90,10 @@ def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Fl
 
 def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
     """Up to `most` contours, evenly picked from the posterior's draws."""
-    contours = contours_of(posterior_draws(posterior), posterior.attrs["family"])
-    count = contours.shape[0]
-    return contours.take(np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp)))
+    draws = posterior_draws(posterior).stack(every=("chain", "draw"), create_index=False)
+    count = draws.sizes["every"]
+    picked = draws.isel(every=np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp)))
+    return contours_of(picked, posterior.attrs["family"])
 
 
 def places(x: ArrayLike) -> Floats:

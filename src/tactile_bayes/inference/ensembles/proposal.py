@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["Proposal", "approximate"]
@@ -95,17 +96,23 @@ class Proposal:
 
 
 def approximate(
-    log_probability: LogProbability, centre: Floats, covariance: Floats, rng: np.random.Generator
+    log_probability: LogProbability,
+    centre: Floats,
+    covariance: Floats,
+    rng: np.random.Generator,
+    deadline: Deadline = NEVER,
 ) -> Proposal:
     """The proposal nearest to a target that some rounds of importance sampling find, by a guess at mean and covariance.
 
     Draws of one round, weighted by the target, say what the next one draws from; of all rounds that counts which was
     the most efficient (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
-    10.1198/106186004X12803).
+    10.1198/106186004X12803). Past the deadline there is no further round.
     """
     proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)))
     best = proposal
     for _ in range(_ROUNDS):
+        if deadline.has_passed:
+            break
         points, density = proposal.draw(rng, _DRAWS * centre.size)
         surplus = log_probability(points) - density
         if not np.isfinite(surplus).sum() > _HELD * centre.size:
