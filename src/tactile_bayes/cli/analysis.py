@@ -67,7 +67,11 @@ def infer(
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
     max_seconds: Annotated[
-        float | None, typer.Option(help="Time for sampling, at most [s]; what is there by then is the result.")
+        float | None,
+        typer.Option(
+            help="Time for the search for a start and for sampling, at most [s]; what is there by then is the result. "
+            "Checks, files and figures come after it."
+        ),
     ] = None,
     checkpoint: Annotated[
         Path | None,

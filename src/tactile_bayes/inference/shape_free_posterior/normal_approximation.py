@@ -30,6 +30,9 @@ _TELLING = 0.03
 _SURE = 0.01
 """Standard deviation of a snap-off, over half a step of the drive, below which nothing more is asked of it."""
 
+_RIDGE = 1e-12
+"""Share by which precisions are raised, so that they stay positive definite where rounding is as large as the least."""
+
 _BRAVE = 4.0
 """Residual in standard deviations from which on a reading pulls less than by its square."""
 
@@ -160,6 +163,7 @@ class NormalApproximation:
         precision = through @ np.swapaxes(through, 1, 2)
         diagonal = np.arange(self.prior.mean.size)
         precision[:, diagonal, diagonal] += self.prior.precision
+        precision[:, diagonal, diagonal] *= 1.0 + _RIDGE
         root = np.linalg.cholesky(precision)
         pull = through @ (certainty * self._seen)[..., None] + (self.prior.precision * self.prior.mean)[:, None]
         return np.linalg.solve(root, pull)[..., 0], np.asarray(root)
