@@ -64,17 +64,17 @@ def test_a_run_keeps_its_time_and_its_memory(shape, samples, family, gigabytes, 
     write_record(record_of(shape(), samples), tmp_path / "record.csv")
     command = f"infer record.csv --out run --family {family} --max-seconds {SECONDS} --quiet".split()
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-m", "tactile_bayes.cli", *command],
         cwd=tmp_path,
         env=os.environ | threads,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-    )
-    said = process.stdout.read()
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
+    ) as process:
+        said = process.stdout.read()
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
     assert process.returncode == 0, said
     assert (tmp_path / "run" / "posterior.nc").exists()
     assert (tmp_path / "run" / "band.csv").exists()
