@@ -17,7 +17,7 @@ from tactile_bayes.scanning import scan
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="there is no wait4")]
 
-SECONDS = 30
+SECONDS = 20
 """Time that is given."""
 
 COMPILERS, ALLOWANCE = 45.0, 25.0
