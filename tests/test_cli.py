@@ -214,6 +214,29 @@ def test_what_is_wrong_with_the_record_is_the_first_line(posterior, record, tmp_
     )
 
 
+@pytest.mark.usefixtures("at_once")
+def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_path, monkeypatch):
+    def broken(*arguments):
+        raise RuntimeError("it broke")
+
+    monkeypatch.setattr(contour_run, "contour_band", broken)
+    said = "Left out: band. Unexpected error, RuntimeError: it broke"
+    result = call("infer", record, "--out", tmp_path / "run", "--quiet")
+    assert result.exit_code == 0, result.output
+    assert said in result.stdout.split("\n\n")[0].splitlines()
+    assert result.stderr == "tactile-bayes: left out: band; tactile-bayes --debug ... shows where that comes from\n"
+    assert (tmp_path / "run" / "posterior.nc").exists()
+    assert not (tmp_path / "run" / "band.csv").exists()
+    traced = call("--debug", "infer", record, "--out", tmp_path / "run", "--json")
+    assert traced.exit_code == 0
+    answer = json.loads(traced.stdout)
+    assert answer["left_out"] == {"band": "it broke"}
+    assert said in answer["words"]
+    assert "band" not in answer["files"]
+    assert traced.stderr.startswith("Traceback (most recent call last):")
+    assert "in broken" in traced.stderr
+
+
 @pytest.mark.usefixtures("quick")
 def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
     result = call("demo", "--out", tmp_path / "demo")

@@ -23,7 +23,9 @@ from helpers.contour_posteriors import (
 )
 from tactile_bayes.contours import Circle, Ellipse, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
+from tactile_bayes.inference import blocks, contour_groups
 from tactile_bayes.inference.contour import contours_of, infer_contour
+from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
@@ -443,3 +445,94 @@ def test_a_prior_that_ends_before_what_the_record_wants_is_named():
     found = infer_contour(record, priors=edged, nuisances=[], seed=1, settings=BRIEF)
     assert float(found["posterior"].q.max()) < TRUTH["q"] - deviation
     assert float(found["posterior"].q.mean()) == pytest.approx(TRUTH["q"] - deviation, abs=3.0 * deviation)
+
+
+@pytest.mark.parametrize("cell", [CELL, replace(CELL, drive_angle_noise=0.01)], ids=["plain", "encoder"])
+def test_blocks_of_points_make_no_difference(cell, monkeypatch):
+    """To the log-probability, and to all that is predicted: readings, densities, events."""
+    draw = {"load_cell": cell, "seed": 1, "settings": replace(BRIEF, max_steps=2, block_steps=2)}
+    whole = infer_as_stated(measured(), **draw)
+    sizes = []
+
+    def few(model, points):
+        sizes.append(len(points))
+        return together(model, points)
+
+    together = ContourModel.loads_with_errors
+    monkeypatch.setattr(ContourModel, "loads_with_errors", few)
+    monkeypatch.setattr(blocks, "_MOST", 3 * 3 * measured().sizes["sample"])
+    parts = infer_as_stated(measured(), **draw)
+    assert max(sizes) <= 3
+    for name, group in whole.children.items():
+        for variable, values in group.data_vars.items():
+            if values.dtype.kind == "f":
+                np.testing.assert_allclose(parts[name][variable], values, rtol=1e-9, atol=1e-12, err_msg=variable)
+
+
+def test_of_a_long_record_fewer_predictions_are_stored(monkeypatch):
+    """As few as the check of the record can do with, and the group says so; events are of as many draws as ever."""
+    samples = measured().sizes["sample"]
+    whole = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    assert whole["log_likelihood"].sizes["draw"] == 240
+    assert "stored" not in whole["log_likelihood"].attrs
+    monkeypatch.setattr(contour_groups, "_STORED_NUMBERS", 4 * 2 * samples * 120)
+    some = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    monkeypatch.setattr(contour_groups, "_STORED_NUMBERS", 1)
+    few = infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF)
+    for result, stored in ((some, 120), (few, 50)):
+        for group in ("posterior_predictive", "log_likelihood"):
+            assert result[group].sizes["draw"] == stored
+            assert result[group].attrs["stored"] == (
+                f"of {stored} draws of each chain, not 240, since the record has {samples} samples"
+            )
+        assert result["events"].sizes["draw"] == 240
+
+
+class Clock:
+    """Time that passes by calls alone: a second for every prediction of loads."""
+
+    def __init__(self, monkeypatch) -> None:
+        self.now = 0.0
+        predict = RecordLikelihood._predict
+
+        def slow(likelihood, *arguments):
+            self.now += 1.0
+            return predict(likelihood, *arguments)
+
+        monkeypatch.setattr(RecordLikelihood, "_predict", slow)
+        for module in ("deadline", "ensembles.sampling", "ensembles.block"):
+            monkeypatch.setattr(f"tactile_bayes.inference.{module}.time.monotonic", lambda: self.now)
+
+
+@pytest.mark.parametrize("family", ["parabola", pytest.param("shape-free", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seconds", [0.5, 3.5, 8.5])
+def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
+    """Past it, only the step that is under way ends, a cloud is found, and walkers start and make one step."""
+    clock, drawn = Clock(monkeypatch), []
+    settings = SamplerSettings(ensembles=2, walkers=80, max_seconds=seconds, min_ess=1e9)
+    result = infer_contour(
+        measured(), family=family, load_cell=CELL, seed=1, settings=settings, keep=lambda tree: drawn.append(clock.now)
+    )
+    assert result["sample_stats"].attrs["steps_run"] == 1
+    assert result.attrs["message"].startswith("not converged, the time allowed ran out after 1 steps")
+    assert drawn[0] < seconds + 15.0
+    clock.now = 0.0
+    free = replace(settings, max_steps=1, max_seconds=None)
+    infer_contour(
+        measured(), family=family, load_cell=CELL, seed=1, settings=free, keep=lambda tree: drawn.append(clock.now)
+    )
+    assert drawn[0] <= drawn[1] - (seconds < 1.0)  # with all the time it wants
+
+
+def test_a_posterior_is_kept_before_anything_is_made_of_it(monkeypatch):
+    def fail(*arguments):
+        raise MemoryError
+
+    monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", fail)
+    kept = []
+    with pytest.raises(MemoryError):
+        infer_as_stated(measured(), load_cell=CELL, seed=1, settings=BRIEF, keep=kept.append)
+    (tree,) = kept
+    assert set(tree.children) == {"posterior", "sample_stats", "observed_data", "constant_data"}
+    assert tree["posterior"].sizes["draw"] == 240
+    assert tree.attrs["message"].startswith("not converged")

@@ -100,6 +100,15 @@ def test_a_volume_grows_as_the_whitening_says(rod):
     assert sign != 0.0
 
 
+def test_scales_that_lie_far_apart_leave_the_approximation_a_distribution():
+    """As a corner asks for them: readings then tell 1e16 times as much of one direction as the prior of another."""
+    approximation = whitened(model_of([])).approximation
+    scales = np.array([[amplitude, 0.3, noise] for amplitude in (1.0, 1e4, 1e8) for noise in (1.0, 1e-4, 1e-8)])
+    pulled, root = approximation.conditional(scales)
+    assert np.all(np.isfinite(pulled))
+    assert np.all(np.diagonal(root, axis1=1, axis2=2) > 0.0)
+
+
 def test_a_start_out_of_reach_leads_somewhere():
     """Where the rod touches nothing there is no snap-off to be made linear."""
     model = model_of([])

@@ -17,7 +17,8 @@ from tactile_bayes.inference.result import read_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import to_dimensionless
-from tactile_bayes.runs.contour import analyse, summary
+from tactile_bayes.runs import contour as module
+from tactile_bayes.runs.contour import analyse, reach, summary
 from tactile_bayes.scanning import scan
 
 FIGURES = ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs")
@@ -69,8 +70,6 @@ def test_the_summary_begins_with_the_verdicts(analysed):
 
 
 def test_where_no_contour_is_found_the_former_run_stays_whole(measured, tmp_path, monkeypatch):
-    from tactile_bayes.runs import contour as module
-
     def infer_nothing(*arguments, **options):
         raise InferenceError("no parabola was found.")
 
@@ -82,8 +81,6 @@ def test_where_no_contour_is_found_the_former_run_stays_whole(measured, tmp_path
 
 
 def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path, monkeypatch):
-    from tactile_bayes.runs import contour as module
-
     def infer_nothing(*arguments, **options):
         raise InferenceError("no parabola was found.")
 
@@ -178,8 +175,6 @@ def test_units_do_not_matter(analysed, measured, tmp_path):
 
 
 def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
-    from tactile_bayes.runs import contour as module
-
     monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
     few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
     run = analyse(measured, tmp_path, nuisances=[], settings=few)
@@ -199,3 +194,99 @@ def test_an_unknown_family_is_refused(measured, tmp_path):
         ParameterError, match="there is no family 'blob': choose parabola, circle, ellipse, power-law, one"
     ):
         analyse(measured, tmp_path, family="blob")
+
+
+@pytest.fixture
+def drawn_before(analysed, monkeypatch):
+    """Runs that are given the posterior of another."""
+    posterior = analysed[0].posterior
+
+    def infer(measured, *, keep, **options):
+        keep(posterior.copy(deep=True))
+        return posterior.copy(deep=True)
+
+    monkeypatch.setattr(module, "infer_contour", infer)
+
+
+def broken(*arguments, **options):
+    raise RuntimeError("it broke")
+
+
+@pytest.mark.parametrize(
+    ("function", "what", "file"),
+    [
+        ("contact_points", "contacts", "contacts.csv"),
+        ("contour_band", "band", "band.csv"),
+        ("gap", "gap", None),
+        ("verdicts", "verdicts", None),
+    ],
+)
+@pytest.mark.usefixtures("drawn_before")
+def test_what_fails_is_named_and_left_out_and_all_else_is_there(function, what, file, measured, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    whole = analyse(measured, tmp_path)
+    monkeypatch.setattr(module, function, broken)
+    run = analyse(measured, tmp_path)
+    assert list(run.left_out) == [what]
+    assert str(run.left_out[what]) == "it broke"
+    said = f"Left out: {what}. Unexpected error, RuntimeError: it broke"
+    assert run.verdicts == ((said,) if what == "verdicts" else (*whole.verdicts, said))
+    lines = run.files["verdicts"].read_text(encoding="utf-8").splitlines()
+    assert tuple(lines[: lines.index("")]) == run.verdicts
+    assert list(run.files) == [name for name in whole.files if name != what or what == "verdicts"]
+    assert_every_file_is_there(run, tmp_path)  # of the former run, too, nothing is there that is not of this one
+    assert read_result(run.files["posterior"])["posterior"].to_dataset().equals(run.posterior["posterior"].to_dataset())
+    gap_row = "gap width" in run.summary.quantity
+    assert gap_row == (what != "gap")
+    if file is not None:
+        assert (run.contacts if what == "contacts" else run.band) is None
+
+
+@pytest.mark.usefixtures("drawn_before", "coarse_pictures")
+def test_a_figure_that_fails_is_named_and_the_others_are_drawn(measured, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "scan", broken)
+    monkeypatch.setattr(module, "predictive_interval", broken)
+    run = analyse(measured, tmp_path)
+    failed = ("observables", "predictive", "rods")
+    assert list(run.left_out) == [f"figure {name}" for name in failed]
+    assert list(run.files)[5:] == [name for name in FIGURES if name not in failed]
+    assert_every_file_is_there(run, tmp_path)
+    text = run.files["verdicts"].read_text(encoding="utf-8")
+    assert all(f"\nLeft out: figure {name}. Unexpected error, RuntimeError: it broke\n" in text for name in failed)
+
+
+def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
+    """Its draws and what is made of them alone are there; all else says what it lacks."""
+    monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", broken)
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    run = analyse(measured, tmp_path, nuisances=[], settings=QUICK)
+    assert list(run.left_out) == ["predictions", "band", "gap", "verdicts"]
+    assert run.verdicts[0] == "Left out: predictions. Unexpected error, RuntimeError: it broke"
+    assert run.verdicts[1].startswith("Left out: band. the posterior holds no events")
+    assert list(run.files) == ["posterior", "contacts", "verdicts", "summary"]
+    assert_every_file_is_there(run, tmp_path)
+    stored = read_result(run.files["posterior"])
+    assert stored["posterior"].sizes["draw"] == 300
+    assert stored.attrs["probability"] == 0.95
+    assert run.summary.quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
+
+
+def test_what_fails_before_a_posterior_is_drawn_is_passed_on(measured, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "infer_contour", broken)
+    with pytest.raises(RuntimeError, match="it broke"):
+        analyse(measured, tmp_path)
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_band_is_where_events_are(analysed):
+    """Of draws whose contour is not touched, or ends before, there are none."""
+    posterior = analysed[0].posterior.copy(deep=True)
+    events = posterior["events"]
+    events["snap_off_contact_x"][:, ::3] = np.nan
+    x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
+    expected = np.quantile(x[np.isfinite(x)], [0.05, 0.95])
+    np.testing.assert_allclose(reach(posterior)[[0, -1]], expected, rtol=1e-13)
+    for when in ("first", "snap_off"):
+        events[f"{when}_contact_x"][:] = np.nan
+    with pytest.raises(InferenceError, match="touches none of the posterior's contours"):
+        reach(posterior)

@@ -9,7 +9,9 @@ import xarray as xr
 from helpers.contour_posteriors import posterior
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.uncertainty.band import contour_band, contour_heights
+from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.uncertainty import band as band_module
+from tactile_bayes.uncertainty.band import contour_band, contour_heights, contours_drawn
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 X = np.linspace(-0.8, 0.8, 41)
@@ -122,3 +124,20 @@ def test_impossible_probabilities_are_refused(probability):
 def test_impossible_places_are_refused(x):
     with pytest.raises(ParameterError, match="x must be a list of finite numbers"):
         contour_band(made(10), x)
+
+
+def test_only_contours_that_are_picked_are_built(monkeypatch):
+    """Of any shape, each of them holds a table of thousands of numbers."""
+    built = []
+
+    def counted(draws, family):
+        built.append(draws["a"].size)
+        return contours_of(draws, family)
+
+    monkeypatch.setattr(band_module, "contours_of", counted)
+    drawn = made()
+    few = contours_drawn(drawn, 10)
+    assert built == [10] == list(few.shape)
+    every = contours_of(drawn["posterior"].to_dataset(), "parabola")
+    picked = np.linspace(0, every.shape[0] - 1, 10).astype(int)
+    np.testing.assert_array_equal(few.a, every.take(picked).a)

@@ -188,3 +188,34 @@ def test_one_direction_leaves_no_gap(there):
 def test_an_impossible_probability_is_refused():
     with pytest.raises(ParameterError, match="give a number between 0 and 1"):
         gap(tree([[[-0.1, 0.1]]]), 95.0)
+
+
+def with_events(made, **there):
+    """The same with events only in some of the draws, which are said for one stroke."""
+    events = made["events"].to_dataset()
+    for name, (draws, stroke) in there.items():
+        gone = ~draws[:, None] & (np.arange(2) == stroke)
+        events[name] = events[name].where(~xr.DataArray(gone, dims=("draw", "stroke")))
+    out = made.copy()
+    out["events"] = xr.DataTree(events)
+    return out
+
+
+def test_draws_without_an_event_do_not_count():
+    """As if they were not there, but for the band, which is of contours that need not be touched."""
+    made, *_ = spread()
+    number = np.arange(500)
+    lost = with_events(made, snap_off_contact_x=(number % 7 > 0, 0), first_contact_x=(number % 11 > 0, 1))
+    rest = made.copy()
+    rest["events"] = xr.DataTree(made["events"].to_dataset().isel(draw=(number % 7 > 0) & (number % 11 > 0)))
+    found, expected = gap(lost, 0.9), gap(rest, 0.9)
+    for name in ("left", "right", "width", "triangle_height", "snap_off_drive_angle", "band_lower", "band_upper"):
+        np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+    assert expected.status == "ok"
+    assert found.status == "some contours are not touched in every sweep: this is of the others"
+
+
+def test_without_any_event_there_are_no_ends():
+    made = with_events(spread()[0], first_contact_x=(np.zeros(500, dtype=bool), 0))
+    with pytest.raises(InferenceError, match=r"none of the posterior's contours is touched in every sweep"):
+        gap(made)

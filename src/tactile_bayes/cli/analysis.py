@@ -67,7 +67,11 @@ def infer(
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
     max_seconds: Annotated[
-        float | None, typer.Option(help="Time for sampling, at most [s]; what is there by then is the result.")
+        float | None,
+        typer.Option(
+            help="Time for the search for a start and for sampling, at most [s]; what is there by then is the result. "
+            "Checks, files and figures come after it."
+        ),
     ] = None,
     checkpoint: Annotated[
         Path | None,
@@ -117,7 +121,7 @@ def infer(
     go_on = "give --checkpoint FOLDER, and the same command can go on after an interrupt"
     if checkpoint is not None:
         go_on = f"the same command goes on with the steps in {checkpoint}"
-    _tell(run, {}, as_json=json, go_on=go_on)
+    _tell(ctx, run, {}, as_json=json, go_on=go_on)
 
 
 def demo(
@@ -154,10 +158,11 @@ def demo(
             command=ctx.meta["words"],
             progress=progress,
         )
-    _tell(run, {"record": path}, TRUTH, as_json=json)
+    _tell(ctx, run, {"record": path}, TRUTH, as_json=json)
 
 
 def _tell(
+    ctx: typer.Context,
     run: Run,
     files: Mapping[str, Path],
     truth: Mapping[str, float] | None = None,
@@ -165,7 +170,12 @@ def _tell(
     as_json: bool = False,
     go_on: str = "the same command begins anew",
 ) -> None:
-    """Print what came out; an interrupted run ends with the exit code of an interrupt all the same."""
+    """Print what came out; an interrupted run ends with the exit code of an interrupt all the same.
+
+    What is left out is among the verdicts; with --debug its traceback is on stderr.
+    """
+    if run.left_out:
+        _trace_back(run, in_full=ctx.find_root().params["debug"])
     if as_json:
         print_json(_numbers(run, {**files, **run.files}, truth))
     else:
@@ -175,12 +185,20 @@ def _tell(
         raise typer.Exit(130)
 
 
-def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None) -> dict[str, Any]:
-    from tactile_bayes.runs.contour import summary
+def _trace_back(run: Run, *, in_full: bool) -> None:
+    import traceback
 
+    if in_full:
+        for error in run.left_out.values():
+            typer.echo("".join(traceback.format_exception(error)), err=True)
+    else:
+        names = ", ".join(run.left_out)
+        typer.echo(f"tactile-bayes: left out: {names}; tactile-bayes --debug ... shows where that comes from", err=True)
+
+
+def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None) -> dict[str, Any]:
     attrs = run.posterior.attrs
-    probability = run.band.attrs["probability"]
-    rows = columns_of(summary(run.posterior, probability), "quantity")
+    rows = columns_of(run.summary, "quantity")
     if truth:
         rows = [{**row, "truth": truth.get(str(row["quantity"]))} for row in rows]
     answer: dict[str, Any] = {
@@ -188,12 +206,13 @@ def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | N
         "converged": bool(attrs["converged"]),
         "message": attrs["message"],
         "family": attrs["family"],
-        "probability": probability,
+        "probability": run.summary.attrs["probability"],
         "quantities": rows,
         "samples": None,
         "misfit_probability": None,
         "axial_score": None,
         "files": files,
+        "left_out": {what: str(error) for what, error in run.left_out.items()},
     }
     if run.contacts is not None:
         answer["samples"] = dict(Counter(run.contacts.status.values.tolist()).most_common())
@@ -205,10 +224,8 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
     from rich.console import Console
     from rich.table import Table
 
-    from tactile_bayes.runs.contour import summary
-
-    numbers = summary(run.posterior, run.band.attrs["probability"])
-    share = f"{run.band.attrs['probability']:.0%}"
+    numbers = run.summary
+    share = f"{numbers.attrs['probability']:.0%}"
     table = Table(box=None, pad_edge=False)
     heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
     for head in heads:
@@ -232,7 +249,9 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
     attrs = run.posterior.attrs
     if attrs["converged"]:  # else it is among the verdicts
         console.print(attrs["message"], highlight=False, soft_wrap=True)
-    if run.contacts is None:
+    if "contacts" in run.left_out:
+        pass  # said above
+    elif run.contacts is None:
         console.print("No contact points: Step 2 needs all three load channels.")
     else:
         fates = Counter(run.contacts.status.values.tolist()).most_common()

@@ -94,7 +94,7 @@ def _warnings_in_a_line() -> Iterator[None]:
 
 _EXIT_CODES = """Exit codes: 0 for done, 1 for an unexpected error, 2 for input or options that are refused, 130 for
 Ctrl-C, 143 for a run that was terminated. A result that is not to be trusted says so in its first line, and in "words"
-and "converged" of --json; its exit code is 0.
+and "converged" of --json; its exit code is 0. What cannot be made of a posterior is named there and in "left_out".
 
 Example: tactile-bayes demo --out results/demo
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +14,10 @@ from threadpoolctl import threadpool_limits
 from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contour_groups import groups_of, prior_draws
+from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
     Coordinates,
     Draws,
@@ -37,6 +39,9 @@ from tactile_bayes.rod import Rod
 
 __all__ = ["Sampled", "contours_of", "infer_contour", "sampled"]
 
+_PRIOR_SECONDS = 3.0
+"""Time for draws from the prior [s] where time is limited: a rod may reach few of its contours."""
+
 
 def infer_contour(
     measured: xr.Dataset,
@@ -52,6 +57,7 @@ def infer_contour(
     settings: SamplerSettings | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
+    keep: Callable[[xr.DataTree], object] | None = None,
 ) -> xr.DataTree:
     """Posterior of a contour's parameters from a whole record, by independent emcee ensembles.
 
@@ -104,13 +110,17 @@ def infer_contour(
         may change: max_steps, max_seconds, min_ess and max_r_hat of the settings.
     progress : callable, optional
         Is given a `Progress` after each look at the diagnostics.
+    keep : callable, optional
+        Is given the posterior as soon as it is drawn, without the groups that are made of it (predictions, events,
+        draws from the prior), so that it may be on disk before they can fail.
 
     Returns
     -------
     xr.DataTree
         In ArviZ's layout and the record's units, a chain being an ensemble: `posterior`, `sample_stats`, `prior`,
-        `posterior_predictive` and `log_likelihood` (by sample; of some of the draws), `events` (first contact and
-        snap-off of each sweep, of the same draws), `observed_data`, `constant_data`. Attributes: version, seed,
+        `posterior_predictive` and `log_likelihood` (by sample; of some of the draws, and of fewer for more than 5,000
+        samples), `events` (first contact and snap-off of each sweep, of 250 draws of each chain), `observed_data`,
+        `constant_data`. Attributes: version, seed,
         settings, hash of the data, `converged` and a `message` in words. A KeyboardInterrupt (Ctrl-C) while walkers
         walk ends the run, and what they have drawn is returned, with `converged` 0 and a message that says so; before
         that it is passed on.
@@ -173,7 +183,7 @@ def infer_contour(
         nuisances=nuisances,
         events=events,
     )
-    return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress).tree
+    return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree
 
 
 class Sampled(NamedTuple):
@@ -191,6 +201,7 @@ def sampled(
     settings: SamplerSettings,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
+    keep: Callable[[xr.DataTree], object] | None = None,
     walk: Walk | None = None,
     with_prior: bool = True,
 ) -> Sampled:
@@ -198,9 +209,11 @@ def sampled(
     prior draws may be left out.
     """
     model, seeds = problem.model, spawn(seed, 4)
+    deadline = Deadline.after(settings.max_seconds)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         if walk is None:
-            walk = walk_of(model, seeds[0], settings)
+            # A run that goes on from a checkpoint has to start where it did, however late it was then.
+            walk = walk_of(model, seeds[0], settings, NEVER if checkpoint is not None else deadline)
             if walk.beyond:
                 raise InferenceError(
                     f"the record wants {walk.beyond}: give a wider prior, or are units, rod and base right? "
@@ -211,18 +224,23 @@ def sampled(
             walk.start,
             names=model.names,
             seed=seeds[1],
-            settings=settings,
+            settings=replace(settings, max_seconds=deadline.seconds_left),
             progress=progress,
             checkpoint=checkpoint,
             coordinates=walk.coordinates,
             identity=None if checkpoint is None else problem.identity,
         )
-        groups = groups_of(model, draws, np.random.default_rng(seeds[2]))
+        tree = xr.DataTree.from_dict(drawn_groups(model, draws))
+        tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
+        if keep is not None:
+            keep(tree)
+        groups = predicted_groups(model, draws, np.random.default_rng(seeds[2]))
         if with_prior:
-            groups["prior"] = prior_draws(model, np.random.default_rng(seeds[3]))
-    tree = xr.DataTree.from_dict(groups)
-    tree.attrs = provenance(draws, seed=seed, settings=settings, **problem.about)
-    return Sampled(tree, draws, walk.coordinates)
+            late = NEVER if settings.max_seconds is None else Deadline.after(_PRIOR_SECONDS)
+            groups["prior"] = prior_draws(model, np.random.default_rng(seeds[3]), late)
+    whole = xr.DataTree.from_dict({**{name: group.to_dataset() for name, group in tree.children.items()}, **groups})
+    whole.attrs = tree.attrs
+    return Sampled(whole, draws, walk.coordinates)
 
 
 def contours_of(draws: xr.Dataset, family: str) -> Contour:

@@ -9,60 +9,102 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws
 from tactile_bayes.inference.result import sample_stats
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 
-__all__ = ["groups_of", "prior_draws", "unit_of"]
+__all__ = ["drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
 
 Floats = NDArray[np.float64]
 
 _KEPT_DRAWS = 250
-"""Draws of each chain for which predictions and events are stored."""
+"""Draws of each chain for which predictions and events are stored, at most."""
+
+_STORED_NUMBERS = 20_000_000
+"""Numbers in predictions and log-likelihoods, 160 MB, beyond which they are stored of fewer draws: from 5,000 samples
+on, with four chains."""
+
+_FEWEST_PREDICTIONS = 100
+"""As few as the check of the record can do with."""
+
+_PATHS = 200
+"""Contours whose paths are followed at a time."""
 
 _PRIOR_DRAWS = 1000
 
+_BY_SAMPLE = ("chain", "draw", "sample")
 
-def groups_of(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
-    """The result's groups except the prior."""
-    chains, count, _ = draws.samples.shape
-    kept = draws.evenly(_KEPT_DRAWS)
-    points = draws.samples[:, kept].reshape(-1, len(model.names))
-    predicted, likelihood, events = [], [], []
-    for part in np.array_split(points, max(1, len(points) // 200)):
-        loads, reached = model.loads_with_errors(part)
-        error = model.likelihood.encoder.draw(rng, (len(part), loads.shape[2]))
-        predicted.append(np.take_along_axis(loads, error[:, None, :, None], axis=1)[:, 0])
-        likelihood.append(model.likelihood.score(loads, reached, model.noise_scale(part), pointwise=True))
-        events.append(events_of(model.likelihood, model.contours(part), model.rig(part), exact=False))
-    shape = (chains, kept.size)
-    coords = {"chain": np.arange(chains), "draw": kept}
-    cell = model.likelihood.load_cell
-    noisy = cell.simulate(np.concatenate(predicted), seed=rng, noise_scale=model.noise_scale(points))
-    units = _load_units(model)
-    predictive, observed = {}, {}
-    for i, name in enumerate(CHANNELS):
-        observed[name] = model.measured[name]
-        if name in present_channels(model.measured):
-            values = noisy[..., i].reshape(*shape, -1) * units[i]
-            predictive[name] = (("chain", "draw", "sample"), values, model.measured[name].attrs)
+
+def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
+    """What is there as soon as walkers stand still: draws, how the ensembles fared, and the record."""
+    observed = {name: model.measured[name] for name in CHANNELS}
     return {
-        "posterior": _labelled(model, draws.samples, np.arange(count)),
+        "posterior": _labelled(model, draws.samples, np.arange(draws.samples.shape[1])),
         "sample_stats": sample_stats(draws),
-        "posterior_predictive": xr.Dataset(predictive, coords=coords),
-        "log_likelihood": xr.Dataset(
-            {"record": (("chain", "draw", "sample"), np.concatenate(likelihood).reshape(*shape, -1))}, coords=coords
-        ),
-        "events": _labelled_events(
-            model,
-            {name: np.concatenate([event[name] for event in events]).reshape(*shape, -1) for name in events[0]},
-            coords,
-        ),
         "observed_data": xr.Dataset(observed),
         "constant_data": model.measured.drop_vars(CHANNELS).drop_attrs(deep=False),
     }
+
+
+def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
+    """What some of the draws say: events of `_KEPT_DRAWS` of each chain, and predictions of as many, or of fewer where
+    the record is long, as attributes of these groups then say.
+    """
+    kept = draws.evenly(_KEPT_DRAWS)
+    chains, samples = len(draws.samples), len(model.likelihood.measured)
+    affordable = _STORED_NUMBERS // (chains * samples * (len(CHANNELS) + 1))
+    fewer = draws.evenly(max(affordable, -(-_FEWEST_PREDICTIONS // chains))) if affordable < kept.size else kept
+    groups = _predictions(model, draws, fewer, rng)
+    if fewer.size < kept.size:
+        said = f"of {fewer.size} draws of each chain, not {kept.size}, since the record has {samples} samples"
+        groups = {name: group.assign_attrs(stored=said) for name, group in groups.items()}
+    return {**groups, "events": _events(model, draws, kept)}
+
+
+def _predictions(
+    model: ContourModel, draws: Draws, kept: NDArray[np.intp], rng: np.random.Generator
+) -> dict[str, xr.Dataset]:
+    points = draws.samples[:, kept].reshape(-1, len(model.names))
+    likelihood, cell = model.likelihood, model.likelihood.load_cell
+    samples = len(likelihood.measured)
+    predicted, log_likelihood = np.empty((len(points), samples, len(CHANNELS))), np.empty((len(points), samples))
+    for block in blocks(len(points), model.loads_of_a_point, _PATHS):
+        loads, reached = model.loads_with_errors(points[block])
+        error = likelihood.encoder.draw(rng, (block.size, samples))
+        predicted[block] = np.take_along_axis(loads, error[:, None, :, None], axis=1)[:, 0]
+        log_likelihood[block] = likelihood.score(loads, reached, model.noise_scale(points[block]), pointwise=True)
+    for block in blocks(len(points), predicted[0].size):
+        scale = model.noise_scale(points[block])
+        predicted[block] = cell.simulate(predicted[block], seed=rng, noise_scale=scale)
+    shape = (len(draws.samples), kept.size, samples)
+    coords = {"chain": np.arange(shape[0]), "draw": kept}
+    predictive = {}
+    for i, (name, unit) in enumerate(zip(CHANNELS, _load_units(model), strict=True)):
+        if name in present_channels(model.measured):
+            values = (predicted[..., i] * unit).reshape(shape)
+            predictive[name] = (_BY_SAMPLE, values, model.measured[name].attrs)
+    return {
+        "posterior_predictive": xr.Dataset(predictive, coords=coords),
+        "log_likelihood": xr.Dataset({"record": (_BY_SAMPLE, log_likelihood.reshape(shape))}, coords=coords),
+    }
+
+
+def _events(model: ContourModel, draws: Draws, kept: NDArray[np.intp]) -> xr.Dataset:
+    points = draws.samples[:, kept].reshape(-1, len(model.names))
+    found = [
+        events_of(model.likelihood, model.contours(points[block]), model.rig(points[block]), exact=False)
+        for block in blocks(len(points), 1, _PATHS)
+    ]
+    shape = (len(draws.samples), kept.size, -1)
+    return _labelled_events(
+        model,
+        {name: np.concatenate([event[name] for event in found]).reshape(shape) for name in found[0]},
+        {"chain": np.arange(shape[0]), "draw": kept},
+    )
 
 
 def _labelled_events(model: ContourModel, events: Mapping[str, Floats], coords: Mapping[str, Any]) -> xr.Dataset:
@@ -75,8 +117,8 @@ def _labelled_events(model: ContourModel, events: Mapping[str, Floats], coords: 
     return xr.Dataset(variables, coords={**coords, "stroke": strokes})
 
 
-def prior_draws(model: ContourModel, rng: np.random.Generator) -> xr.Dataset:
-    points, share = model.draw_prior(rng, _PRIOR_DRAWS)
+def prior_draws(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> xr.Dataset:
+    points, share = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
     return _labelled(model, points[None], np.arange(len(points))).assign_attrs(share_within_reach=share)
 
 

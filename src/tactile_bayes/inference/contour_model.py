@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import DriftWarning, ReachError
+from tactile_bayes.inference.blocks import blocks
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.families import Family, Prior
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
@@ -74,6 +76,11 @@ class ContourModel:
         """Which channels were measured, shape (3,)."""
         return ~np.isnan(self.likelihood.measured).all(axis=0)
 
+    @property
+    def loads_of_a_point(self) -> int:
+        """Numbers that are predicted of a point: a load for every channel, sample and error of the encoder."""
+        return self.likelihood.measured.size * self.likelihood.encoder.count
+
     def contours(self, points: Floats) -> Contour:
         return self.family.build(*points[:, : len(self.family.parameters)].T)
 
@@ -117,15 +124,20 @@ class ContourModel:
         """Up to the prior's normalisation over contours within reach; −inf outside its support or reach."""
         values = self.log_prior(points)
         inside = np.flatnonzero(np.isfinite(values))
-        if inside.size:
-            chosen = points[inside]
-            values[inside] += self.likelihood.score(*self.loads_with_errors(chosen), self.noise_scale(chosen))
+        for block in blocks(inside.size, self.loads_of_a_point) if inside.size else ():
+            chosen = points[inside[block]]
+            values[inside[block]] += self.likelihood.score(*self.loads_with_errors(chosen), self.noise_scale(chosen))
         return values
 
-    def draw_prior(self, rng: np.random.Generator, count: int) -> tuple[Floats, float]:
-        """Draws within reach, fewer where they are very rare, and the share of all draws that they are."""
+    def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
+        """Draws within reach, fewer where they are very rare or time is up, and the share of all draws that they are.
+
+        However late it is, the search for the first one goes on.
+        """
         found, drawn = [np.empty((0, len(self.names)))], 0
-        while sum(map(len, found)) < count and drawn < _MOST_TRIALS * count:
+        while (had := sum(map(len, found))) < count and drawn < _MOST_TRIALS * count:
+            if had and deadline.has_passed:
+                break
             points = np.stack([self.priors[name].rvs(count, random_state=rng) for name in self.names], axis=1)
             drawn += count
             points = points[np.isfinite(self.log_prior(points))]

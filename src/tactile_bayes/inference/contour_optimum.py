@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.families import support_of
 from tactile_bayes.inference.nuisances import BIASES
 from tactile_bayes.inference.start import optima
@@ -90,7 +92,7 @@ def event_brackets(model: ContourModel) -> Brackets:
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
 
 
-def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
+def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
     """The best of `optima_of`, or the first that explains the record.
 
     Raises
@@ -99,7 +101,7 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
         If there is none.
     """
     best: ContourOptimum | None = None
-    for found in optima_of(model, rng):
+    for found in optima_of(model, rng, deadline):
         if best is None or found.cost < best.cost:
             best = found
         if best.fits:
@@ -109,13 +111,13 @@ def optimum_of(model: ContourModel, rng: np.random.Generator) -> ContourOptimum:
     return best
 
 
-def optima_of(model: ContourModel, rng: np.random.Generator) -> Iterator[ContourOptimum]:
+def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
     """Where searches end that begin at Step 2's contacts and at draws from the prior, the likeliest first."""
     size = len(model.located)
     deviation, present = model.deviation, model.present
     measured = model.likelihood.measured[:, present] / deviation[present]
     brackets = event_brackets(model)
-    candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS)
+    candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
     units = [model.nuisances.units[name] for name in BIASES]
     for name, zero, unit in zip(BIASES, model.zero, units, strict=True):
         if name in model.names and np.isfinite(zero):
@@ -142,7 +144,8 @@ def optima_of(model: ContourModel, rng: np.random.Generator) -> Iterator[Contour
         by_contacts = contact_fit(model)
         if by_contacts is not None:
             yield np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0))
-        costs = np.sum(np.minimum(np.abs(residuals(candidates[:, :size])), 30.0), axis=1)
+        parts = [candidates[block, :size] for block in blocks(len(candidates), measured.size)]
+        costs = np.concatenate([np.sum(np.minimum(np.abs(residuals(part)), 30.0), axis=1) for part in parts])
         for i in np.argsort(costs)[:_CANDIDATES]:
             by_events = next(
                 optima(lambda points: residuals(points)[:, measured.size :], [candidates[i, :size]], *about)
@@ -151,7 +154,7 @@ def optima_of(model: ContourModel, rng: np.random.Generator) -> Iterator[Contour
 
     ends = np.array([support_of(model.priors[name]) for name in model.located])
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
-    about = percentiles.mean(axis=0), spread, low, high
+    about = percentiles.mean(axis=0), spread, low, high, deadline
     possible = candidates[:, size:]
     for found in optima(residuals, starts(), *about):
         noise = fitted_noise(model, found.residuals[: measured.size].reshape(measured.shape))

@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optima_of, optimum_of
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
     Coordinates,
     Logarithms,
@@ -60,20 +62,31 @@ class Walk(NamedTuple):
     start: Floats
     """(ensemble, walker, coordinate)."""
     coordinates: Coordinates
+    log_evidence: float = -np.inf
+    """Of the model, roughly, up to a constant of the number of parameters."""
     beyond: str = ""
     """What the record wants and the priors do not allow, in words."""
 
 
-def walk_of(model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings) -> Walk:
-    """Walkers scattered more widely than the posterior, around an optimum that is sought without help."""
+def walk_of(
+    model: ContourModel, seed: np.random.SeedSequence, settings: SamplerSettings, deadline: Deadline = NEVER
+) -> Walk:
+    """Walkers scattered more widely than the posterior, around an optimum that is sought without help.
+
+    Past the deadline every search ends with the step that it is in, and walkers start wherever something is probable.
+    """
     rng = np.random.default_rng(seed)
     if isinstance(model.family, ShapeFreeFamily):
-        return _whitened(model, seed, rng, settings)
-    return _scattered(model, seed, rng, settings)
+        return _whitened(model, seed, rng, settings, deadline)
+    return _scattered(model, seed, rng, settings, deadline)
 
 
 def _whitened(
-    model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
+    model: ContourModel,
+    seed: np.random.SeedSequence,
+    rng: np.random.Generator,
+    settings: SamplerSettings,
+    deadline: Deadline,
 ) -> Walk:
     """Of coordinates that are nearly standard normal it takes no more walkers than span them."""
     by_contacts = contact_fit(model)
@@ -81,18 +94,18 @@ def _whitened(
     whitening = None
     if by_contacts is not None:
         rig = [float(model.priors[name].median()) for name in model.nuisances.names]  # type: ignore[attr-defined]
-        whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng)
-    if whitening is None or _misfit(model, whitening.centre) > _POOR:
-        other = whitening_at(model, optimum_of(model, rng).point, rng)
+        whitening = whitening_at(model, np.concatenate([by_contacts, rig, noise]), rng, deadline)
+    if whitening is None or (_misfit(model, whitening.centre) > _POOR and not deadline.has_passed):
+        other = whitening_at(model, optimum_of(model, rng, deadline).point, rng, deadline)
         if whitening is None or _misfit(model, other.centre) < _misfit(model, whitening.centre):
             whitening = other
     log_probability = in_coordinates(model.log_probability, whitening)
     spread = np.full(whitening.middle.size, _OF_REST)
     spread[: whitening.bent] = [_OF_ROUGHNESS] * 2 + [_OF_NOISE] * len(model.noise.names)
-    cloud = gather(log_probability, whitening.middle, np.diag(np.square(spread)), rng)
+    cloud = gather(log_probability, whitening.middle, np.diag(np.square(spread)), rng, deadline)
     count = len(spread)
     start = scatter_walkers(
-        lambda points: np.where(log_probability(points) > cloud.floor, 0.0, -np.inf),
+        lambda points: np.where(log_probability(points) > cloud.floor_by(deadline), 0.0, -np.inf),
         cloud.draw,
         parameters=count,
         seed=seed,
@@ -123,13 +136,19 @@ def _around(model: ContourModel) -> Logarithms:
 
 
 def _scattered(
-    model: ContourModel, seed: np.random.SeedSequence, rng: np.random.Generator, settings: SamplerSettings
+    model: ContourModel,
+    seed: np.random.SeedSequence,
+    rng: np.random.Generator,
+    settings: SamplerSettings,
+    deadline: Deadline,
 ) -> Walk:
     """Walkers scattered twice as wide as a normal approximation of each mode, which they are then proposed from."""
-    modes = _modes(model, rng)
+    modes = _modes(model, rng, deadline)
     around = _around(model)
     proposal = Mixture(tuple(mode.proposal for mode in modes))
-    floor = min(mode.cloud.floor for mode in modes)
+
+    def floor() -> float:
+        return min(mode.cloud.floor_by(deadline) for mode in modes)
 
     def draw(rng: np.random.Generator, count: int) -> Floats:
         counts = rng.multinomial(count, proposal.shares)
@@ -138,7 +157,7 @@ def _scattered(
 
     try:
         start = scatter_walkers(
-            lambda points: np.where(model.log_probability(points) > floor, 0.0, -np.inf),
+            lambda points: np.where(model.log_probability(points) > floor(), 0.0, -np.inf),
             draw,
             parameters=len(model.names),
             seed=seed,
@@ -153,31 +172,33 @@ def _scattered(
             + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
         ) from error
     walked = _walked(model)
-    return Walk(walked.of(start), Logarithms(walked.positive, proposal), modes[0].optimum.beyond)
+    log_evidence = float(logsumexp([mode.proposal.log_mass for mode in modes]))
+    return Walk(walked.of(start), Logarithms(walked.positive, proposal), log_evidence, modes[0].optimum.beyond)
 
 
 def _walked(model: ContourModel) -> Logarithms:
     return Logarithms((model.low == 0.0) & ~np.isin(model.names, MAY_VANISH))
 
 
-def _modes(model: ContourModel, rng: np.random.Generator) -> list[_Mode]:
+def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> list[_Mode]:
     """Where the posterior has mass, the most first: one, if that explains a record that says much; else all to which
     searches lead, weighed by their evidence.
     """
     found: list[_Mode] = []
     waiting: list[ContourOptimum] = []
     says_much = np.count_nonzero(~model.found["unloaded"].values) >= _MUCH
-    for optimum in optima_of(model, rng):
+    for optimum in optima_of(model, rng, deadline):
         if not optimum.fits:
             waiting.append(optimum)
         elif not _is_known(model, optimum, found):
-            found.append(_mode(model, optimum, rng))
+            found.append(_mode(model, optimum, rng, deadline))
             if says_much and found[-1].proposal.efficiency > _EFFICIENT:
                 break
     for optimum in sorted(waiting, key=lambda one: one.cost):
         least = min((mode.optimum.cost for mode in found), default=optimum.cost)
-        if optimum.cost < least + _HOPELESS and not _is_known(model, optimum, found):
-            found.append(_mode(model, optimum, rng))
+        late = found and deadline.has_passed
+        if optimum.cost < least + _HOPELESS and not late and not _is_known(model, optimum, found):
+            found.append(_mode(model, optimum, rng, deadline))
     if not found:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
     found.sort(key=lambda mode: -mode.proposal.log_mass)
@@ -190,13 +211,13 @@ def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) 
     return any(np.linalg.norm(mode.proposal.steps(place)) < _SAME * np.sqrt(place.size) for mode in found)
 
 
-def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator) -> _Mode:
+def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator, deadline: Deadline) -> _Mode:
     around, walked = _around(model), _walked(model)
 
     def log_probability(coordinates: Floats) -> Floats:
         return model.log_probability(around.parameters(coordinates)[0])
 
-    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng)
+    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng, deadline)
     centre = around.parameters(cloud.centre[None])[0]
     per_unit = np.where(walked.positive & ~around.positive, 1.0 / centre[0], 1.0)
     proposal = approximate(
@@ -204,5 +225,6 @@ def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator
         walked.of(centre)[0],
         cloud.narrow_covariance * np.outer(per_unit, per_unit),
         rng,
+        deadline,
     )
     return _Mode(optimum, cloud, proposal)

@@ -59,6 +59,7 @@ def sample_stats(draws: Draws) -> xr.Dataset:
             "walkers": draws.walkers,
             "steps_run": draws.steps_run,
             "steps_kept": draws.steps_kept,
+            "every": draws.every,
             "evaluations": draws.evaluations,
             "seconds": draws.seconds,
             "stuck": draws.stuck,

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.differences import central_slopes
 
 __all__ = ["Cloud", "Optimum", "gather", "optima"]
@@ -38,6 +38,9 @@ _INSIDE = 1e-3
 """Of the scale of a parameter, from its end, where a search begins that must not leave."""
 
 _ROUNDS = 30
+
+_SOME = 0.05
+"""Share of a cloud that must be possible if time is up."""
 
 _FITS = 0.55
 """Cost per residual that says that the noise explains the record: 0.4 if the noise is guessed right."""
@@ -69,6 +72,7 @@ def optima(
     spread: Floats,
     low: Floats | float = -np.inf,
     high: Floats | float = np.inf,
+    deadline: Deadline = NEVER,
 ) -> Iterator[Optimum]:
     """Robust least squares from one candidate after the other.
 
@@ -84,17 +88,23 @@ def optima(
         Where each parameter lies a priori, and on which scale it varies there: it is drawn there like by one residual.
     low, high : ndarray, shape (d,), or float
         Between what each parameter can be.
+    deadline : Deadline
+        Past it, the search that is under way ends where it is, and no other begins.
     """
     for candidate in candidates:
-        found = _descend(residuals, candidate, middle, spread)
-        again = _descend(residuals, found.point, middle, spread)
+        found = _descend(residuals, candidate, middle, spread, deadline=deadline)
+        again = _descend(residuals, found.point, middle, spread, deadline=deadline)
         while again.cost < found.cost - _GAIN:  # samples that fell on an event's other side on the way
-            found, again = again, _descend(residuals, again.point, middle, spread)
+            found, again = again, _descend(residuals, again.point, middle, spread, deadline=deadline)
         if not np.all((found.point > low) & (found.point < high)):
             inside = np.clip(found.point, low + _INSIDE * spread, high - _INSIDE * spread)
-            bounded = _descend(residuals, inside, middle, spread, low, high)
-            found = bounded._replace(beyond=found.point, excess=bounded.cost - found.cost)
+            bounded = _descend(residuals, inside, middle, spread, low, high, deadline)
+            if not deadline.has_passed:  # else what the record wants is not known
+                bounded = bounded._replace(beyond=found.point, excess=bounded.cost - found.cost)
+            found = bounded
         yield found
+        if deadline.has_passed:
+            break
 
 
 def _descend(
@@ -104,6 +114,7 @@ def _descend(
     spread: Floats,
     low: Floats | float = -np.inf,
     high: Floats | float = np.inf,
+    deadline: Deadline = NEVER,
 ) -> Optimum:
     """In units of the spread, so that the record's units do not matter."""
 
@@ -128,8 +139,12 @@ def _descend(
     while scale > _BRAVE:  # far off, residuals all pull by their squares, or the way would be long
         typical = float(np.sqrt(np.mean(np.square(one(point)))))
         scale = max(_BRAVE, min(typical, _CLOSER * scale))
-        solution = least_squares(one, point, jacobian, bounds, loss=robust, f_scale=scale, max_nfev=_MOST_STEPS)
+        solution = deadline.least_squares(
+            one, point, jacobian, bounds=bounds, loss=robust, f_scale=scale, max_nfev=_MOST_STEPS
+        )
         point = solution.x
+        if deadline.has_passed:
+            break
     _, sizes, axes = np.linalg.svd(np.asarray(solution.jac), full_matrices=False)
     axes = axes / sizes[:, None] * spread
     covariance = axes.T @ axes
@@ -150,12 +165,20 @@ class Cloud:
         """Roughly the posterior's."""
         return np.asarray(self.root @ self.root.T / _WIDER**2)
 
+    def floor_by(self, deadline: Deadline) -> float:
+        """The floor; past the deadline there is none, for of what is above it few points may be found."""
+        return -np.inf if deadline.has_passed else self.floor
+
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return self.centre + rng.normal(size=(count, self.centre.size)) @ self.root.T
 
 
 def gather(
-    log_probability: Callable[[Floats], Floats], centre: Floats, covariance: Floats, rng: np.random.Generator
+    log_probability: Callable[[Floats], Floats],
+    centre: Floats,
+    covariance: Floats,
+    rng: np.random.Generator,
+    deadline: Deadline = NEVER,
 ) -> Cloud:
     """A cloud that is wider than the posterior, but of which most is not hopeless.
 
@@ -172,6 +195,8 @@ def gather(
     covariance : ndarray, shape (d, d)
         A guess at the posterior's.
     rng : np.random.Generator
+    deadline : Deadline
+        Past it, a cloud will do of which `_SOME` is possible.
     """
     size = centre.size
     top = float(log_probability(centre[None])[0])
@@ -183,7 +208,7 @@ def gather(
         if values.max() > top:
             top = float(values.max())
         floor = top - _DEFICIT * size
-        if np.mean(values > floor) > 0.5:
+        if np.mean(values > floor) > 0.5 or (deadline.has_passed and np.mean(np.isfinite(values)) > _SOME):
             break
         best = np.argsort(values)[-12 * size :]
         best = best[np.isfinite(values[best])]

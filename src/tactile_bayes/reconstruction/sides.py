@@ -32,6 +32,9 @@ _ZERO = 0.1
 _WANDER = 0.2
 """That of a zero that moves between contact and the unloaded samples beside it, in standard deviations of the noise."""
 
+_ROUNDING = 4.0 * float(np.finfo(float).eps)
+"""Noise of a reading that has none, over the largest."""
+
 _FALSE_ALARM = 1e-3
 _ALL_BUT_OUTLIERS = 0.98
 
@@ -116,7 +119,7 @@ def _scores(record: xr.Dataset, load_cell: LoadCell | None) -> list[tuple[int, I
         unloaded.append(np.concatenate([rows[: bounds.before], rows[end:]]))
     found = []
     for rows, inside, own in zip(parts, loaded, unloaded, strict=True):
-        noise = max(rough_noise(moment[rows]), known, np.finfo(float).tiny)
+        noise = max(rough_noise(moment[rows]), known, _ROUNDING * float(np.abs(moment[rows]).max()), 1e-100 * unit)
         zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else np.concatenate(unloaded)]
         mean, error = (zeros.mean(), noise / np.sqrt(zeros.size)) if zeros.size >= FEWEST else (0.0, unknown)
         apart = moment[inside] - mean

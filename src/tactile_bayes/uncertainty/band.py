@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.checks import as_numbers, check_probability, check_switch
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.uncertainty.quantiles import quantile_band
@@ -20,6 +21,9 @@ __all__ = ["contour_band", "contour_heights", "contours_drawn", "length_unit", "
 Floats = NDArray[np.float64]
 
 _DRAWS = 4000
+
+_OF_A_HEIGHT = 12
+"""Numbers that a contour of any shape looks up for one of its heights."""
 
 
 def contour_band(
@@ -87,16 +91,19 @@ def contour_band(
 def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Floats:
     """Heights at x of up to `most` contours, evenly picked from the posterior's draws; shape (contours, x)."""
     contours = contours_drawn(posterior, most)
-    every = np.arange(contours.shape[0])[:, None]
+    heights = np.empty((contours.shape[0], x.size))
     with np.errstate(over="ignore"):  # far out, where no contour is
-        return np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
+        for block in blocks(len(heights), _OF_A_HEIGHT * x.size):
+            heights[block] = contours.take(block[:, None]).height(x)
+    return heights
 
 
 def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
     """Up to `most` contours, evenly picked from the posterior's draws."""
-    contours = contours_of(contour_draws(posterior), posterior.attrs["family"])
-    count = contours.shape[0]
-    return contours.take(np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp)))
+    draws = contour_draws(posterior).stack(every=("chain", "draw"), create_index=False)
+    count = draws.sizes["every"]
+    picked = draws.isel(every=np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp)))
+    return contours_of(picked, posterior.attrs["family"])
 
 
 def places(x: ArrayLike) -> Floats:

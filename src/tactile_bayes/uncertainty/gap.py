@@ -58,12 +58,13 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
 
         Numbers: band_width, the largest upper − lower of the band, and band_width_without_events, to be compared with
         triangle_width [length]; share_open, the share of contours that leave a gap; status, in words: "ok", or why
-        something is NaN. Attribute gaps: how many gaps there are.
+        something is NaN. Attribute gaps: how many gaps there are. Draws
+        whose contour is not touched in every sweep do not count.
 
     Raises
     ------
     InferenceError
-        If the record has sweeps in one direction only.
+        If the record has sweeps in one direction only, or no contour is touched in all of them.
     ParameterError
         If the probability is not in (0, 1).
 
@@ -96,9 +97,13 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     missing = [name for name in ("forward", "backward") if name not in events.stroke.values]
     if missing:
         raise InferenceError(f"a gap lies between sweeps of both directions, and there is no {missing[0]} one here")
-    left_x, right_x, gaps = _ends(events)
+    ends = np.stack([_rows(events["first_contact_x"]), _rows(events["snap_off_contact_x"])])
+    touched = np.flatnonzero(np.isfinite(ends).all(axis=(0, 2)))
+    if not touched.size:
+        raise InferenceError("none of the posterior's contours is touched in every sweep: there are no ends of a gap")
+    left_x, right_x, gaps = _ends(ends[:, touched])
     draws = draws.sel(chain=events["chain"], draw=events["draw"])
-    contours = contours_of(draws, posterior.attrs["family"])
+    contours = contours_of(draws, posterior.attrs["family"]).take(touched)
     left, right = (contours.locate(contours.parameter_of_x(x)) for x in (left_x, right_x))
     certificate = triangle(left, right)
     vertex_x, vertex_y = contours.point(0.0)
@@ -123,7 +128,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         "apex_y": (("bound",), bounds(certificate.apex_y[some]), length),
         "triangle_height": (("bound",), bounds(certificate.height[some]), length),
         "triangle_width": (("bound",), bounds(certificate.width[some]), length),
-        "snap_off_drive_angle": (("bound", "stroke"), bounds(_rows(events["snap_off_drive_angle"])), angle),
+        "snap_off_drive_angle": (("bound", "stroke"), bounds(_rows(events["snap_off_drive_angle"])[touched]), angle),
     }
     begin, end = (float(np.median(x)) for x in (left_x, right_x))
     x = np.linspace(begin, end, _PLACES)
@@ -149,16 +154,17 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         {
             **variables,
             "share_open": ((), share, {"units": "1"}),
-            "status": ((), _status(share, known, cut_short)),
+            "status": ((), _status(share, known, cut_short, touched.size < ends.shape[1])),
         },
         coords={"bound": ["lower", "median", "upper"], "x": ("x", x, length), "stroke": events.stroke.values},
         attrs={"probability": probability, "gaps": gaps},
     )
 
 
-def _ends(events: xr.Dataset) -> tuple[Floats, Floats, int]:
-    """Left and right end of the gap of each contour, and how many gaps there are."""
-    ends = np.stack([_rows(events["first_contact_x"]), _rows(events["snap_off_contact_x"])])
+def _ends(ends: Floats) -> tuple[Floats, Floats, int]:
+    """Left and right end of the gap of each contour, and how many gaps there are, from x of the first contact and of
+    the snap-off, shape (2, contours, strokes).
+    """
     low, high = ends.min(axis=0), ends.max(axis=0)
     typical_low, typical_high = np.median(low, axis=0), np.median(high, axis=0)
     order = np.argsort(typical_low + typical_high)
@@ -174,7 +180,7 @@ def _rows(values: xr.DataArray) -> Floats:
     return np.asarray(values.values, dtype=float).reshape(-1, values.sizes["stroke"])
 
 
-def _status(share_open: float, known: bool, cut_short: bool) -> str:
+def _status(share_open: float, known: bool, cut_short: bool, untouched: bool) -> str:
     if share_open == 0.0:
         return "the sweeps overlap: no gap is left"
     if not known:
@@ -183,4 +189,6 @@ def _status(share_open: float, known: bool, cut_short: bool) -> str:
         return "some contours end inside the gap: there is no width of their band"
     if share_open < 1.0:
         return "the sweeps overlap in some contours: the triangle is that of the others"
+    if untouched:
+        return "some contours are not touched in every sweep: this is of the others"
     return "ok"

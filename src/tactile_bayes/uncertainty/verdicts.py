@@ -85,11 +85,11 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     The family parabola and the rig as assumed do not describe the record
     """
     record = record_of(posterior)
-    residuals = residuals_of(posterior)
     try:
         check = check_record(posterior)
     except InferenceError:  # too few draws, which the message tells
         check = None
+    residuals = residuals_of(posterior)  # after the check has let its own go: of a long record they are large
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # which is told in words
         unloaded = zero_load(record)

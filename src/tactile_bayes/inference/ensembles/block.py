@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -63,13 +64,15 @@ class WalkingEnsembles:
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown()
 
-    def make_block(self, steps: int) -> Block:
-        """Make steps; fewer than asked for if an interrupt comes, after which there are no more."""
+    def make_block(self, steps: int, deadline: float = math.inf) -> Block:
+        """Make steps; at least one, but fewer than asked for once the clock passes the deadline, or if an interrupt
+        comes, after which there are no more.
+        """
         chains, walkers, parameters = self._shape
         samples, values = np.empty((chains, steps, walkers, parameters)), np.empty((chains, steps, walkers))
         made, randoms, whole = 0, tuple[RandomState, ...](), True
         try:
-            while made < steps:
+            while made < steps and not (made and time.monotonic() > deadline):
                 waiting = [self._pool.submit(self._together.step, states) for states in self._ensembles]
                 failures = [failure for failure in (one.exception() for one in waiting) if failure is not None]
                 for failure in sorted(failures, key=lambda f: isinstance(f, threading.BrokenBarrierError)):

@@ -8,6 +8,8 @@ import re
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -54,14 +56,14 @@ class Checkpoint:
         """Steps of each ensemble that are there."""
         return self._ends[-1] if self._ends else 0
 
-    def read(self, since: int) -> Block:
-        """The steps from `since` on, in one block."""
-        begins = [0, *self._ends]
-        parts = [self._read(a, b) for a, b in zip(begins, self._ends, strict=False) if b > since]
-        dropped = since - (self.steps - sum(part.steps for part in parts))
-        samples = np.concatenate([part.samples for part in parts], axis=1)[:, dropped:]
-        values = np.concatenate([part.log_probability for part in parts], axis=1)[:, dropped:]
-        return Block(samples, values, parts[-1].random_states)
+    def read(self, since: int) -> Iterator[Block]:
+        """The steps from `since` on, block by block."""
+        for begin, end in pairwise([0, *self._ends]):
+            if end > since:
+                block, dropped = self._read(begin, end), max(0, since - begin)
+                yield replace(
+                    block, samples=block.samples[:, dropped:], log_probability=block.log_probability[:, dropped:]
+                )
 
     def write(self, block: Block, seconds: float) -> None:
         """Append a block, made after `seconds` [s] of the whole run."""

@@ -26,7 +26,7 @@ class Draws:
     names: tuple[str, ...]
     walkers: int
     steps_kept: int
-    """Steps of each walker that are in `samples`: the second half of those it made."""
+    """Steps of each walker that are in `samples`: of the second half of those it made, every `every`-th."""
     steps_run: int
     r_hat: Floats
     """Rank-normalised R̂ per parameter across ensembles, each cut in early and late steps: a common drift shows too."""
@@ -53,6 +53,8 @@ class Draws:
     """Number of walkers that did not move in all the steps kept."""
     places: tuple[Place, ...] = ()
     """Where ensembles sit if each has come to rest but not all in one place; else empty."""
+    every: int = 1
+    """1, or a power of two where the second half of the steps is more than memory should hold."""
 
     def refuse_interrupted(self, what: str) -> None:
         """Pass an interrupt on that ended the run: for what cannot use a part of it."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["Mixture", "Proposal", "approximate"]
@@ -123,13 +124,15 @@ class Mixture:
 
     @property
     def shares(self) -> Floats:
-        """Of the parts, in proportion to the target's integral."""
-        return _weights(np.array([part.log_mass for part in self.parts]))
+        """Of the parts, in proportion to the target's integral; equal where that is not known of any."""
+        masses = np.array([part.log_mass for part in self.parts])
+        return _weights(masses if np.any(np.isfinite(masses)) else np.zeros(masses.size))
 
     @property
     def efficiency(self) -> float:
         """Of the parts together, as if each kept to its own mode."""
-        return float(1.0 / np.sum(self.shares / np.array([part.efficiency for part in self.parts])))
+        each = np.array([part.efficiency for part in self.parts])
+        return float(1.0 / np.sum(self.shares / each)) if np.all(each > 0.0) else 0.0
 
     @property
     def digest(self) -> str:
@@ -149,17 +152,23 @@ class Mixture:
 
 
 def approximate(
-    log_probability: LogProbability, centre: Floats, covariance: Floats, rng: np.random.Generator
+    log_probability: LogProbability,
+    centre: Floats,
+    covariance: Floats,
+    rng: np.random.Generator,
+    deadline: Deadline = NEVER,
 ) -> Proposal:
     """The proposal nearest to a target that some rounds of importance sampling find, by a guess at mean and covariance.
 
     Draws of one round, weighted by the target, say what the next one draws from; of all rounds that counts which was
     the most efficient (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
-    10.1198/106186004X12803).
+    10.1198/106186004X12803). Past the deadline there is no further round.
     """
     proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)))
     best = proposal
     for _ in range(_ROUNDS):
+        if deadline.has_passed:
+            break
         points, density = proposal.draw(rng, _DRAWS * centre.size)
         surplus = log_probability(points) - density
         if not np.isfinite(surplus).sum() > _HELD * centre.size:

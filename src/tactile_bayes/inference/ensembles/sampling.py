@@ -19,6 +19,7 @@ from tactile_bayes.inference.ensembles.coordinates import Coordinates, Plain, in
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.identity import identity_of_run
+from tactile_bayes.inference.ensembles.kept import KeptSteps
 from tactile_bayes.inference.ensembles.places import places_in_words, places_of
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability
@@ -153,14 +154,15 @@ def sample(
             stored = stack.enter_context(open_checkpoint(checkpoint, about, (chains, walkers, parameters)))
         if stored is not None and stored.steps:
             steps = stored.steps
-            last = stored.read(since=steps // 2)
-            kept, kept_values = _as_parameters(last, coordinates)
+            kept = KeptSteps(coordinates, points, steps // 2, steps)
+            for last in stored.read(since=steps // 2):
+                kept.append(last)
             evaluations_before, seconds_before = chains * walkers * (1 + steps), stored.seconds
             if steps in (stored.judged, next_look(steps - 1, settings.block_steps)) or steps >= settings.max_steps:
                 look = steps  # else it was killed on its way to a look
         else:
             last = _beginning(points, walked, seed)
-            kept, kept_values = last.samples[:, 1:], last.log_probability[:, 1:]
+            kept = KeptSteps(coordinates, points)
         ensembles = stack.enter_context(
             WalkingEnsembles(
                 walked, coordinates.moves, last.samples[:, -1], last.log_probability[:, -1], last.random_states
@@ -169,31 +171,32 @@ def sample(
 
         while not ending:
             look = look or min(next_look(steps, settings.block_steps), settings.max_steps)
-            blocks: list[Block] = []
             while steps < look and not ending:
-                blocks.append(ensembles.make_block(min(settings.block_steps, look - steps)))
-                steps += blocks[-1].steps
+                block = ensembles.make_block(min(settings.block_steps, look - steps), deadline)
+                steps += block.steps
                 try:
-                    if not blocks[-1].whole:
+                    if not block.whole:
                         ending = _INTERRUPTED
                     elif stored is not None:
-                        stored.write(blocks[-1], seconds_before + time.monotonic() - began)
+                        stored.write(block, seconds_before + time.monotonic() - began)
                 except KeyboardInterrupt:
                     ending = _INTERRUPTED
+                try:
+                    kept.append(block)
+                except KeyboardInterrupt:
+                    ending = _INTERRUPTED
+                    kept.append(block)
                 if not ending and time.monotonic() > deadline:
                     ending = _OUT_OF_TIME
             if not steps:
                 raise KeyboardInterrupt
             look = 0
-            later_half = slice(steps // 2 - steps, None)
-            new = [_as_parameters(block, coordinates) for block in blocks]
-            kept = np.concatenate([kept, *(points for points, _ in new)], axis=1)[:, later_half]
-            kept_values = np.concatenate([kept_values, *(values for _, values in new)], axis=1)[:, later_half]
+            samples, values = kept.second_half()
             try:
-                diagnosis = Diagnosis(kept)
+                diagnosis = Diagnosis(samples)
             except KeyboardInterrupt:
-                ending, diagnosis = _INTERRUPTED, Diagnosis(kept)
-            lost = lost_walkers(kept_values)
+                ending, diagnosis = _INTERRUPTED, Diagnosis(samples)
+            lost = lost_walkers(values)
             if ending != _INTERRUPTED and not lost and diagnosis.satisfies(settings.max_r_hat, enough):
                 ending = _CONVERGED
             elif not ending and steps >= settings.max_steps:
@@ -208,9 +211,9 @@ def sample(
             except KeyboardInterrupt:
                 ending = ending or _INTERRUPTED
 
-    moved = np.any(kept[:, 1:] != kept[:, :-1], axis=-1)  # (chain, step, walker)
+    moved = kept.moved
     stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
-    places = () if ending == _CONVERGED else places_of(kept, kept_values, names)
+    places = () if ending == _CONVERGED else places_of(samples, values, names)
     message = f"{ending} after {steps} steps: {diagnosis.in_words(names)}"
     if ending != _CONVERGED:
         message += f"; wanted are R̂ below {settings.max_r_hat:g} and an effective sample size of {enough:.0f}"
@@ -223,17 +226,18 @@ def sample(
     if stuck:
         message += f"; {stuck} of {chains * walkers} walkers did not move in the steps kept: look where they sit"
     return Draws(
-        samples=walker_major(kept),
-        log_probability=walker_major(kept_values),
+        samples=walker_major(samples),
+        log_probability=walker_major(values),
         names=names,
         walkers=walkers,
-        steps_kept=kept.shape[1],
+        steps_kept=samples.shape[1],
+        every=kept.every,
         steps_run=steps,
         r_hat=diagnosis.r_hat,
         ess_bulk=diagnosis.ess_bulk,
         ess_tail=diagnosis.ess_tail,
         acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
-        autocorrelation_time=autocorrelation_time(kept),
+        autocorrelation_time=kept.every * autocorrelation_time(samples),
         evaluations=evaluations_before + target.evaluations,
         seconds=seconds_before + time.monotonic() - began,
         converged=ending == _CONVERGED,
@@ -241,13 +245,6 @@ def sample(
         stuck=stuck,
         places=places,
     )
-
-
-def _as_parameters(block: Block, coordinates: Coordinates) -> tuple[Floats, Floats]:
-    """Parameters of a block, and their log-probability."""
-    shape = block.samples.shape
-    points, growth = coordinates.parameters(block.samples.reshape(-1, shape[-1]))
-    return points.reshape(shape), block.log_probability - growth.reshape(shape[:-1])
 
 
 def _beginning(points: Floats, target: LogProbability, seed: Seed) -> Block:

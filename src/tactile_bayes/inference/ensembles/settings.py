@@ -29,8 +29,8 @@ class SamplerSettings:
         faster with more of them, but every one of them has to forget its start.
     block_steps : int
         Steps before the first look at the diagnostics, and the least between later ones, which come when the number of
-        steps has grown by a quarter. Also the steps between two looks at the clock, and between two files of a
-        checkpoint: what a killed run has to make again.
+        steps has grown by a quarter. Also the steps between two files of a checkpoint: what a killed run has to make
+        again.
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
@@ -39,9 +39,14 @@ class SamplerSettings:
     max_steps : int
         Steps after which each ensemble stops, converged or not.
     max_seconds : float, optional
-        Time after which the ensembles stop [s], at the end of a block of at most `block_steps`. A run that ends by it
-        is not reproducible from its seed. It counts from the call: a run that goes on from a checkpoint has all of it
-        again.
+        Time after which a posterior is content with what it has [s], counted from the call: the search for a start
+        ends with the step that it is in, and the ensembles with theirs, of which they make at least one. It is
+        exceeded by these steps, by a look at what is likely around the start (some 60 points for each parameter) and by
+        the last diagnosis: a few seconds in all, more for records of thousands of samples, and for the first
+        posterior after an installation, which waits for compilers. What is predicted from the draws, and files and
+        figures, come after it. A run that ends by it is not reproducible from its seed. A run that goes on from a
+        checkpoint has all of the time again; its search for a start, which must come to the same end each time, is
+        counted, but not cut short.
 
     Raises
     ------

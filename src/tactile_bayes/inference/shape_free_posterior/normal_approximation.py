@@ -30,6 +30,9 @@ _TELLING = 0.03
 _SURE = 0.01
 """Standard deviation of a snap-off, over half a step of the drive, below which nothing more is asked of it."""
 
+_RIDGE = 1e-12
+"""Share by which precisions are raised, so that they stay positive definite where rounding is as large as the least."""
+
 _BRAVE = 4.0
 """Residual in standard deviations from which on a reading pulls less than by its square."""
 
@@ -93,7 +96,8 @@ class Observer:
         cell = model.likelihood.load_cell
         beyond = cell.expected(model.nuisances.sensed(loads, values, cell)) - model.likelihood.measured
         late = (model.likelihood.snap_offs(contours, rig) - self._end) / self._width
-        return beyond / self.noise, agree, late[:, self.ends]
+        beyond /= self.noise
+        return beyond, agree, late[:, self.ends]
 
     def insist(self, point: Floats) -> bool:
         """Take snap-offs for better known that a point, (1, parameters), has where the record has none; any there?"""
@@ -160,6 +164,7 @@ class NormalApproximation:
         precision = through @ np.swapaxes(through, 1, 2)
         diagonal = np.arange(self.prior.mean.size)
         precision[:, diagonal, diagonal] += self.prior.precision
+        precision[:, diagonal, diagonal] *= 1.0 + _RIDGE
         root = np.linalg.cholesky(precision)
         pull = through @ (certainty * self._seen)[..., None] + (self.prior.precision * self.prior.mean)[:, None]
         return np.linalg.solve(root, pull)[..., 0], np.asarray(root)
@@ -200,14 +205,15 @@ def _linearised(
     residual, agree, late = observer(contours, dict(zip(model.nuisances.names, points[:, nodes + 2 :].T, strict=True)))
     # A sample that only one of two has touched says nothing about how loads change.
     smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
-    found = []
+    seen, counts = [], []
     for channels, scale in zip(model.noise.channels, scales[2:], strict=True):
         chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
         of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
-        weight = np.minimum(1.0, _BRAVE * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
-        found.append(of_kind * weight)
-    readings = np.array([float(of_kind.shape[1]) for of_kind in found])
-    seen = [_condensed(of_kind, centre, units) for of_kind in (*found, late)]
+        of_kind *= np.minimum(1.0, _BRAVE * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
+        counts.append(float(of_kind.shape[1]))
+        seen.append(_condensed(of_kind, centre, units))
+    readings = np.array(counts)
+    seen.append(_condensed(late, centre, units))
     kinds = np.repeat(np.arange(len(seen)), [len(values) for _, values in seen])
     return (
         np.concatenate([slopes for slopes, _ in seen]),
@@ -223,7 +229,8 @@ def _condensed(residual: Floats, centre: Floats, units: Floats) -> tuple[Floats,
     What is not there at one of the points, like a snap-off where the rod does not reach, says nothing.
     """
     size = centre.size
-    residual = residual[:, np.isfinite(residual).all(axis=0)]
+    finite = np.isfinite(residual).all(axis=0)
+    residual = residual if finite.all() else residual[:, finite]
     slopes = (residual[:size] - residual[size:-1]).T / (2.0 * _STEP)
     axes, sizes, across = np.linalg.svd(slopes, full_matrices=False)
     telling = sizes > _TELLING

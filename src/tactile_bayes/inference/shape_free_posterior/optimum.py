@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
     LinearPrior,
     NormalApproximation,
@@ -41,11 +42,12 @@ _DRAWS = 4000
 """From a prior, for its mean and standard deviation."""
 
 
-def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator) -> Whitening:
+def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:
     """Coordinates that belong to the posterior's centre, which is sought from a point, shape (parameters,).
 
     Gauss's and Newton's steps, shortened as long as they lead down, alternate with the likeliest scales, of which
     linear loads give the evidence in closed form. A snap-off that is not where the record has it is insisted upon.
+    Past the deadline, the best place so far is the centre.
     """
     observer, prior = Observer(model), _linear_prior(model, rng)
     (scales,), (linear,) = split(model, point[None])
@@ -57,13 +59,13 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator) -
         density = observer.log_density(joined(np.tile(scales, (len(tried), 1)), tried))
         density -= 0.5 * (np.square(tried - prior.mean) * prior.precision).sum(axis=1)
         linear, before, best = tried[np.argmax(density)], best, float(density.max())
-        if best - before < _GAINED:
+        if best - before < _GAINED or deadline.has_passed:
             here = joined(scales[None], linear[None])
             probability = float(model.log_probability(here)[0])
             if probability <= found[0]:
                 break
             found, best = (probability, scales, linear), -np.inf
-            if not observer.insist(here):
+            if deadline.has_passed or not observer.insist(here):
                 break
     _, scales, linear = found
     return Whitening(NormalApproximation(observer, prior, scales, linear), scales)

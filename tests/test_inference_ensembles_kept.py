@@ -1,0 +1,105 @@
+"""Steps of a run that are kept: which, whatever blocks they come in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_bayes.inference.ensembles import Logarithms, Plain, SamplerSettings, kept, sample
+from tactile_bayes.inference.ensembles.block import Block
+from tactile_bayes.inference.ensembles.kept import KeptSteps
+
+SHAPE = (2, 4, 3)
+"""Chains, walkers, parameters: 24 numbers a step."""
+
+
+def walked(steps):
+    """Coordinates of walkers before the first and after each of these steps, some of which do not move them."""
+    rng = np.random.default_rng(1)
+    moves = rng.normal(size=(2, steps + 1, 4, 3)) * (rng.random((2, steps + 1, 4, 1)) < 0.5)
+    return np.cumsum(moves, axis=1)
+
+
+def appended(samples, ends, coordinates):
+    keeping = KeptSteps(coordinates, samples[:, 0])
+    for begin, end in zip([0, *ends], ends, strict=False):
+        part = samples[:, begin + 1 : end + 1]
+        keeping.append(Block(part, part.sum(axis=-1), ()))
+    return keeping
+
+
+@pytest.fixture
+def little_memory(monkeypatch):
+    """No more than ten steps are kept."""
+    monkeypatch.setattr(kept, "_MOST", 10 * 24)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 7, 20])
+@pytest.mark.usefixtures("little_memory")
+def test_of_few_steps_the_second_half_is_kept(steps):
+    samples = walked(steps)
+    keeping = appended(samples, [steps], Plain())
+    points, values = keeping.second_half()
+    np.testing.assert_array_equal(points, samples[:, steps // 2 + 1 :])
+    np.testing.assert_array_equal(values, points.sum(axis=-1))
+    moved = np.any(points[:, 1:] != points[:, :-1], axis=-1)
+    np.testing.assert_array_equal(keeping.moved, moved)
+    assert keeping.every == 1
+
+
+@pytest.mark.parametrize(("steps", "every"), [(21, 2), (22, 2), (43, 4), (100, 8)])
+@pytest.mark.usefixtures("little_memory")
+def test_of_many_steps_every_so_manieth_is_kept(steps, every):
+    """And whether walkers moved is known of all of them."""
+    samples = walked(steps)
+    keeping = appended(samples, [steps], Plain())
+    points, _ = keeping.second_half()
+    assert keeping.every == every
+    assert points.shape[1] <= 11
+    number = np.arange(steps + 1)
+    np.testing.assert_array_equal(points, samples[:, (number > steps // 2) & (number % every == 0)])
+    np.testing.assert_array_equal(keeping.moved, np.any(np.diff(samples[:, steps // 2 + 1 :], axis=1) != 0.0, axis=-1))
+
+
+@pytest.mark.usefixtures("little_memory")
+def test_blocks_and_looks_make_no_difference():
+    steps, positive = 90, Logarithms(np.array([True, False, True]))
+    samples = 0.01 * walked(steps)
+    whole = appended(samples, [steps], positive)
+    parts = appended(samples, [3, 10, 11, 40], positive)
+    parts.second_half()
+    for begin, end in ((40, 47), (47, 80), (80, 90)):
+        part = samples[:, begin + 1 : end + 1]
+        parts.append(Block(part, part.sum(axis=-1), ()))
+    resumed = KeptSteps(positive, samples[:, 0], 45, 90)
+    part = samples[:, 46:]
+    resumed.append(Block(part, part.sum(axis=-1), ()))
+    for other in (parts, resumed):
+        for one, another in zip(whole.second_half(), other.second_half(), strict=True):
+            np.testing.assert_array_equal(one, another)
+        np.testing.assert_array_equal(whole.moved, other.moved)
+        assert whole.every == other.every > 1
+
+
+def test_a_thinned_run_is_the_same_run(monkeypatch, tmp_path):
+    """Steps, acceptance and autocorrelation time are of all steps, also where a run goes on from a checkpoint."""
+    settings = SamplerSettings(ensembles=2, walkers=8, block_steps=50, max_steps=1600, min_ess=1e9)
+    start = np.random.default_rng(0).normal(size=(2, 8, 1))
+
+    def drawn(**options):
+        chosen = SamplerSettings(**{**settings.__dict__, **options.pop("settings", {})})
+        return sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=1, settings=chosen, **options)
+
+    whole = drawn()
+    monkeypatch.setattr(kept, "_MOST", 16 * 250)
+    thinned = drawn()
+    assert (whole.every, thinned.every) == (1, 4)
+    assert (whole.steps_kept, thinned.steps_kept, thinned.steps_run) == (800, 200, 1600)
+    np.testing.assert_array_equal(thinned.by_walker(), whole.by_walker()[:, :, 3::4])
+    np.testing.assert_array_equal(thinned.acceptance, whole.acceptance)
+    # Walkers forget within two steps, so that of every fourth the time is as good as its least, four.
+    assert thinned.autocorrelation_time[0] == pytest.approx(4.0, rel=0.3)
+    drawn(checkpoint=tmp_path, settings={"max_steps": 930})
+    resumed = drawn(checkpoint=tmp_path)
+    np.testing.assert_array_equal(resumed.samples, thinned.samples)
+    np.testing.assert_array_equal(resumed.acceptance, thinned.acceptance)
