@@ -118,7 +118,7 @@ def infer_contour(
     -------
     xr.DataTree
         In ArviZ's layout and the record's units, a chain being an ensemble: `posterior`, `sample_stats`, `prior`,
-        `posterior_predictive` and `log_likelihood` (by sample; of some of the draws, and of fewer for more than 5,000
+        `posterior_predictive` and `log_likelihood` (by sample; of some of the draws, and of fewer for more than 4,000
         samples), `events` (first contact and snap-off of each sweep, of 250 draws of each chain), `observed_data`,
         `constant_data`. Attributes: version, seed,
         settings, hash of the data, `converged` and a `message` in words. A KeyboardInterrupt (Ctrl-C) while walkers

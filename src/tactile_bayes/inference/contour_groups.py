@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 _KEPT_DRAWS = 250
 """Draws of each chain for which predictions and events are stored, at most."""
 
-_STORED_NUMBERS = 20_000_000
-"""Numbers in predictions and log-likelihoods, 160 MB, beyond which they are stored of fewer draws: from 5,000 samples
+_STORED_NUMBERS = 16_000_000
+"""Numbers in predictions and log-likelihoods, 128 MB, beyond which they are stored of fewer draws: from 4,000 samples
 on, with four chains."""
 
 _FEWEST_PREDICTIONS = 100
