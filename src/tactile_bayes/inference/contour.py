@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.contours import Contour
-from tactile_bayes.errors import InferenceError
+from tactile_bayes.errors import InferenceError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
@@ -35,6 +35,7 @@ from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.rod import Rod
 
 __all__ = ["Sampled", "contours_of", "infer_contour", "sampled"]
@@ -208,17 +209,18 @@ def sampled(
     """The posterior of a problem; see `infer_contour`. Walkers walk as they would anyway, or as is said; the group of
     prior draws may be left out.
     """
-    model, seeds = problem.model, spawn(seed, 4)
+    seeds = spawn(seed, 4)
     deadline = Deadline.after(settings.max_seconds)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         if walk is None:
             # A run that goes on from a checkpoint has to start where it did, however late it was then.
-            walk = walk_of(model, seeds[0], settings, NEVER if checkpoint is not None else deadline)
-            if walk.beyond:
-                raise InferenceError(
-                    f"the record wants {walk.beyond}: give a wider prior, or are units, rod and base right? "
-                    + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
-                )
+            problem, walk = _likeliest(problem, seeds[0], settings, NEVER if checkpoint is not None else deadline)
+        model = problem.model
+        if walk.beyond:
+            raise InferenceError(
+                f"the record wants {walk.beyond}: give a wider prior, or are units, rod and base right? "
+                + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
+            )
         draws = sample(
             model.log_probability,
             walk.start,
@@ -241,6 +243,33 @@ def sampled(
     whole = xr.DataTree.from_dict({**{name: group.to_dataset() for name, group in tree.children.items()}, **groups})
     whole.attrs = tree.attrs
     return Sampled(whole, draws, walk.coordinates)
+
+
+def _likeliest(
+    problem: ContourProblem, seed: np.random.SeedSequence, settings: SamplerSettings, deadline: Deadline
+) -> tuple[ContourProblem, Walk]:
+    """Of a problem and those with other sides of contact the one with the most evidence, and where its walkers start.
+
+    The sides that are taken, and how probable they are, are among what is said about it.
+    """
+    if not problem.others:
+        return problem, walk_of(problem.model, seed, settings, deadline)
+    found: list[tuple[float, ContourProblem, Walk]] = []
+    failure: InferenceError | ReachError | None = None
+    for one in (problem, *problem.others):
+        try:
+            walk = walk_of(one.model, seed, settings, deadline)
+        except (InferenceError, ReachError) as error:
+            failure = failure or error
+            continue
+        found.append((walk.log_evidence + one.log_prior_odds, one, walk))
+    if not found and failure is not None:
+        raise failure
+    best, chosen, walk = max(found, key=lambda each: each[0])
+    known = np.isfinite(best)
+    shares = np.exp([each[0] - best for each in found]) if known else np.ones(len(found))
+    doubt = {"doubtful_sides": chosen.about[CONTACT_SIDES], "sides_probability": float(1.0 / shares.sum())}
+    return chosen._replace(about={**chosen.about, **doubt}), walk
 
 
 def contours_of(draws: xr.Dataset, family: str) -> Contour:

@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,14 +20,29 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.families import Family, Prior, refuse_no_prior
 from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.likelihood import without_errors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import loaded_samples
+from tactile_bayes.reconstruction import (
+    CONTACT_SIDES,
+    OTHER_SIDE,
+    doubtful_sweeps,
+    loaded_samples,
+    side_of,
+    with_sides,
+)
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 
 __all__ = ["ContourProblem", "contour_priors", "contour_problem", "default_priors", "prior_in_words"]
+
+
+_MOST_DOUBTFUL = 2
+"""Sweeps of which both sides are tried, the most doubtful: each of them doubles what there is to compare."""
+
+_BELIEVED = float(np.log(10.0))
+"""Logarithm of how much likelier a direction is to say the side than not, where the record leaves doubt."""
 
 
 class ContourProblem(NamedTuple):
@@ -36,6 +52,11 @@ class ContourProblem(NamedTuple):
     about: Mapping[str, Any]
     loaded: NDArray[np.bool_]
     """Which of the record's samples carry a load that noise does not explain."""
+
+    others: tuple[ContourProblem, ...] = ()
+    """The same with other sides of contact, where the record leaves doubt of them."""
+    log_prior_odds: float = 0.0
+    """Of its sides of contact over those that directions say."""
 
     @property
     def identity(self) -> dict[str, str]:
@@ -64,7 +85,48 @@ def contour_problem(
     nuisances: Sequence[str],
     events: bool,
 ) -> ContourProblem:
-    """What `infer_contour` is asked for, as it says."""
+    """What `infer_contour` is asked for, as it says; with the problems of other sides of contact beside it."""
+
+    def of_sides(record: xr.Dataset) -> ContourProblem:
+        return _contour_problem(
+            record,
+            family=family,
+            load_cell=load_cell,
+            priors=priors,
+            rod=rod,
+            friction=friction,
+            nuisances=nuisances,
+            events=events,
+        )
+
+    problem = of_sides(measured)
+    cell = problem.model.noise.cell
+    doubtful = doubtful_sweeps(without_errors(problem.model.measured, cell), cell)[:_MOST_DOUBTFUL]
+    if not doubtful:
+        return problem
+    measured = validate(measured)
+    stated = {sweep: side_of(measured, sweep) for sweep in doubtful}
+    every = []
+    for turned in product((False, True), repeat=len(doubtful)):
+        sides = {
+            sweep: OTHER_SIDE[stated[sweep]] if turn else stated[sweep]
+            for sweep, turn in zip(doubtful, turned, strict=True)
+        }
+        every.append(of_sides(with_sides(measured, sides))._replace(log_prior_odds=-_BELIEVED * sum(turned)))
+    return every[0]._replace(others=tuple(every[1:]))
+
+
+def _contour_problem(
+    measured: xr.Dataset,
+    *,
+    family: str,
+    load_cell: LoadCell | None,
+    priors: Mapping[str, Prior] | None,
+    rod: Rod | None,
+    friction: float,
+    nuisances: Sequence[str],
+    events: bool,
+) -> ContourProblem:
     measured = with_rod(validate(measured), rod)
     check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     check_switch("events", events)
@@ -101,6 +163,7 @@ def contour_problem(
         "priors": json.dumps({name: prior_in_words(prior) for name, prior in chosen_priors.items()}),
         "units": measured.attrs["units"],
         "load_cell_frame": frame_of(measured),
+        **{name: measured.attrs[name] for name in (CONTACT_SIDES,) if name in measured.attrs},
         **{name: measured.attrs[name] for name in ("rod_length", "rod_flexural_rigidity", "rod_diameter")},
         "approximations": "; ".join(noise.cell.approximations),
         **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name not in noise.inferred},

@@ -111,7 +111,8 @@ def _whitened(
         seed=seed,
         settings=replace(settings, walkers=settings.walkers or max(48, 2 * count)),
     )
-    return Walk(start, whitening)
+    # Of a posterior that is standard normal in these coordinates the density in the middle is all that differs.
+    return Walk(start, whitening, float(log_probability(whitening.middle[None])[0]))
 
 
 def _misfit(model: ContourModel, point: Floats) -> float:

@@ -24,7 +24,7 @@ from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, t
 if TYPE_CHECKING:
     from tactile_bayes.compiled.loads import Strokes
 
-__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood", "Rig", "bases_of"]
+__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood", "Rig", "bases_of", "without_errors"]
 
 Floats = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ class RecordLikelihood:
         self.noise = self.load_cell.noise
         angle = record.drive_angle.values - load_cell.misread(measured.direction.values)
         self._turn = angle if frame_of(record) == "turning" else None
-        backward = contact_sides(_without_errors(measured, load_cell), load_cell) < 0.0
+        backward = contact_sides(without_errors(measured, load_cell), load_cell) < 0.0
         places = np.stack([measured.base_x.values, measured.base_y.values], axis=-1)
         pivots = {base: k for k, base in enumerate(bases_of(measured))}
         sense = np.where(measured.direction.values == "backward", -1.0, 1.0)
@@ -398,7 +398,7 @@ def bases_of(measured: xr.Dataset) -> list[tuple[float, float]]:
     return list(dict.fromkeys(zip(measured.base_x.values.tolist(), measured.base_y.values.tolist(), strict=True)))
 
 
-def _without_errors(measured: xr.Dataset, load_cell: LoadCell) -> xr.Dataset:
+def without_errors(measured: xr.Dataset, load_cell: LoadCell) -> xr.Dataset:
     """The record with the cell's known errors taken out; where channels are missing, those of the moment alone."""
     if len(present_channels(measured)) == len(CHANNELS):
         return load_cell.corrected(measured)

@@ -107,7 +107,11 @@ def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
 
 def record_of(posterior: xr.DataTree) -> xr.Dataset:
     """The record that a contour was inferred from, with the rod and the load cell that were taken for it."""
-    kept = {name: value for name, value in posterior.attrs.items() if str(name).startswith(("rod_", "load_cell_"))}
+    kept = {
+        name: value
+        for name, value in posterior.attrs.items()
+        if str(name).startswith(("rod_", "load_cell_", "contact_sides"))
+    }
     columns = [posterior[group].to_dataset() for group in ("constant_data", "observed_data")]
     return xr.merge(columns).assign_attrs({"units": posterior.attrs["units"], **kept})
 

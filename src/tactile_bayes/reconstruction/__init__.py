@@ -2,12 +2,21 @@
 
 from tactile_bayes.reconstruction.estimate import STATUSES
 from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, loaded_samples, samples_of
-from tactile_bayes.reconstruction.sides import contact_sides, doubtful_sweeps, with_sides
+from tactile_bayes.reconstruction.sides import (
+    CONTACT_SIDES,
+    OTHER_SIDE,
+    contact_sides,
+    doubtful_sweeps,
+    side_of,
+    with_sides,
+)
 from tactile_bayes.reconstruction.step2 import AXIAL_ALARM, reconstruct
 
 __all__ = [
     "AXIAL_ALARM",
+    "CONTACT_SIDES",
     "FALSE_ALARM",
+    "OTHER_SIDE",
     "STATUSES",
     "Samples",
     "contact_sides",
@@ -15,5 +24,6 @@ __all__ = [
     "loaded_samples",
     "reconstruct",
     "samples_of",
+    "side_of",
     "with_sides",
 ]

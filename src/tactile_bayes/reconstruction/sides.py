@@ -14,13 +14,15 @@ from tactile_bayes.load_cell import LoadCell, rough_noise
 from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 
-__all__ = ["contact_sides", "doubtful_sweeps", "with_sides"]
+__all__ = ["CONTACT_SIDES", "OTHER_SIDE", "contact_sides", "doubtful_sweeps", "side_of", "with_sides"]
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_ATTRIBUTE = "contact_sides"
+CONTACT_SIDES = "contact_sides"
 """Of a record: a JSON object from sweep to the direction of a sweep that touches the object from that side."""
+
+OTHER_SIDE = {"forward": "backward", "backward": "forward"}
 
 _CONTRADICTED, _DOUBTED = -6.0, -2.0
 """Mean moment in contact, on the direction's side of the zero, in standard errors, below which the direction is not
@@ -71,6 +73,11 @@ def doubtful_sweeps(record: xr.Dataset, load_cell: LoadCell | None = None) -> tu
     return tuple(sweep for score, sweep in sorted(scores) if _CONTRADICTED <= score < _DOUBTED)
 
 
+def side_of(record: xr.Dataset, sweep: int) -> str:
+    """The side that the direction of a sweep says."""
+    return str(record.direction.values[np.argmax(record.sweep.values == sweep)])
+
+
 def with_sides(record: xr.Dataset, sides: Mapping[int, str]) -> xr.Dataset:
     """The record with the sides of some sweeps stated: "forward" as a forward sweep touches, or "backward".
 
@@ -91,11 +98,11 @@ def with_sides(record: xr.Dataset, sides: Mapping[int, str]) -> xr.Dataset:
         if sweep not in record.sweep.values or side not in ("forward", "backward"):
             raise ParameterError(f"there is no side {side!r} of sweep {sweep!r}: give sweeps, each forward or backward")
     every = {**_stated(record), **{int(sweep): side for sweep, side in sides.items()}}
-    return record.assign_attrs({_ATTRIBUTE: json.dumps(every)})
+    return record.assign_attrs({CONTACT_SIDES: json.dumps(every)})
 
 
 def _stated(record: xr.Dataset) -> dict[int, str]:
-    return {int(sweep): side for sweep, side in json.loads(record.attrs.get(_ATTRIBUTE, "{}")).items()}
+    return {int(sweep): side for sweep, side in json.loads(record.attrs.get(CONTACT_SIDES, "{}")).items()}
 
 
 def _scores(record: xr.Dataset, load_cell: LoadCell | None) -> list[tuple[int, Index, float]]:
@@ -124,7 +131,7 @@ def _scores(record: xr.Dataset, load_cell: LoadCell | None) -> list[tuple[int, I
         mean, error = (zeros.mean(), noise / np.sqrt(zeros.size)) if zeros.size >= FEWEST else (0.0, unknown)
         apart = moment[inside] - mean
         most = np.quantile(np.abs(apart), _ALL_BUT_OUTLIERS)
-        error = np.sqrt(error**2 + noise**2 / inside.size + (_WANDER * noise) ** 2)
+        error = np.hypot(error, noise * np.hypot(_WANDER, 1.0 / np.sqrt(inside.size)))
         sign = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
         found.append((int(sweep[rows[0]]), rows, float(sign * np.clip(apart, -most, most).mean() / error)))
     return found

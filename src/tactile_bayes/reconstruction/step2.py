@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Literal
 
 import numpy as np
@@ -17,7 +18,8 @@ from tactile_bayes.reconstruction.constrained import constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
-from tactile_bayes.record import COLUMNS, validate, with_rod
+from tactile_bayes.reconstruction.sides import OTHER_SIDE, doubtful_sweeps, side_of, with_sides
+from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
 from tactile_bayes.rod import Rod
 from tactile_bayes.touching import PLACE
 
@@ -29,6 +31,10 @@ _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 AXIAL_ALARM = 6.0
 """Size of the axial score beyond which the force along the rod is told not to agree with the moment."""
+_NO_CONTACT = 25.0
+"""Misfit of a loaded sample that no contact explains, at least."""
+_TWENTY_TO_ONE = 6.0
+"""Difference of misfits by which one of two sides is twenty times likelier."""
 _CLEAR = 3.0
 """Standard deviations from the edge between the phases at which the misfit is χ² with one degree of freedom."""
 
@@ -152,12 +158,46 @@ def reconstruct(
         remedy = "with such moments the pivot would give way by more than a turn: give radians per moment"
         raise refused("suspension_compliance", suspension_compliance, remedy)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
+    measured, doubtful = _with_likelier_sides(measured, cell, suspension_compliance, friction)
     samples = samples_of(measured, cell, suspension_compliance)
     estimate = _METHODS[method](samples, np.full(samples.side.size, np.arctan(friction)))
     kept = cell.corrected(measured)[list(_KEPT)].drop_attrs(deep=False)
     return kept.assign(_variables(estimate, samples, measured)).assign_attrs(
-        method=method, friction=friction, units=measured.attrs["units"], **_check(estimate, samples, cell, friction)
+        method=method,
+        friction=friction,
+        units=measured.attrs["units"],
+        **({"doubtful_sides": json.dumps(doubtful)} if doubtful else {}),
+        **_check(estimate, samples, cell, friction),
     )
+
+
+def _with_likelier_sides(
+    measured: xr.Dataset, cell: LoadCell, suspension_compliance: float, friction: float
+) -> tuple[xr.Dataset, dict[int, str]]:
+    """The record with the sides of doubtful sweeps stated, and these: as directions say, or the other that fits better.
+
+    Without any noise to go by there is no misfit, and directions are believed.
+    """
+    taken: dict[int, str] = {}
+    for sweep in doubtful_sweeps(_in_channels(measured, cell), cell):
+        stated = side_of(measured, sweep)
+        part = measured.isel(sample=np.flatnonzero(measured.sweep.values == sweep))
+        misfits = []
+        for side in (stated, OTHER_SIDE[stated]):
+            if not np.all(cell.unrest):
+                break
+            samples = samples_of(with_sides(part, {sweep: side}), cell, suspension_compliance)
+            found = constrained_estimate(samples, np.full(samples.side.size, np.arctan(friction))).misfit
+            none = np.nan if found is None else found
+            misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
+        fits_better = len(misfits) == 2 and misfits[1] < misfits[0] - _TWENTY_TO_ONE
+        taken[sweep] = OTHER_SIDE[stated] if fits_better else stated
+    return with_sides(measured, taken) if taken else measured, taken
+
+
+def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:
+    """The record with known errors taken out, if it has all channels; else it is refused later."""
+    return cell.corrected(measured) if len(present_channels(measured)) == len(CHANNELS) else measured
 
 
 def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> dict[str, tuple[str, object, object]]:

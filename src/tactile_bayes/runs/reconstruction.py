@@ -21,6 +21,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
 from tactile_bayes.record import validate
 from tactile_bayes.runs.picture import write_picture
+from tactile_bayes.uncertainty.verdicts import doubtful_sides
 
 __all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_in_words"]
 
@@ -136,7 +137,7 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
     told = [
         f"{found} contact point{'s' * (found != 1)} by the {contacts.attrs['method']} method; samples: {fates}.",
     ]
-    against = []
+    against = doubtful_sides(contacts.attrs)
     samples = int(contacts.attrs.get("misfit_samples", 0))
     if samples:
         total, chance = (float(contacts.attrs[name]) for name in ("misfit_sum", "misfit_probability"))

@@ -6,6 +6,7 @@ import json
 import math
 import warnings
 from collections.abc import Container, Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,7 +22,7 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.uncertainty.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.uncertainty.suspicions import suspicions
 
-__all__ = ["verdicts"]
+__all__ = ["doubtful_sides", "verdicts"]
 
 Floats = NDArray[np.float64]
 
@@ -93,7 +94,12 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # which is told in words
         unloaded = zero_load(record)
-    against = [*suspicions(record), *_off_zero(record, unloaded, residuals), *_moved_zero(posterior, record, unloaded)]
+    against = [
+        *suspicions(record),
+        *doubtful_sides(posterior.attrs),
+        *_off_zero(record, unloaded, residuals),
+        *_moved_zero(posterior, record, unloaded),
+    ]
     if check is not None and not check.attrs["passed"]:
         against.append(_not_described(posterior, check))
     if not posterior.attrs["converged"]:
@@ -114,6 +120,20 @@ def _inferred(posterior: xr.DataTree) -> list[str]:
     """Nuisance parameters of a run."""
     names: list[str] = json.loads(posterior.attrs.get("nuisances", "[]"))
     return names
+
+
+def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
+    """What the attributes of a posterior, or of contacts, say of sweeps that may have touched from either side."""
+    if "doubtful_sides" not in attrs:
+        return []
+    sides = json.loads(attrs["doubtful_sides"])
+    taken = ", ".join(f"sweep {sweep} as a {side} one" for sweep, side in sides.items())
+    probability = attrs.get("sides_probability")
+    sure = "" if probability is None else f", with probability {probability:.2g}"
+    return [
+        f"The moment leaves doubt on which side of the object it was touched; taken is {taken}{sure}. Is the sign of "
+        "the moment right, and the direction, and was the load cell tared?"
+    ]
 
 
 def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
