@@ -8,7 +8,7 @@ import pytest
 from tactile_bayes.compiled import compiler
 from tactile_bayes.contours import Joined, Parabola, ShapeFree
 from tactile_bayes.inference.family_names import family_named
-from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import in_frame
 from tactile_bayes.rod import Rod
@@ -79,6 +79,21 @@ def test_loads_and_usable_contours_are_those_of_the_arrays(name, rod):
     # Except for a sample at an event that falls on its other side.
     assert np.quantile(np.sqrt(np.square(off).sum(axis=(1, 2))), 0.95) < 0.015
     assert np.mean(off > 0.01) < 2e-3
+
+
+def test_events_are_those_of_the_arrays():
+    """To the tolerance of a snap-off, as read: with an offset, and with the backlash of each direction."""
+    likelihood = likelihood_of(THIN, is_always_clear=False)
+    contours = drawn("ellipse", THIN, 200)
+    rig = Rig(drive_angle_offset=0.02, drive_angle_backlash=0.01)
+    *_, usable, events = likelihood.predict_with_events(contours, rig)
+    likelihood.order = FINE_ORDER
+    *_, expected = likelihood.predict_with_events(contours, rig)
+    assert events.shape == (contours.shape[0], len(likelihood.strokes), 2)
+    assert np.count_nonzero(usable) > 30
+    off = np.abs(events - expected)[usable]
+    assert np.quantile(off, 0.99) < 1e-6
+    assert off[..., 0].max() < 1e-9
 
 
 def test_a_joint_with_an_edge_and_a_measured_shape_are_left_to_the_arrays():

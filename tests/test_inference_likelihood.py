@@ -11,9 +11,12 @@ from scipy import stats
 from scipy.optimize import brentq
 
 from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
@@ -294,3 +297,54 @@ def test_no_events_without_a_load():
     record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
     likelihood = RecordLikelihood(record, LoadCell(force_noise=0.05, moment_noise=0.02))
     assert (likelihood.event_samples(np.zeros(record.sizes["sample"], dtype=bool)) == -1).all()
+
+
+def exact_sensed(model, point):
+    """What the cell senses of one point, (1, samples, 3), from states at the drive angles to rounding."""
+    likelihood, rig = model.likelihood, model.rig(point)
+    paths = likelihood.paths(model.contours(point), rig, exact_events=True)
+    stroke = likelihood.stroke_of_sample
+    signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.strokes])[stroke]
+    found = paths.states(stroke, likelihood.seen_angles - signs * likelihood.misread(rig)[0]).wrench
+    loads = np.stack([signs * found.holding_moment, signs * found.force_x, found.force_y], axis=-1)
+    scaled = np.atleast_1d(rig.rigidity_scale)[:, None, None] * np.nan_to_num(loads)[None]
+    return model.nuisances.sensed(scaled, model.values(point), likelihood.load_cell)
+
+
+@pytest.mark.parametrize(
+    ("noise", "family", "count"),
+    [
+        (1.0, "parabola", 30),
+        pytest.param(1.0, "parabola", 1000, marks=pytest.mark.slow),
+        *(pytest.param(0.1, name, 100, marks=pytest.mark.slow) for name in ("parabola", "power-law", "ellipse")),
+    ],
+)
+def test_interpolation_is_not_felt_at_the_truth(noise, family, count):
+    """Log-likelihoods of default-prior records, near pivots too, are within 0.05 of the exact ones."""
+    cell = LoadCell(force_noise=0.05 * noise, moment_noise=0.02 * noise)
+    experiment = experiment_of(
+        seed=1,
+        family=family,
+        load_cell=cell,
+        rod=None,
+        base=(0.0, 0.0),
+        direction="both",
+        drive_angles=None,
+        priors=None,
+        nuisances=STANDARD,
+        friction=0.0,
+        events=True,
+        settings=None,
+        probability=0.9,
+        world=None,
+    )
+    off = []
+    for number in range(count):
+        simulation = simulate(experiment, np.random.default_rng([9, number]))
+        model = experiment.problem_of(simulation.measured).model
+        point = np.array([[simulation.truth[name] for name in model.names]])
+        reached = np.ones(1, dtype=bool)
+        scale = model.noise_scale(point)
+        exact = model.likelihood.score(exact_sensed(model, point)[:, None], reached, scale)
+        off.append(float((model.likelihood.score(model.loads(point)[:, None], reached, scale) - exact)[0]))
+    assert np.abs(off).max() < 0.05
