@@ -248,7 +248,7 @@ def cases(tmp_path):
     of_sheet = {
         **dict.fromkeys([name for name in sheet if name.endswith(("noise", "resolution"))], AT_LEAST_0),
         **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), number(TINY, or_infinite=True)),
-        "drive_angle_offset": number(),
+        **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), number()),
         "drift": nothing,
         "frame": nothing,
     }

@@ -10,6 +10,9 @@ from tactile_bayes.errors import ParameterError
 
 __all__ = ["LARGEST_STRAIN", "Rod"]
 
+_THICKEST = 1e70
+"""A diameter whose fourth power is beyond what numbers hold [m]."""
+
 LARGEST_STRAIN = 0.1
 """Bending strain up to which a rod is slender and its bending moment proportional to its curvature."""
 
@@ -101,8 +104,8 @@ class Rod:
         """
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
             check_positive(f"the rod's {name}", value)
-        square = float(diameter) * float(diameter)
-        return cls(length, youngs_modulus * math.pi * (square * square) / 64, diameter, elastic_strain)
+        fourth = float(diameter) ** 4 if diameter < _THICKEST else math.inf
+        return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain)
 
     @property
     def is_dimensionless(self) -> bool:

@@ -140,17 +140,20 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
     rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
     spread = np.where(np.isfinite(spread), spread, rough)
 
+    def events_missed(points: Floats) -> Floats:
+        return residuals(points)[:, measured.size :]
+
     def starts() -> Iterator[Floats]:
         by_contacts = contact_fit(model)
         if by_contacts is not None:
             yield np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0))
         parts = [candidates[block, :size] for block in blocks(len(candidates), measured.size)]
         costs = np.concatenate([np.sum(np.minimum(np.abs(residuals(part)), 30.0), axis=1) for part in parts])
-        for i in np.argsort(costs)[:_CANDIDATES]:
-            by_events = next(
-                optima(lambda points: residuals(points)[:, measured.size :], [candidates[i, :size]], *about)
-            )
-            yield by_events.point if brackets.low.size else candidates[i, :size]
+        for candidate in candidates[np.argsort(costs)[:_CANDIDATES], :size]:
+            if brackets.low.size and not deadline.has_passed:
+                yield next(optima(events_missed, [candidate], *about)).point
+            else:
+                yield candidate
 
     ends = np.array([support_of(model.priors[name]) for name in model.located])
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
@@ -203,11 +206,11 @@ def contact_fit(model: ContourModel) -> Floats | None:
 
 
 def _zeroed_cell(model: ContourModel) -> LoadCell:
-    """The load cell, its zeros and noise those of the record's unloaded samples where they are inferred."""
+    """The load cell, its noise that of the record, and its zeros, where they are inferred, too."""
     rod = model.likelihood.rod
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     inferred = [name in model.nuisances.names for name in BIASES]
     cell = model.noise.cell
     bias = np.where(inferred & np.isfinite(model.zero), model.zero * units, cell.bias)
-    moment, *forces = (cell.moment_noise, cell.force_noise) if model.noise.stated_cell else model.deviation * units
+    moment, *forces = model.deviation * units
     return replace(cell, bias=tuple(bias.tolist()), moment_noise=float(moment), force_noise=float(max(forces)))

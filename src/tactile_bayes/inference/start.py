@@ -93,9 +93,11 @@ def optima(
     """
     for candidate in candidates:
         found = _descend(residuals, candidate, middle, spread, deadline=deadline)
-        again = _descend(residuals, found.point, middle, spread, deadline=deadline)
-        while again.cost < found.cost - _GAIN:  # samples that fell on an event's other side on the way
-            found, again = again, _descend(residuals, again.point, middle, spread, deadline=deadline)
+        gain = np.inf
+        while gain > _GAIN and not deadline.has_passed:  # samples may have fallen on an event's other side on the way
+            again = _descend(residuals, found.point, middle, spread, deadline=deadline)
+            gain = found.cost - again.cost
+            found = again if gain > 0.0 else found
         if not np.all((found.point > low) & (found.point < high)):
             inside = np.clip(found.point, low + _INSIDE * spread, high - _INSIDE * spread)
             bounded = _descend(residuals, inside, middle, spread, low, high, deadline)

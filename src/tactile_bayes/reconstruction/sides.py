@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -27,6 +28,10 @@ OTHER_SIDE = {"forward": "backward", "backward": "forward"}
 _CONTRADICTED, _DOUBTED = -6.0, -2.0
 """Mean moment in contact, on the direction's side of the zero, in standard errors, below which the direction is not
 believed, and below which it is doubted."""
+
+_UNLIKELY, _IMPOSSIBLE = 3.0, 5.0
+"""Standard deviations of a zero of which nothing is known: if the direction is right, and the zero no further off than
+the first, it is doubted at most; what is beyond the second is load and no zero."""
 
 _ZERO = 0.1
 """Standard deviation of a zero of which nothing is known [EI/L]."""
@@ -58,19 +63,20 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     """
     direction = np.where(record.direction.values == "backward", -1.0, 1.0)
     side = direction.copy()
-    for sweep, rows, score in _scores(record, load_cell):
-        stated = _stated(record).get(sweep)
-        if stated is not None:
-            side[rows] = -1.0 if stated == "backward" else 1.0
-        else:
-            side[rows] = -direction[rows[0]] if score < _CONTRADICTED else direction[rows[0]]
+    stated = _stated(record)
+    for one in _judged(record, load_cell):
+        if one.sweep in stated:
+            side[one.rows] = -1.0 if stated[one.sweep] == "backward" else 1.0
+        elif one.is_contradicted:
+            side[one.rows] = -direction[one.rows[0]]
     return side
 
 
 def doubtful_sweeps(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[int, ...]:
     """Sweeps whose moment speaks against their direction, and not clearly, the most doubtful first."""
-    scores = [(score, sweep) for sweep, _, score in _scores(record, load_cell) if sweep not in _stated(record)]
-    return tuple(sweep for score, sweep in sorted(scores) if _CONTRADICTED <= score < _DOUBTED)
+    found = [one for one in _judged(record, load_cell) if one.sweep not in _stated(record)]
+    doubted = [one for one in found if one.score < _DOUBTED and not one.is_contradicted]
+    return tuple(one.sweep for one in sorted(doubted, key=lambda one: one.score))
 
 
 def side_of(record: xr.Dataset, sweep: int) -> str:
@@ -105,8 +111,22 @@ def _stated(record: xr.Dataset) -> dict[int, str]:
     return {int(sweep): side for sweep, side in json.loads(record.attrs.get(CONTACT_SIDES, "{}")).items()}
 
 
-def _scores(record: xr.Dataset, load_cell: LoadCell | None) -> list[tuple[int, Index, float]]:
-    """Every sweep, its samples, and how far, in standard errors, its moment is on the side of its direction."""
+class _Judged(NamedTuple):
+    """What the moment of one sweep says of its direction."""
+
+    sweep: int
+    rows: Index
+    score: float
+    """How far its mean in contact is on the direction's side of the zero, in standard errors."""
+    absolute: float
+    """The same where nothing is known of the zero."""
+
+    @property
+    def is_contradicted(self) -> bool:
+        return self.score < _CONTRADICTED and self.absolute < -_UNLIKELY
+
+
+def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     unit = rod_of(record).moment_unit
     cell = load_cell or LoadCell()
     known = float(np.sqrt(cell.covariance(np.zeros((1, 3)))[0, 0, 0]))
@@ -116,22 +136,33 @@ def _scores(record: xr.Dataset, load_cell: LoadCell | None) -> list[tuple[int, I
     order = np.argsort(sweep, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
     if CHANNELS[0] not in present:
-        return [(int(sweep[rows[0]]), rows, np.inf) for rows in parts]
+        return [_Judged(int(sweep[rows[0]]), rows, np.inf, np.inf) for rows in parts]
     readings = np.stack([record[name].values for name in present], axis=-1)
+    readings /= np.maximum(np.abs(readings).max(axis=0), 1e-100 * unit)  # squares of large ones would overflow
+    floor = np.full(len(present), _ROUNDING**2)
     loaded, unloaded = [], []
     for rows in parts:
-        bounds = contact_bounds(readings[rows], _FALSE_ALARM, np.full(len(present), np.finfo(float).tiny))
+        bounds = contact_bounds(readings[rows], _FALSE_ALARM, floor)
         end = len(rows) - bounds.after
         loaded.append(rows[bounds.before : end] if bounds.found else rows)
         unloaded.append(np.concatenate([rows[: bounds.before], rows[end:]]))
     found = []
     for rows, inside, own in zip(parts, loaded, unloaded, strict=True):
         noise = max(rough_noise(moment[rows]), known, _ROUNDING * float(np.abs(moment[rows]).max()), 1e-100 * unit)
-        zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else np.concatenate(unloaded)]
-        mean, error = (zeros.mean(), noise / np.sqrt(zeros.size)) if zeros.size >= FEWEST else (0.0, unknown)
-        apart = moment[inside] - mean
-        most = np.quantile(np.abs(apart), _ALL_BUT_OUTLIERS)
-        error = np.hypot(error, noise * np.hypot(_WANDER, 1.0 / np.sqrt(inside.size)))
         sign = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
-        found.append((int(sweep[rows[0]]), rows, float(sign * np.clip(apart, -most, most).mean() / error)))
+
+        def score(samples: Index, zero: float, error: float, noise: float = noise, sign: float = sign) -> float:
+            apart = moment[samples] - zero
+            most = np.quantile(np.abs(apart), _ALL_BUT_OUTLIERS)
+            error = float(np.hypot(error, noise * np.hypot(_WANDER, 1.0 / np.sqrt(samples.size))))
+            return float(sign * np.clip(apart, -most, most).mean() / error)
+
+        absolute = score(inside, 0.0, unknown)
+        zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else np.concatenate(unloaded)]
+        zero = float(zeros.mean()) if zeros.size >= FEWEST else np.inf
+        if abs(zero) < _IMPOSSIBLE * unknown:
+            relative = score(inside, zero, noise / np.sqrt(zeros.size))
+        else:
+            absolute = relative = score(rows, 0.0, unknown)
+        found.append(_Judged(int(sweep[rows[0]]), rows, relative, absolute))
     return found
