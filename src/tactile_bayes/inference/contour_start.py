@@ -22,6 +22,7 @@ from tactile_bayes.inference.ensembles import (
     approximate,
     in_coordinates,
     scatter_walkers,
+    straightened,
 )
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import MAY_VANISH
@@ -42,6 +43,9 @@ _MUCH = 100
 
 _EFFICIENT = 0.3
 """Efficiency of a proposal from which on the posterior is nearly normal around it."""
+
+_OF_SCALE = 500
+"""Draws from the prior that tell on which scale a coordinate varies."""
 
 _HOPELESS = 100.0
 """Cost above the least from which on a place is not weighed."""
@@ -173,8 +177,21 @@ def _scattered(
             + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
         ) from error
     walked = _walked(model)
+    coordinates: Coordinates = Logarithms(walked.positive, proposal)
+    if len(modes) == 1 and proposal.efficiency < _EFFICIENT and not deadline.has_passed:
+        scale = _prior_scale(model, walked, rng)
+        coordinates = (
+            straightened(model.log_probability, walked, modes[0].proposal, scale, rng, deadline) or coordinates
+        )
     log_evidence = float(logsumexp([mode.proposal.log_mass for mode in modes]))
-    return Walk(walked.of(start), Logarithms(walked.positive, proposal), log_evidence, modes[0].optimum.beyond)
+    return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
+
+
+def _prior_scale(model: ContourModel, walked: Logarithms, rng: np.random.Generator) -> Floats:
+    """Half the distance in which two thirds of the prior lie, of each coordinate."""
+    draws = np.stack([model.priors[name].rvs(_OF_SCALE, random_state=rng) for name in model.names], axis=1)
+    low, high = np.quantile(walked.of(draws), [0.16, 0.84], axis=0)
+    return np.asarray(0.5 * (high - low))
 
 
 def _walked(model: ContourModel) -> Logarithms:

@@ -29,6 +29,7 @@ from tactile_bayes.inference.ensembles.places import Place
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
+from tactile_bayes.inference.ensembles.straightened import Straightened, straightened
 from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, seed_sequence, spawn
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "Proposal",
     "SamplerSettings",
     "Seed",
+    "Straightened",
     "approximate",
     "in_coordinates",
     "sample",
@@ -49,5 +51,6 @@ __all__ = [
     "seed_sequence",
     "settings_of",
     "spawn",
+    "straightened",
     "whitened_moves",
 ]

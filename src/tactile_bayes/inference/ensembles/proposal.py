@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["Mixture", "Proposal", "approximate"]
+__all__ = ["GOOD", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ _ROUNDS = 8
 _DRAWS = 60
 """For each parameter, in each round."""
 
-_GOOD = 0.5
+GOOD = 0.5
 """Efficiency that is not worth another round."""
 
 _HELD = 5
@@ -126,7 +126,7 @@ class Mixture:
     def shares(self) -> Floats:
         """Of the parts, in proportion to the target's integral; equal where that is not known of any."""
         masses = np.array([part.log_mass for part in self.parts])
-        return _weights(masses if np.any(np.isfinite(masses)) else np.zeros(masses.size))
+        return normalised(masses if np.any(np.isfinite(masses)) else np.zeros(masses.size))
 
     @property
     def efficiency(self) -> float:
@@ -173,29 +173,34 @@ def approximate(
         surplus = log_probability(points) - density
         if not np.isfinite(surplus).sum() > _HELD * centre.size:
             break
-        efficiency = _effective(_weights(surplus)) / len(points)
+        efficiency = effective(normalised(surplus)) / len(points)
         if efficiency > best.efficiency:
             log_mass = float(logsumexp(surplus) - np.log(len(points)))
             best = Proposal(proposal.mean, proposal.root, efficiency, log_mass)
-        if best.efficiency >= _GOOD:
+        if best.efficiency >= GOOD:
             break
-        power = 1.0
-        while _effective(weights := _weights(power * surplus)) < _HELD * centre.size:
-            power *= 0.8
         try:
-            proposal = Proposal.fitted(points, weights)
+            proposal = Proposal.fitted(points, flattened(surplus, _HELD * centre.size))
         except np.linalg.LinAlgError:
             break
     return best
 
 
-def _weights(surplus: Floats) -> Floats:
+def flattened(surplus: Floats, least: float) -> Floats:
+    """Weights from their logarithms, made more equal until their effective number is at least that."""
+    power = 1.0
+    while effective(weights := normalised(power * surplus)) < least:
+        power *= 0.8
+    return weights
+
+
+def normalised(surplus: Floats) -> Floats:
     with np.errstate(invalid="ignore"):  # −inf less the largest is −inf still
         weights = np.exp(surplus - surplus.max())
     return np.asarray(weights / weights.sum())
 
 
-def _effective(weights: Floats) -> float:
+def effective(weights: Floats) -> float:
     return float(1.0 / np.sum(weights**2))
 
 
