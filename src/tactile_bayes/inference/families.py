@@ -20,6 +20,9 @@ __all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior", "refuse_no_prior", 
 
 _MOST_STEPS = 100
 
+_STEEPEST = 1e300
+"""Of a power law, in its unit: more is beyond what numbers hold."""
+
 _FAR = 1e3
 """Widths from the vertex beyond which a power law is as high as here, or its height would overflow."""
 
@@ -232,7 +235,9 @@ _POSITIVE = (0.0, np.inf)
 
 
 def _power_law(values: Values) -> Contour:
-    return PowerLaw(values["w"] ** (1.0 - values["n"]), values["n"], values["q"], values["x_c"])
+    with np.errstate(over="ignore"):  # where it is narrow and n is large
+        steepness = np.minimum(values["w"] ** (1.0 - values["n"]), _STEEPEST)
+    return PowerLaw(steepness, values["n"], values["q"], values["x_c"])
 
 
 def _ellipse_miss(u: Floats, v: Floats, values: Values) -> Floats:
