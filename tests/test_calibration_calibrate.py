@@ -22,6 +22,7 @@ from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.world import World
 from tactile_bayes.errors import CalibrationError, ParameterError
+from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.ensembles import SamplerSettings, moves
 from tactile_bayes.load_cell import LoadCell
 
@@ -34,7 +35,7 @@ ANGLES = np.radians(np.arange(-30.0, 211.0, 4.0))
 FEW_STEPS = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
 """Enough for numbers that are the same again, not for right ones."""
 
-BY_DEFAULT = SamplerSettings(ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
+BY_DEFAULT = SamplerSettings(ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
 
 
 def quickly(**options):
@@ -237,6 +238,25 @@ def test_the_error_is_raised_where_a_replicate_is_lost(monkeypatch):
     assert (made.truth, made.measured, made.posterior) == ({}, None, None)
 
 
+def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
+    """By default alone: settings that are given are those of the only run."""
+    runs = []
+
+    def spied(problem, *, settings, **options):
+        runs.append(settings)
+        return sampled(problem, settings=FEW_STEPS, **options)
+
+    monkeypatch.setattr("tactile_bayes.calibration.replicate.sampled", spied)
+    asked = {"nuisances": [], "priors": PRIORS, "drive_angles": ANGLES, "seed": 1}
+    assert not calibration_replicate(0, **asked).outcome.numbers["converged"]
+    first, second = runs
+    assert first == BY_DEFAULT
+    assert second == replace(BY_DEFAULT, walkers=None, max_steps=2000)
+    runs.clear()
+    calibration_replicate(0, settings=FEW_STEPS, **asked)
+    assert runs == [FEW_STEPS]
+
+
 def test_a_replicate_of_another_calibration_is_refused(small, tmp_path):
     with pytest.raises(CalibrationError, match="replicates of another experiment: seed is 1 there and 2 here"):
         again(0, out=small[1], seed=2)
@@ -410,7 +430,7 @@ def test_what_an_experiment_is_follows_from_its_words():
         "priors": {},
         "nuisances": (),
         "settings": SamplerSettings(
-            ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000
+            ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500
         ),
         "world": World(),
     }

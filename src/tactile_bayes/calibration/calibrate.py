@@ -33,9 +33,12 @@ Floats = NDArray[np.float64]
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 """Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""
 
-_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=2000)
+_SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
 _FEWEST_WALKERS, _MORE_WALKERS = 20, 2
 """Walkers of an ensemble at least, and how many more than twice the parameters: few, as 200 draws are soon there."""
+
+_AGAIN = replace(_SETTINGS, max_steps=2000)
+"""Where that has not converged: as many walkers as `infer_contour` has, which learn the shape of a bent posterior."""
 
 
 def calibrate(
@@ -93,8 +96,9 @@ def calibrate(
         As in `infer_contour`; truths are drawn from the same priors.
     settings : SamplerSettings, optional
         By default 2 ensembles of 20 walkers, or two more than twice the parameters where these are many, until R̂ is
-        below 1.05 and 200 effective draws are there, five for every walker, in 2000 steps at most. Runs that end
-        unconverged stay in.
+        below 1.05 and 200 effective draws are there, five for every walker, in 500 steps at most; where they are
+        not, again with as many walkers as `infer_contour` has, in 2000 steps at most. Runs that end unconverged
+        stay in.
     probability : float
         Of the bands, regions and intervals that are judged.
     world : World, optional
@@ -282,10 +286,8 @@ def experiment_of(
         seed=int(seed),
         world=world or World(),
     )
-    if settings is not None:
-        return experiment
-    walkers = max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS)
-    return replace(experiment, settings=replace(_SETTINGS, walkers=walkers))
+    default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))
+    return replace(experiment, settings=default, again=_AGAIN) if settings in (None, default) else experiment
 
 
 def _floats(values: ArrayLike) -> Floats:

@@ -49,6 +49,8 @@ class Experiment:
     friction: float = 0.0
     events: bool = True
     settings: SamplerSettings = field(default_factory=SamplerSettings)
+    again: SamplerSettings | None = None
+    """Of a second run, where the first has not converged."""
     probability: float = 0.9
     seed: int = 0
     world: World = field(default_factory=World)
@@ -142,6 +144,7 @@ class Experiment:
             "friction": repr(self.friction),
             "events": repr(self.events),
             "settings": json.dumps(asdict(self.settings), default=_plain),
+            "again": "never" if self.again is None else json.dumps(asdict(self.again), default=_plain),
             "probability": repr(self.probability),
             "seed": repr(self.seed),
         }

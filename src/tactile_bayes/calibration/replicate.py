@@ -108,6 +108,8 @@ def make_replicate(experiment: Experiment, number: int, *, throw: bool = False) 
         began = time.perf_counter()
         problem = experiment.problem_of(simulation.measured)
         result = sampled(problem, seed=inferred, settings=experiment.settings, with_prior=False)
+        if not result.draws.converged and experiment.again is not None:
+            result = sampled(problem, seed=inferred, settings=experiment.again, with_prior=False)
         seconds = time.perf_counter() - began
         result.draws.refuse_interrupted(f"replicate {number}")
         outcome = _compared(experiment, simulation, problem.model, result, np.random.default_rng(picked))
