@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -205,7 +206,7 @@ class RecordLikelihood:
         samples = self.event_samples(loaded)
         return np.where(samples >= 0, self.seen_angles[samples], np.nan)
 
-    @property
+    @cached_property
     def seen_angles(self) -> Floats:
         """Drive angle of each sample, as read and as seen in forward sweeps."""
         angles = np.empty(len(self.measured))
@@ -213,7 +214,7 @@ class RecordLikelihood:
             angles[stroke.samples] = seen[: stroke.samples.size]
         return angles
 
-    @property
+    @cached_property
     def stroke_of_sample(self) -> NDArray[np.intp]:
         which = np.empty(len(self.measured), dtype=np.intp)
         for k, stroke in enumerate(self.strokes):

@@ -52,7 +52,8 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     It is the side of the sweep's direction, unless the moment contradicts that, since a drive may also turn back in
     contact: in contact the moment is on the other side of its zero by more than six standard errors. The zero is the
     mean of the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else none within a
-    standard deviation of 0.1 EI/L. A record may state the sides of its sweeps itself (`with_sides`).
+    standard deviation of 0.1 EI/L. As what looks unloaded may be a load that does not change, the moment must also be
+    on the other side of all zeros within three of these. A record may state the sides of its sweeps (`with_sides`).
 
     Parameters
     ----------
@@ -127,6 +128,7 @@ class _Judged(NamedTuple):
 
 
 def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
+    """Every sweep of a record, in the order of their numbers."""
     unit = rod_of(record).moment_unit
     cell = load_cell or LoadCell()
     known = float(np.sqrt(cell.covariance(np.zeros((1, 3)))[0, 0, 0]))
