@@ -7,7 +7,7 @@ import re
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from scipy.stats import binomtest
 
 from tactile_bayes.contours import Circle, Parabola, paper_profile
@@ -190,6 +190,7 @@ usual = st.floats(-3.0, 3.0, width=32)
     noise=st.sampled_from([None, 0.02, 1e-300]),
     friction=st.sampled_from([0.0, 0.5]),
 )
+@example(loads=[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], angle=0.0, direction="backward", noise=1e-300, friction=0.0)
 @settings(max_examples=40, deadline=None)
 def test_no_sample_raises_and_none_is_silently_empty(loads, angle, direction, noise, friction):
     moment, force_x, force_y = np.array(loads).T

@@ -22,7 +22,7 @@ from tactile_bayes.reconstruction.estimate import (
 from tactile_bayes.reconstruction.samples import Samples
 from tactile_bayes.touching import touching, touching_and_slopes
 
-__all__ = ["constrained_estimate", "refuse_without_noise"]
+__all__ = ["are_weighed", "constrained_estimate", "refuse_without_noise"]
 
 Floats = NDArray[np.float64]
 
@@ -76,16 +76,20 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     return Estimate(place, covariance, phase, status, misfit, distance)
 
 
+def are_weighed(samples: Samples) -> bool:
+    """Whether the load cell says how far each channel is to be trusted."""
+    covariance = samples.reading.covariance
+    return bool(np.all(np.isfinite(covariance)) and np.all(np.diagonal(covariance, axis1=1, axis2=2) > 0.0))
+
+
 def refuse_without_noise(samples: Samples) -> None:
     """Refuse a load cell that does not say how far each channel is to be trusted."""
-    covariance = samples.reading.covariance
-    variance = np.diagonal(covariance, axis1=1, axis2=2)
-    if not np.all(np.isfinite(covariance)):
+    if not np.all(np.isfinite(samples.reading.covariance)):
         raise ParameterError(
             "Student's t with 2 degrees of freedom and fewer has no standard deviation to weigh the channels by: use "
             "method='raw', or more degrees of freedom"
         )
-    if not np.all(variance > 0.0):
+    if not are_weighed(samples):
         raise ParameterError(
             "which contact is most likely depends on the noise of every channel, and the load cell has none on at "
             "least one: give LoadCell(force_noise=..., moment_noise=...), or one of LoadCell.from_zero_load(record)"

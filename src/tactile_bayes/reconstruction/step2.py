@@ -14,7 +14,7 @@ from tactile_bayes.checks import check_choice, check_number, check_optional, ref
 from tactile_bayes.contact_fit import Reading
 from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES, TANGENTIAL
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction.constrained import constrained_estimate
+from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
@@ -184,9 +184,9 @@ def _with_likelier_sides(
         part = measured.isel(sample=np.flatnonzero(measured.sweep.values == sweep))
         misfits = []
         for side in (stated, OTHER_SIDE[stated]):
-            if not np.all(cell.unrest):
-                break
             samples = samples_of(with_sides(part, {sweep: side}), cell, suspension_compliance)
+            if not are_weighed(samples):
+                break
             found = constrained_estimate(samples, np.full(samples.side.size, np.arctan(friction))).misfit
             none = np.nan if found is None else found
             misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
