@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles import Logarithms, in_coordinates, straightened
-from tactile_bayes.inference.ensembles.proposal import Proposal, approximate
+from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.ensembles import Logarithms, Mixture, Proposal, approximate, in_coordinates, learned
 from tactile_bayes.inference.ensembles.straightened import Straightened
 
 SIZE = 6
 POSITIVE = np.arange(SIZE) == 0
 SCALE = np.ones(SIZE)
+PLAIN = Logarithms(np.zeros(SIZE, dtype=bool))
 
 
 def bent(points):
@@ -25,12 +26,27 @@ def bent(points):
     return np.where(inside, values, -np.inf)
 
 
-def true_efficiency(proposal, target):
-    """By 20,000 draws; of fewer, one that misses a part of the target looks better than it is."""
-    points, density = proposal.draw(np.random.default_rng(2), 20_000)
-    surplus = target(points) - density
-    weights = np.exp(surplus - surplus.max())
-    return weights.sum() ** 2 / np.sum(weights**2) / len(points)
+def drawn(count):
+    """Exact draws of the bent ridge."""
+    steps = np.random.default_rng(3).normal(size=(count, SIZE))
+    parabola = 0.1 * steps[:, 0] ** 2 - 0.07 * steps[:, 0] * steps[:, 1] + 0.05 * steps[:, 1] ** 2
+    rest = 0.1 * steps[:, 2:] + np.arange(1, SIZE - 1) * parabola[:, None]
+    return np.column_stack([np.exp(steps[:, 0]), steps[:, 1], rest])
+
+
+def acceptance(log_probability, coordinates, exact):
+    """Share of proposals that walkers accept who are where the target is."""
+    target, proposal = in_coordinates(log_probability, coordinates), coordinates.proposal
+    points, density = proposal.draw(np.random.default_rng(2), len(exact))
+    places = coordinates.of(exact)
+    here, there = target(places) - proposal.log_density(places), target(points) - density
+    return float(np.mean(np.exp(np.minimum(0.0, there - here))))
+
+
+def scouts(width):
+    """Where walkers begin, in parameters."""
+    places = width * np.random.default_rng(5).normal(size=(36, SIZE)) * np.array([1.0, 1.0, *[0.1] * (SIZE - 2)])
+    return Logarithms(POSITIVE).parameters(places)[0]
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +54,31 @@ def found():
     base, rng = Logarithms(POSITIVE), np.random.default_rng(4)
     target = in_coordinates(bent, base)
     straight = approximate(target, np.zeros(SIZE), np.diag([1.0, 1.0, *[0.1] * (SIZE - 2)]) ** 2, rng)
-    return straight, straightened(bent, base, straight, SCALE, rng)
+    return straight, learned(bent, base.with_proposal(Mixture((straight,))), scouts(2.0), SCALE, rng)
 
 
 def test_a_bent_ridge_is_made_normal(found):
-    """Of draws from a normal approximation of the ridge hardly any count, of the straightened one half do."""
+    """Of proposals from a normal approximation of the ridge few are accepted, of the straightened one many."""
     straight, coordinates = found
-    assert true_efficiency(straight, in_coordinates(bent, coordinates.base.base)) < 0.02
-    assert true_efficiency(coordinates.proposal, in_coordinates(bent, coordinates)) > 0.4
+    exact = drawn(5000)
+    assert acceptance(bent, coordinates.base.with_proposal(Mixture((straight,))), exact) < 0.15
+    assert acceptance(bent, coordinates, exact) > 0.3
+
+
+def test_directions_that_turn_about_one_another_are_followed():
+    """Along the first coordinate, which is wide, the narrowest one shears a third."""
+    narrow = np.array([1.0, *[0.1] * (SIZE - 2), 0.01])
+
+    def sheared(points):
+        steps = points / narrow
+        steps[:, -1] -= 3.0 * steps[:, 0] * steps[:, 2]
+        return -0.5 * np.sum(steps**2, axis=1)
+
+    start = narrow * np.random.default_rng(5).normal(size=(36, SIZE))
+    coordinates = learned(sheared, PLAIN, start, SCALE, np.random.default_rng(4))
+    exact = np.random.default_rng(3).normal(size=(5000, SIZE))
+    exact[:, -1] += 3.0 * exact[:, 0] * exact[:, 2]
+    assert acceptance(sheared, coordinates, narrow * exact) > 0.4
 
 
 def test_coordinates_and_parameters_are_there_and_back(found):
@@ -71,15 +104,48 @@ def test_volumes_grow_as_is_said(found):
 
 def test_what_tells_coordinates_apart_is_what_they_follow_from(found):
     _, one = found
-    other = Straightened(one.base, one.mean, one.root, one.bends + 1e-9, one.wide, one.proposal)
+    other = Straightened(one.base, one.mean, one.root, one.bends + 1e-9, one.proposal)
     assert one.digest != other.digest
-    assert one.digest == Straightened(one.base, one.mean, one.root, one.bends, one.wide, one.proposal).digest
+    assert one.digest == Straightened(one.base, one.mean, one.root, one.bends, one.proposal).digest
+
+
+def normal(points):
+    return -0.5 * np.sum(points**2, axis=1)
+
+
+def learned_of_a_normal(width, efficiency, deadline=NEVER):
+    """What is made of a proposal so many times as wide as a standard normal posterior."""
+    base = PLAIN.with_proposal(Mixture((Proposal(np.zeros(SIZE), width * np.eye(SIZE), efficiency),)))
+    start = 2.0 * np.random.default_rng(5).normal(size=(36, SIZE))
+    return learned(normal, base, start, SCALE, np.random.default_rng(1), deadline)
 
 
 def test_what_is_normal_already_is_left_alone():
-    def normal(points):
-        return -0.5 * np.sum(points**2, axis=1)
+    assert isinstance(learned_of_a_normal(1.1, 0.2), Logarithms)
 
-    exact = Proposal(np.zeros(SIZE), np.eye(SIZE), 0.99)
-    base = Logarithms(np.zeros(SIZE, dtype=bool))
-    assert straightened(normal, base, exact, SCALE, np.random.default_rng(1)) is None
+
+def test_a_narrow_proposal_is_not_believed():
+    """Its own draws hardly ever meet what it misses, so that they take it for nearly perfect."""
+    coordinates = learned_of_a_normal(0.4, 0.99)
+    assert isinstance(coordinates, Straightened)
+    assert acceptance(normal, coordinates, np.random.default_rng(3).normal(size=(5000, SIZE))) > 0.5
+
+
+def test_past_the_deadline_one_step_is_made():
+    coordinates = learned_of_a_normal(0.4, 0.99, Deadline.after(0.0))
+    assert isinstance(coordinates, Logarithms)
+    assert coordinates.proposal.efficiency < 0.5
+
+
+def test_an_interrupt_is_passed_on():
+    calls = 0
+
+    def interrupted(points):
+        nonlocal calls
+        calls += 1
+        if calls > 10:
+            raise KeyboardInterrupt
+        return normal(points)
+
+    with pytest.raises(KeyboardInterrupt):
+        learned(interrupted, PLAIN, np.random.default_rng(5).normal(size=(36, SIZE)), SCALE, np.random.default_rng(1))

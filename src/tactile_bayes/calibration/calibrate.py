@@ -37,7 +37,7 @@ _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess
 _FEWEST_WALKERS, _MORE_WALKERS = 20, 2
 """Walkers of an ensemble at least, and how many more than twice the parameters: few, as 200 draws are soon there."""
 
-_AGAIN = replace(_SETTINGS, max_steps=2000)
+_AGAIN = replace(_SETTINGS, max_steps=6000)
 """Where that has not converged: as many walkers as `infer_contour` has, which learn the shape of a bent posterior."""
 
 

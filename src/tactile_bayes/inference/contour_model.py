@@ -13,10 +13,11 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import DriftWarning, ReachError
 from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.ensembles import Logarithms
 from tactile_bayes.inference.families import Family, Prior
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
-from tactile_bayes.inference.nuisances import Nuisances
+from tactile_bayes.inference.nuisances import MAY_VANISH, Nuisances
 from tactile_bayes.inference.prior_density import log_density_of
 from tactile_bayes.load_cell import rough_noise, zero_load
 from tactile_bayes.record import CHANNELS
@@ -75,6 +76,11 @@ class ContourModel:
     def present(self) -> NDArray[np.bool_]:
         """Which channels were measured, shape (3,)."""
         return ~np.isnan(self.likelihood.measured).all(axis=0)
+
+    @property
+    def coordinates(self) -> Logarithms:
+        """In which posteriors are sought and walked: the logarithms of parameters that are positive and never zero."""
+        return Logarithms((self.low == 0.0) & ~np.isin(self.names, MAY_VANISH))
 
     @property
     def loads_of_a_point(self) -> int:

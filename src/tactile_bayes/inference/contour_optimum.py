@@ -13,6 +13,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.ensembles import Logarithms
 from tactile_bayes.inference.families import support_of
 from tactile_bayes.inference.nuisances import BIASES
 from tactile_bayes.inference.start import optima
@@ -25,12 +26,15 @@ __all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimu
 Floats = NDArray[np.float64]
 
 _PRIOR_DRAWS = 1000
-_CANDIDATES = 8
-"""Draws from the prior from which the optimum is sought, the likeliest first, until one explains the record. A sample
-at an event that is loaded or not holds the search up where it began too far away."""
+_CANDIDATES = 24
+"""Draws from the prior from which the optimum is sought at most, the likeliest first. A sample at an event that is
+loaded or not holds the search up where it began too far away."""
 
 _SHARP = 0.1
 """Of the angle between the samples beside an event: how far it may be outside for a residual of one."""
+
+_FARTHEST = 12.0
+"""Standard deviations of the prior's logarithm that a size may be off on the way to where it is sought."""
 
 _FAR_OFF = 1000.0
 """Residual of an event that does not happen."""
@@ -48,7 +52,7 @@ class ContourOptimum(NamedTuple):
     point: Floats
     """All of the model's."""
     covariance: Floats
-    """Roughly theirs in the posterior, of the logarithms of those of the noise."""
+    """Roughly that of the model's coordinates in the posterior."""
     cost: float
     """Of robust least squares."""
     fits: bool
@@ -114,6 +118,7 @@ def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline
 def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
     """Where searches end that begin at Step 2's contacts and at draws from the prior, the likeliest first."""
     size = len(model.located)
+    located = Logarithms(model.coordinates.positive[:size])
     deviation, present = model.deviation, model.present
     measured = model.likelihood.measured[:, present] / deviation[present]
     brackets = event_brackets(model)
@@ -123,9 +128,18 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
         if name in model.names and np.isfinite(zero):
             candidates[:, model.names.index(name)] = zero * unit
 
-    def residuals(points: Floats) -> Floats:
+    drawn = located.of(candidates[:, :size])
+    percentiles = np.quantile(drawn, [0.16, 0.84], axis=0)
+    middle = percentiles.mean(axis=0)
+    rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
+    stated = np.array([float(model.priors[name].std()) for name in model.located])
+    spread = np.where(np.isfinite(stated) & ~located.positive, stated, rough)
+
+    def residuals(places: Floats) -> Floats:
         # A prior that ends somewhere is no wall: the way to where it does not may lead through there.
+        points = located.parameters(places)[0]
         allowed = ((points > model.low[:size]) & (points < model.high[:size])).all(axis=1)
+        allowed &= (np.abs(places - middle) < _FARTHEST * spread)[:, located.positive].all(axis=1)
         out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
         late = np.full((len(points), brackets.low.size), _FAR_OFF)
         if allowed.any():
@@ -135,33 +149,30 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
             late[allowed] = brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
-    spread = np.array([float(model.priors[name].std()) for name in model.located])
-    percentiles = np.quantile(candidates[:, :size], [0.16, 0.84], axis=0)
-    rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
-    spread = np.where(np.isfinite(spread), spread, rough)
-
     def events_missed(points: Floats) -> Floats:
         return residuals(points)[:, measured.size :]
 
     def starts() -> Iterator[Floats]:
         by_contacts = contact_fit(model)
         if by_contacts is not None:
-            yield np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0))
-        parts = [candidates[block, :size] for block in blocks(len(candidates), measured.size)]
+            yield located.of(np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))
+        parts = [drawn[block] for block in blocks(len(drawn), measured.size)]
         costs = np.concatenate([np.sum(np.minimum(np.abs(residuals(part)), 30.0), axis=1) for part in parts])
-        for candidate in candidates[np.argsort(costs)[:_CANDIDATES], :size]:
+        for place in drawn[np.argsort(costs)[:_CANDIDATES]]:
             if brackets.low.size and not deadline.has_passed:
-                yield next(optima(events_missed, [candidate], *about)).point
+                yield next(optima(events_missed, [place], *about)).point
             else:
-                yield candidate
+                yield place
 
     ends = np.array([support_of(model.priors[name]) for name in model.located])
     low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
-    about = percentiles.mean(axis=0), spread, low, high, deadline
+    with np.errstate(divide="ignore"):  # a size may be as small as it likes
+        about = middle, spread, located.of(low), located.of(high), deadline
     possible = candidates[:, size:]
     for found in optima(residuals, starts(), *about):
+        point = located.parameters(found.point[None])[0][0]
         noise = fitted_noise(model, found.residuals[: measured.size].reshape(measured.shape))
-        if not np.isfinite(model.log_prior(np.append(found.point, noise)[None]))[0]:
+        if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
             noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
         narrow = np.minimum(0.5 * spread / np.sqrt(np.diag(found.covariance)), 1.0)
         covariance = np.zeros((len(model.names), len(model.names)))
@@ -169,11 +180,12 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
         covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
         beyond = ""
         if found.beyond is not None and found.excess > _FAR_BETTER:
-            off = np.flatnonzero((found.beyond <= low) | (found.beyond >= high))
+            wanted = located.parameters(found.beyond[None])[0][0]
+            off = np.flatnonzero((wanted <= low) | (wanted >= high))
             beyond = ", ".join(
-                f"{model.located[i]} = {found.beyond[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
+                f"{model.located[i]} = {wanted[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
             )
-        yield ContourOptimum(np.append(found.point, noise), covariance, found.cost, found.fits, beyond)
+        yield ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, beyond)
 
 
 def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:

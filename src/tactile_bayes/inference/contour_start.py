@@ -21,11 +21,10 @@ from tactile_bayes.inference.ensembles import (
     SamplerSettings,
     approximate,
     in_coordinates,
+    learned,
     scatter_walkers,
-    straightened,
 )
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.start import Cloud, gather
@@ -41,8 +40,17 @@ coordinates whose posterior is nearly standard normal: wider in all of those at 
 _MUCH = 100
 """Loaded samples from which on what explains a record is not one of several contours that do."""
 
-_EFFICIENT = 0.3
+_TRIED = 9
+"""Searches after which there is no other, if one of them has explained the record."""
+
+_AGAIN = 2
+"""Searches that end where others did, after which it is believed that there is nothing else."""
+
+_EFFICIENT = 0.35
 """Efficiency of a proposal from which on the posterior is nearly normal around it."""
+
+_SCOUTS = 6
+"""Walkers for each parameter, at most, that learn in which coordinates the posterior is nearly normal."""
 
 _OF_SCALE = 500
 """Draws from the prior that tell on which scale a coordinate varies."""
@@ -130,14 +138,8 @@ class _Mode(NamedTuple):
 
     optimum: ContourOptimum
     cloud: Cloud
-    """In the coordinates of `_around`."""
     proposal: Proposal
-    """In those in which walkers walk."""
-
-
-def _around(model: ContourModel) -> Logarithms:
-    """Coordinates in which walkers are scattered."""
-    return Logarithms(np.arange(len(model.names)) >= len(model.located))
+    """In the model's coordinates, like the cloud."""
 
 
 def _scattered(
@@ -149,7 +151,7 @@ def _scattered(
 ) -> Walk:
     """Walkers scattered twice as wide as a normal approximation of each mode, which they are then proposed from."""
     modes = _modes(model, rng, deadline)
-    around = _around(model)
+    walked = model.coordinates
     proposal = Mixture(tuple(mode.proposal for mode in modes))
 
     def floor() -> float:
@@ -158,7 +160,7 @@ def _scattered(
     def draw(rng: np.random.Generator, count: int) -> Floats:
         counts = rng.multinomial(count, proposal.shares)
         points = [mode.cloud.draw(rng, int(each)) for mode, each in zip(modes, counts, strict=True)]
-        return around.parameters(np.concatenate(points)[rng.permutation(count)])[0]
+        return walked.parameters(np.concatenate(points)[rng.permutation(count)])[0]
 
     try:
         start = scatter_walkers(
@@ -176,13 +178,11 @@ def _scattered(
             "signs, drive angle, rod and base right? tactile-bayes inspect may tell. "
             + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
         ) from error
-    walked = _walked(model)
-    coordinates: Coordinates = Logarithms(walked.positive, proposal)
-    if len(modes) == 1 and proposal.efficiency < _EFFICIENT and not deadline.has_passed:
-        scale = _prior_scale(model, walked, rng)
-        coordinates = (
-            straightened(model.log_probability, walked, modes[0].proposal, scale, rng, deadline) or coordinates
-        )
+    coordinates: Coordinates = walked.with_proposal(proposal)
+    if proposal.efficiency < _EFFICIENT and not deadline.has_passed:
+        size = len(model.names)
+        scouts, scale = start.reshape(-1, size)[: _SCOUTS * size], _prior_scale(model, walked, rng)
+        coordinates = learned(model.log_probability, walked.with_proposal(proposal), scouts, scale, rng, deadline)
     log_evidence = float(logsumexp([mode.proposal.log_mass for mode in modes]))
     return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
 
@@ -194,10 +194,6 @@ def _prior_scale(model: ContourModel, walked: Logarithms, rng: np.random.Generat
     return np.asarray(0.5 * (high - low))
 
 
-def _walked(model: ContourModel) -> Logarithms:
-    return Logarithms((model.low == 0.0) & ~np.isin(model.names, MAY_VANISH))
-
-
 def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> list[_Mode]:
     """Where the posterior has mass, the most first: one, if that explains a record that says much; else all to which
     searches lead, weighed by their evidence.
@@ -205,13 +201,18 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
     found: list[_Mode] = []
     waiting: list[ContourOptimum] = []
     says_much = np.count_nonzero(~model.found["unloaded"].values) >= _MUCH
-    for optimum in optima_of(model, rng, deadline):
+    again = 0
+    for tried, optimum in enumerate(optima_of(model, rng, deadline), start=1):
         if not optimum.fits:
             waiting.append(optimum)
-        elif not _is_known(model, optimum, found):
+        elif _is_known(model, optimum, found):
+            again += 1
+        else:
             found.append(_mode(model, optimum, rng, deadline))
-            if says_much and found[-1].proposal.efficiency > _EFFICIENT:
-                break
+        if says_much and found and (again == _AGAIN or found[-1].proposal.efficiency > _EFFICIENT):
+            break
+        if found and tried >= _TRIED:
+            break
     for optimum in sorted(waiting, key=lambda one: one.cost):
         least = min((mode.optimum.cost for mode in found), default=optimum.cost)
         late = found and deadline.has_passed
@@ -225,24 +226,11 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
 
 def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) -> bool:
     """Whether an optimum belongs to a mode that was found."""
-    place = _walked(model).of(optimum.point[None])
+    place = model.coordinates.of(optimum.point[None])
     return any(np.linalg.norm(mode.proposal.steps(place)) < _SAME * np.sqrt(place.size) for mode in found)
 
 
 def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator, deadline: Deadline) -> _Mode:
-    around, walked = _around(model), _walked(model)
-
-    def log_probability(coordinates: Floats) -> Floats:
-        return model.log_probability(around.parameters(coordinates)[0])
-
-    cloud = gather(log_probability, around.of(optimum.point), optimum.covariance, rng, deadline)
-    centre = around.parameters(cloud.centre[None])[0]
-    per_unit = np.where(walked.positive & ~around.positive, 1.0 / centre[0], 1.0)
-    proposal = approximate(
-        in_coordinates(model.log_probability, walked),
-        walked.of(centre)[0],
-        cloud.narrow_covariance * np.outer(per_unit, per_unit),
-        rng,
-        deadline,
-    )
-    return _Mode(optimum, cloud, proposal)
+    target = in_coordinates(model.log_probability, model.coordinates)
+    cloud = gather(target, model.coordinates.of(optimum.point), optimum.covariance, rng, deadline)
+    return _Mode(optimum, cloud, approximate(target, cloud.centre, cloud.narrow_covariance, rng, deadline))

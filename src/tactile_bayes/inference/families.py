@@ -235,8 +235,8 @@ _POSITIVE = (0.0, np.inf)
 
 
 def _power_law(values: Values) -> Contour:
-    with np.errstate(over="ignore"):  # where it is narrow and n is large
-        steepness = np.minimum(values["w"] ** (1.0 - values["n"]), _STEEPEST)
+    with np.errstate(over="ignore", divide="ignore"):  # where it is narrow, or wide, and n is large
+        steepness = np.clip(values["w"] ** (1.0 - values["n"]), 1.0 / _STEEPEST, _STEEPEST)
     return PowerLaw(steepness, values["n"], values["q"], values["x_c"])
 
 

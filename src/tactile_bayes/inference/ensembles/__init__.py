@@ -25,11 +25,12 @@ not.
 from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithms, Plain, in_coordinates
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.moves import whitened_moves
+from tactile_bayes.inference.ensembles.pilot import learned
 from tactile_bayes.inference.ensembles.places import Place
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
-from tactile_bayes.inference.ensembles.straightened import Straightened, straightened
+from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, seed_sequence, spawn
 
 __all__ = [
@@ -46,11 +47,11 @@ __all__ = [
     "Straightened",
     "approximate",
     "in_coordinates",
+    "learned",
     "sample",
     "scatter_walkers",
     "seed_sequence",
     "settings_of",
     "spawn",
-    "straightened",
     "whitened_moves",
 ]

@@ -57,14 +57,18 @@ class Logarithms(Plain):
     def __init__(self, positive: NDArray[np.bool_], proposal: Mixture | None = None) -> None:
         """What is known to come near the posterior, of the coordinates, may be proposed to walkers."""
         self.positive = positive
-        self._proposal = proposal
+        self.proposal = proposal
         self.digest = f"logarithms of parameters {', '.join(map(str, np.flatnonzero(positive)))}"
         if proposal is not None:
             self.digest += f", proposal {proposal.digest}"
 
+    def with_proposal(self, proposal: Mixture) -> Logarithms:
+        return Logarithms(self.positive, proposal)
+
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         points = coordinates.copy()
-        points[:, self.positive] = np.exp(coordinates[:, self.positive])
+        with np.errstate(over="ignore"):  # what is beyond all numbers is impossible
+            points[:, self.positive] = np.exp(coordinates[:, self.positive])
         return points, np.sum(coordinates[:, self.positive], axis=1)
 
     def of(self, points: Floats) -> Floats:
@@ -74,7 +78,7 @@ class Logarithms(Plain):
         return coordinates
 
     def moves(self) -> list[tuple[Any, float]]:
-        return standard_moves(self._proposal)
+        return standard_moves(self.proposal)
 
 
 def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) -> LogProbability:

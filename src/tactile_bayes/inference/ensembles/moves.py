@@ -20,6 +20,9 @@ Moves = Callable[[], list[tuple[Any, float]]]
 _LEAST_NEW = 0.2
 """Share that is new in the shortest step of `NormalMove`."""
 
+_SMALL = 0.25
+"""Of the usual scale of differences, where what is likely lies along bent ridges or between walls."""
+
 _MOST_FIXED, _EFFICIENT = 0.8, 0.5
 """Share of proposals from a distribution of that efficiency or a better one."""
 
@@ -101,12 +104,21 @@ def standard_moves(proposal: Mixture | None = None) -> list[tuple[Any, float]]:
 
     Proposals fitted to the walkers where the posterior is nearly normal; differences of two other walkers, scaled and
     now and then unscaled, where it is not. Where there is a proposal that comes near the posterior anyway, it is used
-    most, the more efficient it is. All cut the ensemble in two halves, which `Together` counts on.
+    most, the more efficient it is; what it misses, one fitted to walkers would miss as well, and differences of other
+    walkers, scaled far down, do not. All cut the ensemble in two halves, which `Together` counts on.
     """
-    fixed = 0.0 if proposal is None else _MOST_FIXED * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))
-    rest = [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
-    moves = [(move, (1.0 - fixed) * share) for move, share in rest]
-    return moves if proposal is None or not fixed else [(FixedMove(proposal), fixed), *moves]
+    if proposal is None:
+        return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
+    fixed = _MOST_FIXED * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))
+    usual = 2.38 / np.sqrt(2.0 * proposal.size)
+    moves = [
+        (FixedMove(proposal), fixed),
+        (FittedMove(), 0.2 * (1.0 - fixed)),
+        (emcee.moves.DEMove(gamma0=usual), 0.4 * (1.0 - fixed)),
+        (emcee.moves.DEMove(gamma0=_SMALL * usual), 0.37 * (1.0 - fixed)),
+        (emcee.moves.DEMove(gamma0=1.0), 0.03 * (1.0 - fixed)),
+    ]
+    return [move for move in moves if move[1]]
 
 
 def whitened_moves(bent: int) -> list[tuple[Any, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -123,6 +123,11 @@ class Mixture:
     parts: tuple[Proposal, ...]
 
     @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return self.parts[0].mean.size
+
+    @property
     def shares(self) -> Floats:
         """Of the parts, in proportion to the target's integral; equal where that is not known of any."""
         masses = np.array([part.log_mass for part in self.parts])
@@ -133,6 +138,10 @@ class Mixture:
         """Of the parts together, as if each kept to its own mode."""
         each = np.array([part.efficiency for part in self.parts])
         return float(1.0 / np.sum(self.shares / each)) if np.all(each > 0.0) else 0.0
+
+    def with_efficiency(self, efficiency: float) -> Mixture:
+        """The same, with what is known of its efficiency otherwise."""
+        return Mixture(tuple(replace(part, efficiency=efficiency) for part in self.parts))
 
     @property
     def digest(self) -> str:

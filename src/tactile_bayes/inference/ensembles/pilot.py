@@ -1,0 +1,118 @@
+"""A short run of walkers that learns in which coordinates a posterior is nearly normal, and a proposal in them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.inference.deadline import NEVER, Deadline
+from tactile_bayes.inference.ensembles.block import WalkingEnsembles
+from tactile_bayes.inference.ensembles.coordinates import Logarithms, in_coordinates
+from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
+from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
+from tactile_bayes.inference.ensembles.straightened import Straightened
+from tactile_bayes.inference.ensembles.target import LogProbability
+from tactile_bayes.inference.ensembles.walkers import first_random_state
+
+__all__ = ["learned"]
+
+Floats = NDArray[np.float64]
+
+_STEPS = (60, 120, 240, 480, 960)
+"""Of the stages, in each of which walkers walk in the best coordinates so far."""
+
+_KEPT = 3000
+"""Draws of a stage, at most, from each half of the walkers, to which coordinates are fitted."""
+
+_GOOD = 0.25
+"""Quality at which there is nothing more to be learned; 0.4 is that of a posterior which is normal."""
+
+_JUDGED = 400
+"""Draws of the posterior, and of the proposal, by which it is judged."""
+
+_LEAST = 0.02
+"""Share of proposals that is as good as taken anywhere, as there are other moves beside them."""
+
+
+def learned(
+    log_probability: LogProbability,
+    base: Logarithms,
+    start: Floats,
+    scale: Floats,
+    rng: np.random.Generator,
+    deadline: Deadline = NEVER,
+) -> Logarithms | Straightened:
+    """Coordinates with a proposal in them, found by walkers who walk in the best so far.
+
+    A proposal that is judged by its own draws looks good if it is so narrow that they do not meet what it misses; here
+    it is judged by where walkers have been.
+
+    Parameters
+    ----------
+    log_probability : callable
+        Of parameters.
+    base : Logarithms
+        Coordinates with a proposal, as far as one is known.
+    start : ndarray, shape (walkers, d)
+        Parameters where walkers begin; an even number of walkers.
+    scale : ndarray, shape (d,)
+        On which each of the base's coordinates varies a priori.
+    rng : np.random.Generator
+    deadline : Deadline
+        Past it, the walkers make one step more, and there is no further stage.
+    """
+    best: Logarithms | Straightened = base
+    points = start
+    random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
+    for steps in _STEPS:
+        walked = in_coordinates(log_probability, best)
+        places = best.of(points)
+        with WalkingEnsembles(walked, best.moves, places[None], walked(places)[None], [random]) as ensembles:
+            block = ensembles.make_block(steps, deadline.moment)
+        if not block.whole:
+            raise KeyboardInterrupt
+        (random,) = block.random_states
+        late = block.samples[:, block.steps // 2 :]
+        points = best.parameters(late[0, -1])[0]
+        every = [best.parameters(walker)[0] for walker in np.swapaxes(late[0], 0, 1)]
+        share = 1.0 / max(1.0, float(np.median(autocorrelation_time(late))))
+        half = len(every) // 2
+        some, others = (rng.permutation(np.concatenate(part))[:_KEPT] for part in (every[:half], every[half:]))
+        most = 0.0
+        if best.proposal is not None:
+            most = _quality(log_probability, best, np.concatenate([some, others]), rng)
+            best = best.with_proposal(best.proposal.with_efficiency(most))
+        if most < _GOOD and not deadline.has_passed:
+            with suppress(np.linalg.LinAlgError):  # too few have moved for anything to be fitted
+                quality = _quality(log_probability, _straightened(base, some, scale, share), others, rng)
+                if quality > most:
+                    most = quality
+                    best = _straightened(base, np.concatenate([some, others]), scale, share, quality)
+        if most >= _GOOD or deadline.has_passed:
+            break
+    return best
+
+
+def _straightened(
+    base: Logarithms, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0
+) -> Straightened:
+    """Coordinates fitted to draws, a share of which are independent, and a proposal in them."""
+    found = Straightened.fitted(base, draws, scale, share * len(draws))
+    return replace(found, proposal=Mixture((replace(Proposal.fitted(found.of(draws)), efficiency=efficiency),)))
+
+
+def _quality(
+    log_probability: LogProbability, coordinates: Logarithms | Straightened, draws: Floats, rng: np.random.Generator
+) -> float:
+    """One over the number of proposals after which a walker moves on, on average over draws of the posterior."""
+    target, proposal = in_coordinates(log_probability, coordinates), coordinates.proposal
+    assert proposal is not None
+    proposed, density = proposal.draw(rng, _JUDGED)
+    there = target(proposed) - density
+    chosen = coordinates.of(draws[rng.permutation(len(draws))[:_JUDGED]])
+    here = target(chosen) - proposal.log_density(chosen)
+    accepted = np.exp(np.minimum(0.0, there - here[:, None])).mean(axis=1)
+    return float(1.0 / np.mean(1.0 / np.maximum(accepted, _LEAST)))
