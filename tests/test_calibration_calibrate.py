@@ -251,7 +251,7 @@ def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
     assert not calibration_replicate(0, **asked).outcome.numbers["converged"]
     first, second = runs
     assert first == BY_DEFAULT
-    assert second == replace(BY_DEFAULT, walkers=None, max_steps=2000)
+    assert second == replace(BY_DEFAULT, walkers=None, max_steps=6000)
     runs.clear()
     calibration_replicate(0, settings=FEW_STEPS, **asked)
     assert runs == [FEW_STEPS]

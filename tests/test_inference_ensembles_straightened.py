@@ -89,6 +89,14 @@ def test_coordinates_and_parameters_are_there_and_back(found):
     )
 
 
+def test_what_is_far_off_has_coordinates_that_are_numbers(found):
+    """Parabolas of parabolas of parabolas."""
+    _, coordinates = found
+    far = coordinates.of(np.full((1, SIZE), 1e60))
+    assert np.isfinite(far).all()
+    assert np.isfinite(coordinates.proposal.log_density(far)).all()
+
+
 def test_volumes_grow_as_is_said(found):
     """The Jacobian by differences, but for a constant."""
     _, coordinates = found

@@ -41,7 +41,7 @@ _MUCH = 100
 """Loaded samples from which on what explains a record is not one of several contours that do."""
 
 _TRIED = 9
-"""Searches after which there is no other, if one of them has explained the record."""
+"""Searches after which there is no other, unless none of them explains a record that says little."""
 
 _AGAIN = 2
 """Searches that end where others did, after which it is believed that there is nothing else."""
@@ -211,7 +211,7 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
             found.append(_mode(model, optimum, rng, deadline))
         if says_much and found and (again == _AGAIN or found[-1].proposal.efficiency > _EFFICIENT):
             break
-        if found and tried >= _TRIED:
+        if tried >= _TRIED and (found or says_much):
             break
     for optimum in sorted(waiting, key=lambda one: one.cost):
         least = min((mode.optimum.cost for mode in found), default=optimum.cost)

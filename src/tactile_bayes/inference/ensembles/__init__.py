@@ -8,14 +8,16 @@ The draws of a chain are laid out walker-major: each walker's history in one pie
 out step by step, neighbours in the array would be different walkers, and any estimate of autocorrelation would take
 the draws for nearly independent.
 
-Seven proposals in ten come from a t distribution fitted to those walkers of the ensemble that do not move meanwhile
-(after Boehl 2022, doi 10.2139/ssrn.4250395), which gives three to four times the effective draws per evaluation where
-a posterior is nearly normal. The others are differential evolution (ter Braak 2006, doi 10.1007/s11222-006-8769-1;
-Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11): the difference of two other walkers, scaled, which follows whatever
-shape there is, and now and then unscaled, which lets a walker jump between separated modes. The snooker proposal of
-emcee 3.1.6 does not leave the target invariant and is not used.
+Where nothing else is known, seven proposals in ten come from a t distribution fitted to those walkers of the ensemble
+that do not move meanwhile (after Boehl 2022, doi 10.2139/ssrn.4250395), which gives three to four times the effective
+draws per evaluation where a posterior is nearly normal. The others are differential evolution (ter Braak 2006, doi
+10.1007/s11222-006-8769-1; Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11): the difference of two other walkers,
+scaled, which follows whatever shape there is, and now and then unscaled, which lets a walker jump between separated
+modes. The snooker proposal of emcee 3.1.6 does not leave the target invariant and is not used.
 
-Walkers may walk in other coordinates than the parameters, which then are what is judged and returned.
+Walkers may walk in other coordinates than the parameters, which then are what is judged and returned. `learned` finds
+such coordinates, and a proposal in them, by a short run whose draws are thrown away. Where there is a proposal, most
+steps are taken from it; what it misses is left to differential evolution, with long and short steps.
 
 With a checkpoint, every block of steps is on disk before the next begins. A block's file holds the last positions of
 the walkers and the states of their random numbers, so that a run that was killed makes the same draws as one that was

@@ -17,6 +17,9 @@ __all__ = ["Straightened"]
 
 Floats = NDArray[np.float64]
 
+_FARTHEST = 1e100
+"""Coordinate of what is further off: its square is a number still."""
+
 _NEAR = 0.1
 """Share of draws, those nearest to the middle, by which directions are found."""
 
@@ -109,7 +112,8 @@ class Straightened:
         straight = _solved(self.root, self.base.of(points.reshape(-1, points.shape[-1])) - self.mean)
         for k, bend in enumerate(self.bends):
             one, other = np.nonzero(bend)
-            straight[:, k] -= (straight[:, one] * straight[:, other]) @ bend[one, other]
+            bent = straight[:, k] - (straight[:, one] * straight[:, other]) @ bend[one, other]
+            straight[:, k] = np.clip(bent, -_FARTHEST, _FARTHEST)
         return straight.reshape(points.shape)
 
     def with_proposal(self, proposal: Mixture) -> Straightened:
