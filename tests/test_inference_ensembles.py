@@ -9,6 +9,7 @@ from arviz_stats.base.array import array_stats
 from scipy import stats
 from scipy.signal import lfilter
 
+from helpers.interrupts import interrupted_at
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, diagnosis, sample, scatter_walkers
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time, walker_major
@@ -227,16 +228,7 @@ def test_stuck_walkers_are_reported():
 @pytest.mark.parametrize("calls", [10, 60])
 def test_an_interrupt_leaves_what_has_been_drawn(calls):
     """The draws are those of a run that was planned to end after as many steps."""
-    count = 0
-
-    def log_probability(x):
-        nonlocal count
-        count += 1
-        if count == calls:
-            raise KeyboardInterrupt
-        return standard(x)
-
-    draws = draw_from(log_probability, 2, settings=SMALL)
+    draws = draw_from(interrupted_at(calls, standard), 2, settings=SMALL)
     assert not draws.converged
     assert "interrupted" in draws.message
     steps = draws.steps_run
@@ -274,17 +266,8 @@ def test_an_interrupt_of_the_diagnosis_leaves_what_has_been_drawn(monkeypatch):
 
 
 def test_an_interrupt_before_the_first_step_is_passed_on():
-    count = 0
-
-    def log_probability(x):
-        nonlocal count
-        count += 1
-        if count > 2:
-            raise KeyboardInterrupt
-        return standard(x)
-
     with pytest.raises(KeyboardInterrupt):
-        draw_from(log_probability, 2, settings=SMALL)
+        draw_from(interrupted_at(3, standard), 2, settings=SMALL)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from helpers.interrupts import interrupted_at
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Logarithms, Mixture, Proposal, approximate, in_coordinates, learned
 from tactile_bayes.inference.ensembles.straightened import Straightened
@@ -146,14 +147,6 @@ def test_past_the_deadline_one_step_is_made():
 
 
 def test_an_interrupt_is_passed_on():
-    calls = 0
-
-    def interrupted(points):
-        nonlocal calls
-        calls += 1
-        if calls > 10:
-            raise KeyboardInterrupt
-        return normal(points)
-
+    start = np.random.default_rng(5).normal(size=(36, SIZE))
     with pytest.raises(KeyboardInterrupt):
-        learned(interrupted, PLAIN, np.random.default_rng(5).normal(size=(36, SIZE)), SCALE, np.random.default_rng(1))
+        learned(interrupted_at(11, normal), PLAIN, start, SCALE, np.random.default_rng(1))

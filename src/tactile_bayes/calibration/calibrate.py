@@ -97,7 +97,7 @@ def calibrate(
     settings : SamplerSettings, optional
         By default 2 ensembles of 20 walkers, or two more than twice the parameters where these are many, until R̂ is
         below 1.05 and 200 effective draws are there, five for every walker, in 500 steps at most; where they are
-        not, again with as many walkers as `infer_contour` has, in 2000 steps at most. Runs that end unconverged
+        not, again with as many walkers as `infer_contour` has, in 6000 steps at most. Runs that end unconverged
         stay in.
     probability : float
         Of the bands, regions and intervals that are judged.
