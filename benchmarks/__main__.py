@@ -31,7 +31,7 @@ from tactile_bayes.demonstration import LOAD_CELL, ROD
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import spawn
 from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.path import trace
+from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import make_record
 
 CONTOUR = tb.contours.paper_profile("II", q=0.6)
@@ -289,7 +289,7 @@ def loads(count: int) -> Callable[[], Any]:
     """As a likelihood asks for them."""
     zero = np.zeros(count)
     seen = SeenContour(contours(count), zero, zero, 1.0, 0.0, zero > 0.0)
-    return lambda: trace(seen, exact_events=False).observables(ANGLES)
+    return lambda: trace(seen, tolerance=np.array([4e-5, 1e-4, 1e-4]), drive_angles=ANGLES)
 
 
 if __name__ == "__main__":

@@ -13,15 +13,9 @@ from scipy.optimize import brentq
 from helpers import exact_rod
 from helpers.exact_rod import Shape
 from helpers.integration import contact_end, rod, shoot
-from tactile_bayes.elastica import (
-    MAX_FRICTION_ANGLE,
-    NONE,
-    TANGENTIAL,
-    TIP,
-    contact_from_wrench,
-    wrench_from_contact,
-)
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE, contact_from_wrench, wrench_from_contact
+from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 
 EPS = np.finfo(float).eps
 CLOSE = 1e-10

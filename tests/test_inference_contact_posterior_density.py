@@ -18,9 +18,10 @@ from helpers.contact_posteriors import (
     posterior_by_roots,
     weighed_moments,
 )
-from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, wrench_from_contact
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.elastica import wrench_from_contact
+from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 
 CELLS = {"plain": CELL, "turning": CELL, "SI": SI_CELL, "exact angle": EXACT_ANGLE}
 

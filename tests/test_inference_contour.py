@@ -28,7 +28,7 @@ from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, in_frame, record_hash, to_si
 from tactile_bayes.rod import Rod
@@ -78,7 +78,7 @@ def test_moments_are_those_of_a_grid():
     On a grid in whitened coordinates the noise scale is summed for every contour, from the sum of squares.
     """
     result, record = posterior(), measured()
-    likelihood = RecordLikelihood(record, CELL, order=FINE_ORDER)
+    likelihood = RecordLikelihood(record, CELL, exact=True)
     draws = np.stack([result["posterior"][name].values.ravel() for name in TRUTH], axis=-1)
     root = np.linalg.cholesky(np.cov(draws.T))
     z = np.linspace(-4.5, 4.5, 11)

@@ -15,7 +15,7 @@ from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.likelihood import FAST_ORDER, FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
@@ -23,7 +23,7 @@ from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan
 
-SHARE = {FAST_ORDER: 3e-4, FINE_ORDER: 1e-6}
+SHARE = {False: 3e-4, True: 1e-6}
 """Error of the interpolated loads over their largest value, at worst, in 150 contours."""
 
 WIRE = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
@@ -94,8 +94,8 @@ def test_against_an_independent_sum(rig):
         present = ~np.isnan(values[0])
         deviation = np.array([cell.standard_deviations[name] for name in CHANNELS])[present]
         units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])[present]
-        for order in (FAST_ORDER,) if missing else (FAST_ORDER, FINE_ORDER):
-            likelihood = RecordLikelihood(measured, cell, friction, order)
+        for exact in (False,) if missing else (False, True):
+            likelihood = RecordLikelihood(measured, cell, friction, exact)
             found = likelihood.log_likelihood(stack([true, other]), scale[:, None])
             pointwise = likelihood.log_likelihood(stack([true, other]), scale[:, None], pointwise=True)
             np.testing.assert_allclose(pointwise.sum(axis=1), found, rtol=1e-12)
@@ -103,7 +103,7 @@ def test_against_an_independent_sum(rig):
                 sigma = scale[k] * deviation
                 densities = stats.norm.logpdf(values[:, present], loads[:, present], sigma).sum(axis=1)
                 expected = densities + np.log(units).sum()  # densities of dimensionless loads
-                error = SHARE[order] * np.abs(loads[:, present]).max(axis=0)
+                error = SHARE[exact] * np.abs(loads[:, present]).max(axis=0)
                 slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
                 assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
 
@@ -129,7 +129,7 @@ def test_the_frame_of_the_load_cell_does_not_matter(rig):
 @pytest.mark.parametrize("rig", RIGS)
 def test_predictions_are_in_the_frame_of_the_record(rig):
     measured, contours, cell, friction = swept_in(rig)
-    likelihood = RecordLikelihood(in_frame(measured, "turning"), cell, friction, FINE_ORDER)
+    likelihood = RecordLikelihood(in_frame(measured, "turning"), cell, friction, True)
     predicted, _ = likelihood.predict(contours)
     rod = RIGS[rig][2]
     load, angle = exact_by(rig), measured.drive_angle.values
@@ -142,7 +142,7 @@ def test_predictions_are_in_the_frame_of_the_record(rig):
         axis=-1,
     )
     largest = np.abs(load / np.array([rod.moment_unit, rod.force_unit, rod.force_unit])).max(axis=0)
-    error = SHARE[FINE_ORDER] * np.array([largest[0], *[np.sum(largest[1:])] * 2])
+    error = SHARE[True] * np.array([largest[0], *[np.sum(largest[1:])] * 2])
     assert np.all(np.abs(predicted[0] - exact) <= error)
     np.testing.assert_array_equal(likelihood.measured[:, 0], measured.holding_moment.values / rod.moment_unit)
 
@@ -202,7 +202,7 @@ def test_snap_off_tells_contours_apart():
     q = brentq(late, 0.45, 0.55, xtol=1e-13)
     sides = sorted((q - 1e-9, q + 1e-9), key=late)
     assert late(sides[0]) < 0.0 < late(sides[1])
-    likelihood = RecordLikelihood(measured, CELL, order=FINE_ORDER)
+    likelihood = RecordLikelihood(measured, CELL, exact=True)
     let_go, held_on = likelihood.log_likelihood(stack([Parabola(0.5, q) for q in sides]))
     values = np.array([float(measured[name][last]) for name in CHANNELS])
     load = exact_loads(measured, Parabola(0.5, sides[1]))[last]
@@ -302,7 +302,7 @@ def test_no_events_without_a_load():
 def exact_sensed(model, point):
     """What the cell senses of one point, (1, samples, 3), from states at the drive angles to rounding."""
     likelihood, rig = model.likelihood, model.rig(point)
-    paths = likelihood.paths(model.contours(point), rig, exact_events=True)
+    paths = likelihood.paths(model.contours(point), rig)
     stroke = likelihood.stroke_of_sample
     signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.strokes])[stroke]
     found = paths.states(stroke, likelihood.seen_angles - signs * likelihood.misread(rig)[0]).wrench

@@ -9,11 +9,13 @@ from scipy.optimize import brentq
 from helpers.legendre import equilibrium, tangential_arclength
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import NONE, TANGENTIAL, TIP
-from tactile_bayes.path import CHANNELS, CLEARANCE, Reach, SnapOff, trace
+from tactile_bayes.mechanics.fates import CLEARANCE, Reach, SnapOff
+from tactile_bayes.mechanics.paths import trace
+from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.record import CHANNELS
 
-SCAN = {"order": 32, "exact_events": True}
-LIKELIHOOD = {"order": 16, "exact_events": False}
+SCAN = {}
+LIKELIHOOD = {"tolerance": np.array([4e-5, 1e-4, 1e-4])}
 
 
 def seen_from(contour, base_x=0.0, base_y=0.0, mirrored=False, standoff=0.0):
@@ -61,7 +63,7 @@ def paths_of(seen, lane, friction_angle=0.0, **options):
         seen.standoff,
         seen.mirrored[pick],
     )
-    return trace(alone, friction_angle=friction_angle, **(options or SCAN))
+    return trace(alone, friction_angle=friction_angle, **options)
 
 
 # --- a search for trouble ---------------------------------------------------------------------------------------------
@@ -292,7 +294,7 @@ def test_first_contact_with_an_edge_straight_above_the_pivot():
     halves = [Parabola(a, y - a * x_c**2, x_c) for a, x_c in zip(sizes, vertices, strict=True)]
     lanes, zero = np.arange(count), np.zeros(count)
     seen = SeenContour(Joined(*halves, x=zero), zero, zero, 1.0, 0.0, np.zeros(count, dtype=bool))
-    paths = trace(seen, order=8, exact_events=False)
+    paths = trace(seen, tolerance=np.full(3, 1e-3))
     first = paths.first_parameter
     end = seen.domain()[1]
     touched = np.isfinite(first)

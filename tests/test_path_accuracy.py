@@ -27,9 +27,11 @@ from helpers.contours_drawn import Scene, scenes
 from helpers.exact_path import ExactPath
 from helpers.exact_rod import mp
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, paper_profile
-from tactile_bayes.elastica import NONE, tangential_arclength
 from tactile_bayes.errors import ContourError
-from tactile_bayes.path import CHANNELS, SnapOff
+from tactile_bayes.mechanics.elastica import tangential_arclength
+from tactile_bayes.mechanics.fates import SnapOff
+from tactile_bayes.mechanics.phases import NONE
+from tactile_bayes.record import CHANNELS
 from tactile_bayes.scanning import equilibria, scan
 from tactile_bayes.sweep_path import sweep_paths
 

@@ -41,7 +41,7 @@ from helpers.report_pages import (
 )
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, read_result, record_of, write_result
 from tactile_bayes.load_cell import LoadCell
@@ -433,7 +433,7 @@ def predicted(tree, rig):
     cell, rod = LoadCell.from_record(record), rod_of(record)
     nuisances = nuisances_of(record, list(rig), {}, cell, 0.0)
     values = {name: np.array([value]) for name, value in rig.items()}
-    likelihood = RecordLikelihood(record, cell, order=FINE_ORDER)
+    likelihood = RecordLikelihood(record, cell, exact=True)
     loads, _ = likelihood.predict(contours_of(best, "parabola"), nuisances.rig(values))
     return loads[0] * [rod.moment_unit, rod.force_unit, rod.force_unit]
 

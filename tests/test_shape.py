@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tactile_bayes.contours import paper_profile
-from tactile_bayes.elastica import TANGENTIAL, TIP, wrench_from_contact
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.elastica import wrench_from_contact
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.scanning import scan
 from tactile_bayes.shape import rod_shape
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_MODULES = ("contours", "datasets", "elastica", "errors", "paper_figures", "plotting")
+_MODULES = ("contours", "datasets", "errors", "paper_figures", "plotting")
 
 _HOMES = {
     "LoadCell": "load_cell",
@@ -35,6 +35,7 @@ _HOMES = {
     "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
     "design": "planning.design",
+    "elastica": "mechanics",
     "equilibria": "scanning",
     "error_map": "planning.error_map",
     "gap": "uncertainty.gap",
@@ -69,7 +70,6 @@ __all__ = ["__version__", *_MODULES, *_HOMES]
 if TYPE_CHECKING:
     from tactile_bayes import contours as contours
     from tactile_bayes import datasets as datasets
-    from tactile_bayes import elastica as elastica
     from tactile_bayes import errors as errors
     from tactile_bayes import paper_figures as paper_figures
     from tactile_bayes import plotting as plotting
@@ -88,6 +88,7 @@ if TYPE_CHECKING:
     from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
     from tactile_bayes.load_cell import RandomWalk as RandomWalk
     from tactile_bayes.load_cell import zero_load as zero_load
+    from tactile_bayes.mechanics import elastica as elastica
     from tactile_bayes.planning.design import design as design
     from tactile_bayes.planning.error_map import error_map as error_map
     from tactile_bayes.planning.plan import Plan as Plan

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from tactile_bayes.elastica import wrench_from_contact
+from tactile_bayes.mechanics.elastica import wrench_from_contact
 
 __all__ = ["base_curvature"]
 

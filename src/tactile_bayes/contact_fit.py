@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.elastica import TANGENTIAL, TIP, contact_from_wrench
+from tactile_bayes.mechanics.elastica import contact_from_wrench
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, Touching, touching, touching_and_slopes
 
 __all__ = ["ContactFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet"]

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.checks import as_numbers, check_choice, check_number, refused
 from tactile_bayes.contours.base import Contour
-from tactile_bayes.elastica import wrench_from_contact
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
-from tactile_bayes.path import Paths, States
+from tactile_bayes.mechanics.elastica import wrench_from_contact
+from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.record import COLUMNS, make_record
 from tactile_bayes.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.sweep_events import SweepEvents, events_of

@@ -10,17 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import PHASE_NAMES
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.path import Reach, trace
+from tactile_bayes.mechanics.fates import Reach
+from tactile_bayes.mechanics.paths import trace
+from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.record import COLUMNS
 from tactile_bayes.rod import Rod
 from tactile_bayes.sweep_path import friction_angle_of
 from tactile_bayes.sweeps import ManyUnits, phases_of, sweep_events, sweep_samples
 
 __all__ = ["scan_many"]
-
-_ORDER = 32
 
 _FATES = {
     Reach.TOUCHES: "ok",
@@ -113,7 +112,8 @@ def scan_many(
         )
     backward = np.full(count, direction == "backward")
     seen = SeenContour(contours.broadcast_to((count,)), x, y, rod.length, 0.5 * rod.diameter, backward)
-    paths = trace(seen, friction_angle=friction_angle_of(friction), order=_ORDER)
+    seen_angles = np.pi - angles if direction == "backward" else angles
+    paths = trace(seen, friction_angle=friction_angle_of(friction), drive_angles=seen_angles)
     units = ManyUnits(rod.length_unit, rod.moment_unit, rod.force_unit)
     system = "dimensionless" if rod.is_dimensionless else "SI"
 
@@ -122,7 +122,7 @@ def scan_many(
         return dims, values, {"units": column.unit_in(system), "long_name": column.long_name}
 
     both = ("contour", "sample")
-    samples = sweep_samples(paths, angles, units)
+    samples = sweep_samples(paths, units)
     phase = np.array(PHASE_NAMES)[samples.pop("contact_phase")]
     variables: dict[str, Any] = {"drive_angle": labelled(both, angles, "drive_angle")}
     variables |= {name: labelled(both, values, name) for name, values in samples.items()}

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ellipj
 
 from tactile_bayes.arc import arc_to
-from tactile_bayes.elastica import contact_from_wrench
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.elastica import contact_from_wrench
 
 __all__ = ["rod_shape"]
 
@@ -56,7 +56,7 @@ def rod_shape(
 
     Examples
     --------
-    >>> from tactile_bayes.elastica import wrench_from_contact
+    >>> from tactile_bayes.mechanics.elastica import wrench_from_contact
     >>> w = wrench_from_contact(0.2, 0.6, 0.1)
     >>> x, y = rod_shape(w.drive_angle, w.holding_moment, w.force_x, w.force_y, points=5)
     >>> x.round(3), y.round(3)

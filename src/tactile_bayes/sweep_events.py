@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from tactile_bayes.elastica import TANGENTIAL, TIP, Wrench, largest_curvature
-from tactile_bayes.path import Paths, SnapOff, States
+from tactile_bayes.mechanics.elastica import Wrench
+from tactile_bayes.mechanics.fates import SnapOff
+from tactile_bayes.mechanics.paths import Paths, States
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.rod import Rod
 from tactile_bayes.sweep_path import Direction
 from tactile_bayes.world import in_world
 
 __all__ = ["Event", "SweepEvents", "events_of"]
-
-_STRAINED = 65
-"""States on each stretch of a path of which the largest strain is taken."""
 
 
 @dataclass(frozen=True)
@@ -77,34 +77,24 @@ class SweepEvents:
 
 
 def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod: Rod) -> SweepEvents:
-    segments = paths.segments
-    inner = np.flatnonzero(segments.tip[1:] != segments.tip[:-1])
-    parameters = np.concatenate([paths.first_parameter, segments.end[inner], paths.snap_parameter])
+    to_tip = paths.change_to_tip[0]
+    parameters = np.concatenate([paths.first_parameter, paths.change_parameter[0, 1:], paths.snap_parameter])
     lane = np.zeros(parameters.size, dtype=np.intp)
     states = paths.states_at(lane, parameters)
     # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
-    wrench = _at_rest_first(states, bool(segments.tip[0]))
+    wrench = _at_rest_first(states, bool(to_tip[0]))
     columns = in_world(paths.seen, lane, states._replace(wrench=wrench), rod)
-    words = ["tip" if tip else "tangential" for tip in segments.tip]
+    words = ["tip" if tip else "tangential" for tip in to_tip]
     kinds = [
         words[0],
-        *(f"{words[i]} → {words[i + 1]}" for i in inner),
+        *(f"{before} → {after}" for before, after in pairwise(words)),
         SnapOff(int(paths.snap_off[0])).name.lower(),
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]
     found = [Event(kind, **{name: float(columns[name][i]) for name in names}) for i, kind in enumerate(kinds)]
     clear = bool(paths.is_clear()[0])
-    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, _largest_strain(paths, rod))
-
-
-def _largest_strain(paths: Paths, rod: Rod) -> float:
-    """Largest bending strain up to snap-off: that of the outer fibre, from the curvature on the nodes of the path."""
-    if not rod.diameter:
-        return 0.0
-    ways = np.broadcast_to(np.linspace(0.0, 1.0, _STRAINED), (paths.segments.lane.size, _STRAINED))
-    parameter, _ = paths.segments.take(np.s_[:, None]).along(ways)
-    wrench = paths.states_at(np.zeros(parameter.size, dtype=np.intp), parameter.ravel()).wrench
-    return float(np.nanmax(largest_curvature(wrench))) * 0.5 * rod.diameter / rod.length
+    strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
+    return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, strain)
 
 
 def _at_rest_first(states: States, tip: bool) -> Wrench:

@@ -9,15 +9,15 @@ import numpy as np
 from tactile_bayes.checks import check_choice, check_kind, check_number
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.path import CLEARANCE, Paths, Reach, trace
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.fates import CLEARANCE, Reach
+from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.rod import Rod
 
 __all__ = ["Direction", "friction_angle_of", "seen_from", "sweep_paths"]
 
 Direction = Literal["forward", "backward"]
-_ORDER = 32
 
 
 def sweep_paths(
@@ -41,7 +41,7 @@ def sweep_paths(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = trace(seen, friction_angle=friction_angle, order=_ORDER)
+    paths = trace(seen, friction_angle=friction_angle)
     sweep = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
     match Reach(int(paths.reach[0])):
         case Reach.TOO_FAR:

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.path import Paths
-from tactile_bayes.segments import first_of_lane
+from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.world import in_world
 
 __all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
@@ -42,15 +41,13 @@ class ManyUnits(NamedTuple):
         return ManyUnits(*(value[lane] if isinstance(value, np.ndarray) else value for value in self))
 
 
-def sweep_samples(paths: Paths, drive_angles: Floats, units: ManyUnits) -> dict[str, NDArray[Any]]:
-    """What the base feels at drive angles, and the contacts, loads to some 1e-8 of the largest.
+def sweep_samples(paths: Paths, units: ManyUnits) -> dict[str, NDArray[Any]]:
+    """What the base feels at the drive angles that paths were traced with, and the contacts.
 
     Parameters
     ----------
     paths : Paths
         A lane for each sweep.
-    drive_angles : ndarray, shape (lanes, k)
-        In the world's sense [rad].
     units : ManyUnits
         Of the lanes' rods.
 
@@ -60,14 +57,13 @@ def sweep_samples(paths: Paths, drive_angles: Floats, units: ManyUnits) -> dict[
         `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
     """
     seen = paths.seen
-    as_seen = np.where(seen.mirrored[:, None], np.pi - drive_angles, drive_angles)
-    lane, sample, states = paths.loaded_states(as_seen, polish=False)
+    lane, sample, states = paths.loaded_states()
     found = in_world(seen, lane, states, units.of(lane))
     out: dict[str, NDArray[Any]] = {}
     for name in SAMPLE_COLUMNS:
-        out[name] = np.full(drive_angles.shape, 0.0 if name in LOADS else np.nan)
+        out[name] = np.full(paths.sampled.shape[:2], 0.0 if name in LOADS else np.nan)
         out[name][lane, sample] = found[name]
-    out["contact_phase"] = np.zeros(drive_angles.shape, dtype=np.int8)
+    out["contact_phase"] = np.zeros(paths.sampled.shape[:2], dtype=np.int8)
     out["contact_phase"][lane, sample] = states.wrench.phase
     return out
 
@@ -89,13 +85,8 @@ def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Fl
 
 def phases_of(paths: Paths) -> list[str]:
     """Phases of every lane in their order, as "A-B-A" (A is tip contact, B tangential); "" where nothing touches."""
-    words = [""] * paths.seen.lanes
-    segments = paths.segments
-    first = first_of_lane(segments.lane)
-    for index, lane in enumerate(segments.lane.tolist()):
-        letter = "A" if segments.tip[index] else "B"
-        if first[index]:
-            words[lane] = letter
-        elif words[lane][-1] != letter:
-            words[lane] += f"-{letter}"
-    return words
+    count = np.isfinite(paths.change_parameter).sum(axis=1)
+    return [
+        "-".join("A" if tip else "B" for tip in to_tip[:phases])
+        for to_tip, phases in zip(paths.change_to_tip.tolist(), count.tolist(), strict=True)
+    ]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.elastica import PHASE_NAMES
-from tactile_bayes.path import States
+from tactile_bayes.mechanics.paths import States
+from tactile_bayes.mechanics.phases import PHASE_NAMES
 
 __all__ = ["RodUnits", "in_world"]
 

@@ -16,10 +16,11 @@ import xarray as xr
 from scipy import stats
 
 from tactile_bayes.contours import Parabola, paper_profile
-from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, wrench_from_contact
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.importance import weigh_contacts
 from tactile_bayes.load_cell import LoadCell, LoneSamples
+from tactile_bayes.mechanics.elastica import wrench_from_contact
+from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.reconstruction import samples_of
 from tactile_bayes.record import CHANNELS, frame_of, in_frame, rod_of
 from tactile_bayes.rod import Rod

@@ -24,7 +24,7 @@ from tactile_bayes.contours import (
 )
 from tactile_bayes.contours.function import FunctionContour
 from tactile_bayes.errors import ContourError, ReachError
-from tactile_bayes.path import Paths
+from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.sweep_path import sweep_paths
 
 

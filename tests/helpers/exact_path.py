@@ -16,7 +16,7 @@ import numpy as np
 
 from helpers.exact_rod import HALF, QUARTER, complementary_arc, mp
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw, ShapeFree
-from tactile_bayes.path import States
+from tactile_bayes.mechanics.paths import States
 
 Number = Any
 DIGITS = 40

@@ -21,7 +21,7 @@ from tactile_bayes.inference.contour_problem import ContourProblem, contour_prio
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior, refuse_no_prior
 from tactile_bayes.inference.family_names import family_named
-from tactile_bayes.inference.likelihood import FINE_ORDER, bases_of
+from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell
@@ -94,7 +94,7 @@ class Experiment:
         priors = {**defaults, **self.priors, **self.world.priors}
         priors = {name: priors[name] for name in (*family.parameters, *rig.names, *noise.names)}
         model = ContourModel(self.template, family, rig, noise, priors)
-        model.likelihood.order = FINE_ORDER
+        model.likelihood.exact = True
         if self.world.friction or self.world.flat_spot:  # a family that is always clear without may be not with them
             model.likelihood.is_always_clear = False
         return model

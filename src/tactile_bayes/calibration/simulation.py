@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.contours import Contour
-from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.load_cell.corruption import corrupted_angles
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["Simulation", "simulate"]

@@ -1,4 +1,4 @@
-"""Halves of contours that have a formula: what compiled code has to know."""
+"""What compiled code has to know of contours: halves with a formula, or a table."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["OVAL", "PARABOLA", "POWER_LAW", "TABLE", "Half", "Halves"]
+__all__ = ["CELLS", "OVAL", "PARABOLA", "POWER_LAW", "SLOPES", "Half", "Halves"]
 
 Floats = NDArray[np.float64]
 
-PARABOLA, OVAL, POWER_LAW, TABLE = 0, 1, 2, 3
+PARABOLA, OVAL, POWER_LAW, SLOPES, CELLS = 0, 1, 2, 3, 4
 
 
 class Half(NamedTuple):
@@ -19,21 +19,21 @@ class Half(NamedTuple):
 
     kind: int
     """`PARABOLA`: y = size · x²; `OVAL`: half-axes size (sideways) and shape; `POWER_LAW`: y = size · |x|^shape;
-    `TABLE`, of both sides: up to the slope angle `size`, shape 1, and the rest is in the tables."""
+    `SLOPES`, `CELLS`, of both sides: up to the parameter `size`, and the rest is in the tables."""
     size: Floats
     shape: Floats
 
 
 class Halves(NamedTuple):
-    """Both sides of a contour that is level at its vertex."""
+    """Both sides of a contour."""
 
     left: Half
     right: Half
     x: Floats
-    """The vertex."""
+    """The vertex, or what a table counts from."""
     y: Floats
-    has_knot: bool
-    """Whether the contour may not be smooth at the vertex."""
     tables: Floats | None = None
-    """Of contours that have no formula, shape (n, cells + 1, 6): at slope angles from −π/2 to π/2, equally far apart,
-    the point seen from the vertex, its rates over the width of a cell, and the rates of these."""
+    """Of contours that have no formula, shape (n, rows, columns). `SLOPES`: at slope angles from −π/2 to π/2, equally
+    far apart, the point, its rates over the width of a cell, and the rates of these. `CELLS`: a row a cell, where it
+    begins and ends in the contour's own parameter, and Chebyshev coefficients of x, y and slope angle; rows beyond the
+    last cell begin at infinity."""

@@ -114,7 +114,7 @@ class Joined(Contour):
         left, right = self.left.halves, self.right.halves
         if self.x is not None or left is None or right is None:
             return None
-        return Halves(left.left, right.right, left.x, left.y, has_knot=True)
+        return Halves(left.left, right.right, left.x, left.y)
 
     def end_name(self, side: Literal["left", "right"]) -> str:
         return (self.left if side == "left" else self.right).end_name(side)

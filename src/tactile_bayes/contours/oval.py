@@ -46,7 +46,7 @@ class Oval(Contour):
     @property
     def halves(self) -> Halves:
         half = Half(OVAL, *(np.asarray(axis) for axis in self.half_axes))
-        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=False)
+        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
 
     def end_name(self, side: Literal["left", "right"]) -> str:
         return "where it stands upright"

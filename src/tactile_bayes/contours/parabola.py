@@ -62,7 +62,7 @@ class Parabola(Contour):
     @property
     def halves(self) -> Halves:
         half = Half(PARABOLA, np.asarray(self.a), np.ones(()))
-        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=False)
+        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
 
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha = np.asarray(parameter, dtype=float)

@@ -80,7 +80,7 @@ class PowerLaw(Contour):
     @property
     def halves(self) -> Halves:
         half = Half(POWER_LAW, np.asarray(self.a), np.asarray(self.n))
-        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=True)
+        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
 
     @property
     def knots(self) -> tuple[Floats, ...]:

@@ -86,13 +86,13 @@ class SeenContour:
                 end[far] = self._parameter_at(far, 2.0 * outward)
         return lo, hi
 
+    def own_domain(self) -> tuple[Floats, Floats]:
+        """The same in the contour's own sense."""
+        low, high = self.domain()
+        return np.where(self.mirrored, -high, low), np.where(self.mirrored, -low, high)
+
     def _parameter_at(self, lane: Index, x: float) -> Floats:
         """Parameters at which the contour itself, without standoff, is at x as seen."""
         sign = np.where(self.mirrored[lane], -1.0, 1.0)
         length = self.length[lane] if isinstance(self.length, np.ndarray) else self.length
         return np.asarray(sign * self.contour.take(lane).parameter_of_x(self.base_x[lane] + sign * x * length))
-
-    def knots(self) -> Floats:
-        """Parameters, shape (knots, lanes), at which the contour may not be smooth."""
-        knots = np.array([np.broadcast_to(k, (self.lanes,)) for k in self.contour.knots], dtype=float)
-        return np.where(self.mirrored, -1.0, 1.0) * knots.reshape(-1, self.lanes)

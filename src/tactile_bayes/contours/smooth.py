@@ -21,7 +21,7 @@ from tactile_bayes.contours.base import (
     finite,
     refuse_unless,
 )
-from tactile_bayes.contours.halves import TABLE, Half, Halves
+from tactile_bayes.contours.halves import SLOPES, Half, Halves
 from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
 from tactile_bayes.roots import falling_root
@@ -110,9 +110,9 @@ class Smooth(Tabled):
 
     @property
     def halves(self) -> Halves:
-        half = Half(TABLE, np.full(self.shape, _UPRIGHT), np.ones(self.shape))
+        half = Half(SLOPES, np.full(self.shape, _UPRIGHT), np.ones(self.shape))
         tables = self.__dict__["_table"][self.__dict__["_row"]]
-        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), has_knot=False, tables=tables)
+        return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q), tables=tables)
 
     def locate(self, parameter: ArrayLike) -> Locus:
         alpha, row = np.broadcast_arrays(np.asarray(parameter, dtype=float), self.__dict__["_row"])

@@ -16,9 +16,9 @@ from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS, rule_of
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.datasets.strain import largest_strain
 from tactile_bayes.errors import ContourError, SpecificationError
-from tactile_bayes.path import Paths, Reach, trace
+from tactile_bayes.mechanics.fates import Reach
+from tactile_bayes.mechanics.paths import Paths, trace
 from tactile_bayes.rod import LARGEST_STRAIN
 from tactile_bayes.sweeps import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
@@ -27,7 +27,6 @@ __all__ = ["Records", "generate_records"]
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_ORDER = 32
 
 _MOST_DRAWS = 1000
 """Draws of one record before the specification is given up."""
@@ -236,7 +235,7 @@ def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
     seen = SeenContour(
         contours.take(lane_of), base_x, base_y, np.tile(lengths, sweeps), np.tile(standoffs, sweeps), backward
     )
-    paths = trace(seen, friction_angle=float(np.arctan(spec.friction)), order=_ORDER)
+    paths = trace(seen, friction_angle=float(np.arctan(spec.friction)))
     fate = paths.reach.reshape(sweeps, -1).max(axis=0)
     with np.errstate(invalid="ignore"):
         clear = paths.is_clear().reshape(sweeps, -1).all(axis=0)
@@ -297,8 +296,9 @@ def _recorded(spec: Specification, paths: Paths, good: NDArray[np.bool_], units:
         found |= {f"{event}_{name}": columns[name] for name in EVENT_COLUMNS}
     found["snap_off_kind"] = paths.snap_off
     if spec.has_thickness:
-        found["largest_strain"] = largest_strain(paths, np.tile(good, len(spec.sweeps)))
-    samples = sweep_samples(paths, angles, units)
+        found["largest_strain"] = np.nan_to_num(paths.largest_curvature * paths.seen.standoff / paths.seen.length)
+    as_seen = np.where(paths.seen.mirrored[:, None], np.pi - angles, angles)
+    samples = sweep_samples(trace(paths.seen, friction_angle=paths.friction_angle, drive_angles=as_seen), units)
     found["drive_angle"] = angles
     found |= {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
     return {name: by_record(values) for name, values in found.items()}

@@ -16,9 +16,9 @@ from tactile_bayes.datasets.families import KNOTS, LOG_RADIUS
 from tactile_bayes.datasets.generation import Records, generate_records
 from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.datasets.specification import Specification, read_text
-from tactile_bayes.elastica import PHASE_NAMES
 from tactile_bayes.files import write_atomically
-from tactile_bayes.path import SnapOff
+from tactile_bayes.mechanics.fates import SnapOff
+from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
 
 __all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]

@@ -21,7 +21,7 @@ def events_of(
     What is not exact is right to 1e-6 rad and 1e-5 rod lengths, at a quarter of the cost.
     """
     count = contours.shape[0]
-    paths = likelihood.paths(contours, rig, exact_events=exact)
+    paths = likelihood.paths(contours, rig, exact=exact)
     lanes = np.arange(paths.seen.lanes)
     backward = paths.seen.mirrored
     out = {}

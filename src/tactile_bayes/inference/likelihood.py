@@ -13,31 +13,26 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.contours.halves import Halves
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.encoder import EncoderErrors
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.path import Paths, Reach, trace
+from tactile_bayes.mechanics.fates import Reach
+from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.shapes import shapes_of
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
-    from tactile_bayes.compiled.loads import Strokes
+    from tactile_bayes.mechanics.sweeps import Lanes, Shapes, Strokes
 
-__all__ = ["FAST_ORDER", "FINE_ORDER", "RecordLikelihood", "Rig", "bases_of", "without_errors"]
+__all__ = ["RecordLikelihood", "Rig", "bases_of", "without_errors"]
 
 Floats = NDArray[np.float64]
-
-FAST_ORDER, FINE_ORDER = 16, 32
-"""Follow loads as well as noise asks, and as well as can be."""
 
 _UNFELT = 2e-3
 """Error of loads over their noise that 360 samples together do not show: it moves their log-likelihood by less than
 0.05 in 999 of 1000 records."""
-
-_FAST_ARRAYS = 1e-5
-"""Error of the loads of arrays with few nodes, over the largest load."""
 
 _LEAST = 1e-9
 """Error of loads that is not asked for to be less, over the largest load: large tables are no better."""
@@ -89,8 +84,8 @@ class RecordLikelihood:
         In the record's units. Its encoder's offset and backlash are taken out of the drive angles.
     friction : float
         Coulomb's coefficient μ.
-    order : int
-        `FAST_ORDER`, or `FINE_ORDER`, which takes some ten times as long.
+    exact : bool
+        Whether paths are followed as well as can be, and not as well as noise asks, which takes a fifth of that.
     is_always_clear : bool
         Whether a rod that has snapped off is past every contour that will be asked for, so that it need not be looked
         at. After snap-off no load is predicted, which would be wrong for others: they are excluded.
@@ -101,10 +96,10 @@ class RecordLikelihood:
         measured: xr.Dataset,
         load_cell: LoadCell,
         friction: float = 0.0,
-        order: int = FAST_ORDER,
+        exact: bool = False,
         is_always_clear: bool = True,
     ) -> None:
-        self.order = order
+        self.exact = exact
         self.is_always_clear = is_always_clear
         self.rod = rod_of(measured)
         self.friction = friction
@@ -131,8 +126,7 @@ class RecordLikelihood:
             for k, (x, y, b, s) in enumerate(kinds)
         ]
         self._pivots = np.array([stroke.pivot for stroke in self.strokes])
-        others = [[t.base == s.base and t.backward != s.backward for t in self.strokes] for s in self.strokes]
-        self._opposite = np.argmax(others, axis=1) if np.all(np.any(others, axis=1)) else None
+        self._signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
         longest = max(stroke.samples.size for stroke in self.strokes)
         self._strokes: tuple[bytes, Strokes] | None = None
         self._angles = np.full((len(self.strokes), longest), np.nan)
@@ -151,32 +145,42 @@ class RecordLikelihood:
         largest = np.nan_to_num(np.abs(self.measured)).max(axis=0)
         share = _UNFELT * math.sqrt(min(1.0, 360.0 / len(self.measured)))
         self._tolerance = np.maximum(share * self._noise, _LEAST * np.maximum(largest, 1.0))
-        self._felt = bool(np.any(self._tolerance < _FAST_ARRAYS * largest))
 
-    def paths(self, contours: Contour, rig: Rig | None = None, *, exact_events: bool = False) -> Paths:
-        """Paths of every contour in every stroke; lane k·n + i is contour i in stroke k."""
-        count = contours.shape[0]
-        rig = self._rig_of(rig, count)
+    def paths(
+        self, contours: Contour, rig: Rig | None = None, *, exact: bool = True, drive_angles: Floats | None = None
+    ) -> Paths:
+        """Paths of every contour in every stroke; lane k·n + i is contour i in stroke k.
+
+        Drive angles are as seen in forward sweeps, less what is misread, shape (lanes, k). What is not exact is as good
+        as noise asks.
+        """
+        rig = self._rig_of(rig, contours.shape[0])
         strokes = len(self.strokes)
-        index = np.tile(np.arange(count), strokes)
-        backward = np.repeat([stroke.backward for stroke in self.strokes], count)
-        stated = np.array([stroke.base for stroke in self.strokes])
-        base_x, base_y = (stated[:, None] + rig.base_shifts[:, self._pivots].swapaxes(0, 1)).reshape(-1, 2).T
-        seen = SeenContour(contours.take(index), base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
         return trace(
-            seen,
+            self._seen(contours, rig),
             friction_angle=np.tile(np.arctan(rig.friction), strokes),
             suspension_compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, strokes),
-            order=FINE_ORDER if self._felt else self.order,
-            exact_events=exact_events or self.order > FAST_ORDER,
+            tolerance=None if exact else self._tolerance,
+            drive_angles=drive_angles,
         )
+
+    def _seen(self, contours: Contour, rig: Rig) -> SeenContour:
+        (count,), strokes = contours.shape, len(self.strokes)
+        base_x, base_y = self._bases(rig).reshape(-1, 2).T
+        backward = np.repeat(self._signs < 0.0, count)
+        every = contours.take(np.tile(np.arange(count), strokes))
+        return SeenContour(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
+
+    def _bases(self, rig: Rig) -> Floats:
+        """Pivots, shape (strokes, n, 2)."""
+        stated = np.array([stroke.base for stroke in self.strokes])
+        return np.asarray(stated[:, None] + rig.base_shifts[:, self._pivots].swapaxes(0, 1))
 
     def snap_offs(self, contours: Contour, rig: Rig | None = None) -> Floats:
         """Drive angles at which contact ends, as read and as seen in forward sweeps, shape (n, strokes)."""
         rig = self._rig_of(rig, contours.shape[0])
-        signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
-        ends = self.paths(contours, rig).snap_angle.reshape(len(self.strokes), -1).T
-        return np.asarray(ends + signs * self._misread(rig))
+        ends = self.paths(contours, rig, exact=False).snap_angle.reshape(len(self.strokes), -1).T
+        return np.asarray(ends + self._signs * self._misread(rig))
 
     def misread(self, rig: Rig) -> Floats:
         """What the encoder reads too much, beyond what the data sheet says [rad], shape (n or 1, samples)."""
@@ -223,21 +227,11 @@ class RecordLikelihood:
 
     def usable(self, contours: Contour, rig: Rig | None = None) -> NDArray[np.bool_]:
         """Contours that every stroke can reach, and that the rod is past after snap-off, shape (n,)."""
-        return self._usable(self.paths(contours, rig), contours.shape[0])
-
-    def _usable(self, paths: Paths, count: int) -> NDArray[np.bool_]:
+        paths = self.paths(contours, rig, exact=False)
         usable = paths.reach == Reach.TOUCHES
         if not self.is_always_clear:
-            usable = usable & self._is_clear(paths)
-        return np.asarray(usable.reshape(-1, count).all(axis=0))
-
-    def _is_clear(self, paths: Paths) -> NDArray[np.bool_]:
-        """Where the sweep in the other direction is at hand its first contact says so."""
-        if self._opposite is None or np.any(paths.friction_angle):
-            return paths.is_clear()
-        first = paths.first_angle.reshape(len(self.strokes), -1)[self._opposite]
-        with np.errstate(invalid="ignore"):
-            return np.asarray(paths.snap_angle > np.pi - first.ravel())
+            usable &= paths.is_clear()
+        return np.asarray(usable.reshape(len(self.strokes), -1).all(axis=0))
 
     def predict(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, NDArray[np.bool_]]:
         """Noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
@@ -260,18 +254,54 @@ class RecordLikelihood:
         return loads[:, 0], reached, events
 
     def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
-        rig = self._rig_of(rig, contours.shape[0])
-        halves = contours.halves
-        if halves is None or np.any(rig.friction) or self.order > FAST_ORDER:
-            predicted, reached, events = self._by_arrays(contours, rig, errors)
-        else:
-            predicted, reached, events = self._by_compiled(halves, rig, errors)
+        from tactile_bayes.mechanics.sweeps import answered  # numba takes a second to load
+
+        (count,) = contours.shape
+        rig = self._rig_of(rig, count)
+        found = answered(
+            self._shapes(contours, rig),
+            self._lanes(rig),
+            self._strokes_with(errors),
+            (count, errors.size * len(self.measured)),
+            tolerance=None if self.exact else self._tolerance,
+            asks_clearance=not self.is_always_clear,
+        )
+        usable = found.reach == Reach.TOUCHES
+        if not self.is_always_clear:
+            usable &= found.snap_angle > found.clear_angle
+        events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(-1, count, 2).swapaxes(0, 1)
+        events = events + (self._signs * self._misread(rig))[..., None]
+        predicted = found.loads.reshape(count, errors.size, *self.measured.shape)
         if self._turn is not None:
             turn = self._turn - self.misread(rig)[:, None] - errors[:, None]
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
         if np.any(rig.rigidity_scale != 1.0):
             predicted *= rig.rigidity_scale[:, None, None, None]
-        return predicted, reached, events
+        return predicted, usable.reshape(-1, count).all(axis=0), events
+
+    def _shapes(self, contours: Contour, rig: Rig) -> Shapes:
+        if contours.halves is not None:
+            return shapes_of(contours)
+        low, high = (end.reshape(len(self.strokes), -1) for end in self._seen(contours, rig).own_domain())
+        return shapes_of(contours, low.min(axis=0), high.max(axis=0))
+
+    def _lanes(self, rig: Rig) -> Lanes:
+        from tactile_bayes.mechanics.sweeps import Lanes
+
+        count, strokes = rig.friction.size, len(self.strokes)
+        bases = self._bases(rig)
+        return Lanes(
+            contour=np.tile(np.arange(count), strokes),
+            stroke=np.repeat(np.arange(strokes), count),
+            base_x=bases[..., 0].ravel(),
+            base_y=bases[..., 1].ravel(),
+            length=np.full(strokes * count, self.rod.length),
+            standoff=np.full(strokes * count, 0.5 * self.rod.diameter),
+            backward=np.repeat(self._signs < 0.0, count),
+            friction_angle=np.tile(np.arctan(rig.friction), strokes),
+            compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, strokes),
+            offset=np.broadcast_to(self._misread(rig), (count, strokes)).T.ravel(),
+        )
 
     def _rig_of(self, rig: Rig | None, count: int) -> Rig:
         """Of every contour, what is known of the rig where nothing is said of it."""
@@ -281,70 +311,21 @@ class RecordLikelihood:
             shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
         return Rig._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
 
-    def _by_compiled(self, halves: Halves, rig: Rig, errors: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
-        """`_predict`, in the pivot's frame, without friction."""
-        from tactile_bayes.compiled.loads import loads_of  # numba takes a second to load
-
-        rod = self.rod.length, 0.5 * self.rod.diameter
-        misread = self._misread(rig)
-        compliance = np.broadcast_to((rig.suspension_compliance * rig.rigidity_scale)[:, None], misread.shape)
-        loads, usable, events = loads_of(
-            halves,
-            self._strokes_with(errors),
-            rod,
-            np.stack([misread, compliance], axis=-1),
-            rig.base_shifts[:, self._pivots],
-            self._tolerance,
-            is_always_clear=self.is_always_clear,
-        )
-        return loads.reshape(len(loads), errors.size, *self.measured.shape), usable, events
-
     def _strokes_with(self, errors: Floats) -> Strokes:
         """Every sample once for each error, one error after the other."""
-        from tactile_bayes.compiled.loads import Strokes
+        from tactile_bayes.mechanics.sweeps import Strokes
 
         key = errors.tobytes()
         if self._strokes is None or self._strokes[0] != key:
-            bases = np.array([stroke.base for stroke in self.strokes])
             samples, angles = [], []
             for row, stroke in zip(self._angles, self.strokes, strict=True):
                 shifts = errors if stroke.backward else -errors
                 angles.append((row[: stroke.samples.size] + shifts[:, None]).ravel())
                 samples.append((stroke.samples + len(self.measured) * np.arange(errors.size)[:, None]).ravel())
-            strokes = Strokes(
-                base_x=bases[:, 0].copy(),
-                base_y=bases[:, 1].copy(),
-                backward=np.array([stroke.backward for stroke in self.strokes]),
-                first=np.cumsum([0, *(part.size for part in samples)]),
-                samples=np.concatenate(samples),
-                angles=np.concatenate(angles),
-            )
+            first = np.cumsum([0, *(part.size for part in samples)])
+            strokes = Strokes(first, np.concatenate(samples), np.concatenate(angles))
             self._strokes = key, strokes
         return self._strokes[1]
-
-    def _by_arrays(
-        self, contours: Contour, rig: Rig | None = None, errors: Floats | None = None
-    ) -> tuple[Floats, NDArray[np.bool_], Floats]:
-        """`_predict`, in the pivot's frame, for any contour, with friction, and to any accuracy."""
-        count, errors = contours.shape[0], np.zeros(1) if errors is None else errors
-        rig = self._rig_of(rig, count)
-        paths = self.paths(contours, rig)
-        signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
-        offset = (signs[:, None] * self._misread(rig).T).reshape(-1, 1)
-        angles = self._angles[:, None] - signs[:, None, None] * errors[:, None]  # (stroke, error, sample)
-        longest = angles.shape[-1]
-        loads = paths.observables(np.repeat(angles.reshape(len(angles), -1), count, axis=0) - offset)
-        predicted = np.zeros((count, errors.size, *self.measured.shape))
-        for k, stroke in enumerate(self.strokes):
-            sign = np.array([-1.0, -1.0, 1.0]) if stroke.backward else 1.0
-            own = loads[k * count : (k + 1) * count].reshape(count, errors.size, longest, -1)
-            predicted[:, :, stroke.samples] = sign * own[:, :, : stroke.samples.size]
-        events = np.stack([paths.first_angle, paths.snap_angle], axis=1).reshape(len(self.strokes), count, 2)
-        return (
-            predicted,
-            self._usable(paths, count),
-            events.swapaxes(0, 1) + offset.reshape(-1, count, 1).swapaxes(0, 1),
-        )
 
     def log_likelihood(
         self, contours: Contour, noise_scale: Any = 1.0, rig: Rig | None = None, *, pointwise: bool = False

@@ -17,7 +17,6 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_priors
 from tactile_bayes.inference.families import Prior, refuse_no_prior
 from tactile_bayes.inference.family_names import family_named
-from tactile_bayes.inference.likelihood import FINE_ORDER
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell
@@ -130,7 +129,7 @@ class Plan:
                 f"there is a prior of {', '.join(strangers)}, which is no parameter: there are {', '.join(priors)}"
             )
         model = ContourModel(self.record, family, rig, noise, {**priors, **self.priors})
-        model.likelihood.order = FINE_ORDER
+        model.likelihood.exact = True
         return model
 
     @cached_property

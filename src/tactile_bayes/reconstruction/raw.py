@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.contact_fit import Reading
-from tactile_bayes.elastica import NONE, TANGENTIAL, TIP, Contact, contact_from_wrench
+from tactile_bayes.mechanics.elastica import Contact, contact_from_wrench
+from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.reconstruction.estimate import (
     BEYOND_TIP,
     NONLINEAR,

@@ -12,8 +12,9 @@ from scipy.special import chdtrc
 
 from tactile_bayes.checks import check_choice, check_number, check_optional, refused
 from tactile_bayes.contact_fit import Reading
-from tactile_bayes.elastica import MAX_FRICTION_ANGLE, PHASE_NAMES, TANGENTIAL
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate

@@ -10,12 +10,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.elastica import PHASE_NAMES
 from tactile_bayes.inference.contour import contours_of
-from tactile_bayes.inference.likelihood import FINE_ORDER, RecordLikelihood
+from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.record import rod_of
 from tactile_bayes.shape import rod_shape
 from tactile_bayes.sweeps import ManyUnits
@@ -98,8 +98,8 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     friction = float(posterior.attrs["friction"])
     nuisances = nuisances_of(record, json.loads(posterior.attrs["nuisances"]), {}, cell, friction)
     rig = nuisances.rig({name: np.atleast_1d(draw[name].values) for name in nuisances.names})
-    likelihood = RecordLikelihood(record, cell, friction, order=FINE_ORDER)
-    paths = likelihood.paths(contour, rig, exact_events=True)
+    likelihood = RecordLikelihood(record, cell, friction)
+    paths = likelihood.paths(contour, rig)
 
     numbers = record.sweep.values
     every = max(1, -(-numbers.size // most))

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.elastica import NONE, PHASE_NAMES, TANGENTIAL, TIP
 from tactile_bayes.inference.result import contact_draws
+from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES, TANGENTIAL, TIP
 from tactile_bayes.reconstruction.estimate import spread_across
 
 __all__ = ["LEAST_DRAWS", "contact_moments"]

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
-from tactile_bayes.elastica import TANGENTIAL
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
 from tactile_bayes.touching import PLACE
 from tactile_bayes.world import in_world
@@ -189,7 +189,6 @@ def contacts_of(
     is asked. Where contact begins and ends need not be exact: 1e-6 rad cost a quarter of that.
     """
     count, strokes = contours.shape[0], likelihood.strokes
-    paths = likelihood.paths(contours, rig, exact_events=exact)
     read = angle - np.broadcast_to(likelihood.misread(rig), (count, angle.size))
     shape = (len(strokes), max(stroke.samples.size for stroke in strokes))
     samples = np.zeros(shape, dtype=np.intp)
@@ -198,7 +197,8 @@ def contacts_of(
         which[: stroke.samples.size] = stroke.samples
         of_stroke = read[:, stroke.samples]
         angles[:, : stroke.samples.size] = np.pi - of_stroke if stroke.backward else of_stroke
-    lane, rank, states = paths.loaded_states(seen.reshape(-1, shape[1]))
+    paths = likelihood.paths(contours, rig, exact=exact, drive_angles=seen.reshape(-1, shape[1]))
+    lane, rank, states = paths.loaded_states()
     columns = in_world(paths.seen, lane, states, likelihood.rod)
     columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
     out = {name: np.full(read.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_choice, check_function, check_number, check_optional, check_whole_number, refused
-from tactile_bayes.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
 from tactile_bayes.inference.contact_posterior.draws import (
@@ -30,6 +29,7 @@ from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAS
 from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.reconstruction import reconstruct, samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
 from tactile_bayes.rod import Rod

@@ -1,0 +1,241 @@
+"""The exact rod for arrays: contact → base wrench and base wrench → contact, in closed form (`states`).
+
+Everything here is dimensionless (length L, moment EI/L, force EI/L²), relative to the pivot, and broadcasts. All
+contacts are forward ones (holding moment ≥ 0); `side=-1` mirrors a backward one in and out.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.phases import NONE
+
+__all__ = [
+    "MAX_FRICTION_ANGLE",
+    "Contact",
+    "Wrench",
+    "contact_from_wrench",
+    "largest_curvature",
+    "tangential_arclength",
+    "wrench_from_contact",
+]
+
+Floats = NDArray[np.float64]
+
+MAX_FRICTION_ANGLE = 0.7
+"""Largest friction angle δ [rad]: 2 E(m) > K(m) must hold for m = (1 + sin δ)/2, else the map of Phase B folds."""
+
+
+class Wrench(NamedTuple):
+    """What the base feels in a contact; NaN where the rod cannot make it (`phase` is then `NONE`)."""
+
+    drive_angle: Floats
+    """Slope φ0 of the rod at the pivot [rad]."""
+    holding_moment: Floats
+    """Moment m0 that the drive holds."""
+    force_x: Floats
+    force_y: Floats
+    """Support reaction (−f sin β, f cos β)."""
+    contact_arclength: Floats
+    """Arc length s1 from the pivot to the contact."""
+    tip_angle: Floats
+    """Slope φ(s1) of the rod at the contact [rad]."""
+    phase: NDArray[np.int8]
+    """`NONE`, `TIP` or `TANGENTIAL`."""
+    by_slope: Floats
+    """∂φ0/∂α, the contact point held; by rotation of the whole, ∂φ0/∂(polar angle of the point) = 1 − by_slope."""
+    by_distance: Floats
+    """∂φ0/∂(r²), r the distance of the contact from the pivot, its direction and α held; zero in tangential contact."""
+    tangential_arclength: Floats
+    """Arc length that tangential contact at this point would take; the rod's length is what it is compared with."""
+
+
+class Contact(NamedTuple):
+    """Where the rod touches, from what the base feels; NaN where there is no answer."""
+
+    contact_x: Floats
+    contact_y: Floats
+    """Contact point relative to the pivot."""
+    slope_angle: Floats
+    """Slope angle α of the contour [rad]."""
+    contact_arclength: Floats
+    """Arc length s1 from the pivot to the contact; above 1 it lies beyond the tip."""
+    tip_angle: Floats
+    """Slope φ(s1) of the rod at the contact [rad]."""
+    modulus: Floats
+    """m; the curvature has a zero if and only if m < 1."""
+
+
+def _refuse_friction(friction_angle: Floats) -> None:
+    bad = ~((friction_angle >= 0.0) & (friction_angle <= MAX_FRICTION_ANGLE))
+    if np.any(bad):
+        found = float(friction_angle[bad].flat[0])
+        raise ParameterError(
+            f"the friction angle is {found:g} rad: give one between 0 and "
+            f"{MAX_FRICTION_ANGLE} (coefficient {np.tan(MAX_FRICTION_ANGLE):.2f}); beyond, a rod would loop before it "
+            "slides"
+        )
+
+
+def tangential_arclength(
+    contact_x: ArrayLike, contact_y: ArrayLike, slope_angle: ArrayLike, friction_angle: ArrayLike = 0.0
+) -> Floats:
+    """Arc length that tangential contact of a forward sweep takes; above 1 only the tip can touch there.
+
+    Parameters are those of `wrench_from_contact`. NaN where the contour turns its back.
+
+    Examples
+    --------
+    >>> tangential_arclength(0.2, 0.6, [0.1, 0.2]).round(6)
+    array([1.053211, 0.976104])
+    """
+    phase = np.full(np.broadcast_shapes(*map(np.shape, (contact_x, contact_y, slope_angle, friction_angle))), NONE)
+    return _states(contact_x, contact_y, slope_angle, friction_angle, 1.0, phase)[1][8]
+
+
+def wrench_from_contact(
+    contact_x: ArrayLike,
+    contact_y: ArrayLike,
+    slope_angle: ArrayLike,
+    friction_angle: ArrayLike = 0.0,
+    *,
+    side: ArrayLike = 1,
+    phase: ArrayLike | None = None,
+) -> Wrench:
+    """What the base feels when the rod touches a contour at a given point: Step 1 for one state.
+
+    Parameters
+    ----------
+    contact_x, contact_y : array_like
+        Contact point relative to the pivot, in rod lengths.
+    slope_angle : array_like
+        Slope angle α of the contour there [rad].
+    friction_angle : array_like
+        δ = arctan μ for a rod that slides with Coulomb's coefficient μ [rad].
+    side : array_like of +1 or −1
+        +1 for a contact of a forward sweep, −1 for one of a backward sweep, its mirror image.
+    phase : array_like of `TIP` or `TANGENTIAL`, optional
+        The phase, where it is known already; then only that one is computed, and not questioned.
+
+    Returns
+    -------
+    Wrench
+        Arrays of the broadcast shape. Where s1 ≤ 1 suffices for tangential contact the phase is `TANGENTIAL`; else it
+        is `TIP` if the point is within reach; else, or where the contour turns its back, it is `NONE` and the rest NaN.
+
+    Examples
+    --------
+    >>> w = wrench_from_contact(0.2, 0.6, [0.1, 0.2])
+    >>> w.phase, w.drive_angle.round(6)
+    (array([1, 2], dtype=int8), array([2.901776, 2.923367]))
+    """
+    known = NONE if phase is None else phase
+    found, columns = _states(contact_x, contact_y, slope_angle, friction_angle, side, known)
+    drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
+    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+    mirrored = sign < 0.0
+    return Wrench(
+        drive_angle=np.where(mirrored, np.pi - drive_angle, drive_angle),
+        holding_moment=sign * moment,
+        force_x=sign * force_x,
+        force_y=force_y,
+        contact_arclength=arclength,
+        tip_angle=np.where(mirrored, np.pi - tip_angle, tip_angle),
+        phase=found,
+        by_slope=by_slope,
+        by_distance=sign * by_distance,
+        tangential_arclength=tangential,
+    )
+
+
+def _states(
+    x: ArrayLike, y: ArrayLike, alpha: ArrayLike, delta: ArrayLike, side: ArrayLike, phase: ArrayLike
+) -> tuple[NDArray[np.int8], Floats]:
+    """Phases, and columns of states, seen as forward ones."""
+    from tactile_bayes.mechanics.states import wrenches  # numba takes a second to load
+    from tactile_bayes.mechanics.tables import room, tables
+
+    _refuse_friction(np.asarray(delta, dtype=float))
+    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, phase)
+    shape = given[0].shape
+    columns = np.stack([column.ravel() for column in given[:4]], axis=-1).astype(float)
+    found, out = given[4].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
+    wrenches(columns, tables(), room(), found, out)
+    return found.reshape(shape), np.ascontiguousarray(out.T).reshape(9, *shape)
+
+
+def contact_from_wrench(
+    drive_angle: ArrayLike,
+    holding_moment: ArrayLike,
+    force_x: ArrayLike,
+    force_y: ArrayLike,
+    friction_angle: ArrayLike = 0.0,
+    *,
+    side: ArrayLike | None = None,
+) -> Contact:
+    """Where the rod touches, from what the base feels: Step 2 for one state, without integration or root search.
+
+    Equation 26 gives the direction of the force, and the pivot's slope and curvature then fix the elastica; the contact
+    is its first point of zero curvature (equation 27).
+
+    Parameters
+    ----------
+    drive_angle, holding_moment, force_x, force_y : array_like
+        Slope of the rod at the pivot [rad] and the wrench there (moment EI/L, force EI/L²).
+    friction_angle : array_like
+        δ = arctan μ [rad].
+    side : array_like of +1 or −1, optional
+        +1 for contacts of a forward sweep, −1 backward; by default the sign of the holding moment.
+
+    Returns
+    -------
+    Contact
+        NaN where there is no force, or the curvature has no zero (`modulus` ≥ 1).
+
+    Examples
+    --------
+    >>> w = wrench_from_contact(0.2, 0.6, 0.1)
+    >>> c = contact_from_wrench(w.drive_angle, w.holding_moment, w.force_x, w.force_y)
+    >>> c.contact_x.round(12), c.contact_y.round(12), c.slope_angle.round(12)
+    (np.float64(0.2), np.float64(0.6), np.float64(0.1))
+    """
+    moment = np.asarray(holding_moment, dtype=float)
+    if side is None:
+        side = np.where(moment < 0.0, -1.0, 1.0)
+    delta = np.asarray(friction_angle, dtype=float)
+    _refuse_friction(delta)
+    from tactile_bayes.mechanics.states import contacts  # numba takes a second to load
+
+    sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+    mirrored = sign < 0.0
+    phi0 = np.where(mirrored, np.pi - np.asarray(drive_angle), drive_angle)
+    given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta)
+    out = np.empty((given[0].size, 6))
+    contacts(np.stack([column.ravel() for column in given], axis=-1).astype(float), out)
+    x, y, slope_angle, arclength, tip_angle, modulus = np.ascontiguousarray(out.T).reshape(6, *given[0].shape)
+    tip_angle = np.where(mirrored, np.pi - tip_angle, tip_angle)
+    return Contact(sign * x, y, sign * slope_angle, arclength, tip_angle, modulus)
+
+
+def largest_curvature(wrench: Wrench) -> Floats:
+    """Largest curvature of the rod between pivot and contact, in 1/L: its bending moment in EI/L.
+
+    Along the rod κ²/2 = f (sin ψ − sin ψ1), which is greatest where ψ = π/2 if the rod comes past there, else at the
+    pivot, where it is the holding moment.
+
+    Examples
+    --------
+    >>> bent = wrench_from_contact(0.2, 0.6, [0.1, 0.8])
+    >>> bent.holding_moment.round(6), largest_curvature(bent).round(6)
+    (array([2.18262 , 3.400363]), array([4.000574, 3.400363]))
+    """
+    cos, sin = np.cos(wrench.drive_angle), np.sin(wrench.drive_angle)
+    along, across = wrench.force_x * cos + wrench.force_y * sin, wrench.force_y * cos - wrench.force_x * sin
+    inflated = 2.0 * (np.hypot(wrench.force_x, wrench.force_y) - along)
+    bent_round = np.where(wrench.holding_moment < 0.0, -across, across) < 0.0
+    return np.sqrt(wrench.holding_moment**2 + np.where(bent_round, inflated, 0.0))

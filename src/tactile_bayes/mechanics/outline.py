@@ -1,0 +1,234 @@
+"""One contour as one rod sees it: from the pivot, in rod lengths, swept forward.
+
+Two halves of families that have a formula, from a common vertex, or a table. The rod's centreline stays half the rod's
+diameter outside the object, so what it traces is the parallel curve, strictly convex like the contour.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
+from tactile_bayes.mechanics.compiler import compiled, inlined
+
+__all__ = ["Outline", "Place", "bearing", "ends", "frame", "mirrored", "place"]
+
+Floats = NDArray[np.float64]
+
+_UPRIGHT = 0.5 * np.pi
+_FAR = 1e3
+"""Rod lengths beyond which an end is as good as none."""
+
+
+class Outline(NamedTuple):
+    """One contour as one rod sees it."""
+
+    left_kind: int
+    left_size: float
+    left_shape: float
+    right_kind: int
+    right_size: float
+    right_shape: float
+    low: float
+    high: float
+    """Least and greatest parameter where there is a table, else of no meaning."""
+    sign: float
+    """−1 where what is in the table is seen in a mirror."""
+    x: float
+    y: float
+    """The vertex."""
+    standoff: float
+    table: Floats
+    """In rod lengths."""
+
+
+class Place(NamedTuple):
+    """A point of an outline."""
+
+    x: float
+    y: float
+    sin: float
+    cos: float
+    """Of the slope angle."""
+    speed: float
+    """dσ/dp ≥ 0, σ the arc length."""
+    bend: float
+    """dα/dp ≥ 0."""
+
+
+@compiled
+def mirrored(outline: Outline) -> Outline:
+    """As the opposite sweep sees it."""
+    return Outline(
+        outline.right_kind,
+        outline.right_size,
+        outline.right_shape,
+        outline.left_kind,
+        outline.left_size,
+        outline.left_shape,
+        -outline.high,
+        -outline.low,
+        -outline.sign,
+        -outline.x,
+        outline.y,
+        outline.standoff,
+        outline.table,
+    )
+
+
+@compiled
+def place(outline: Outline, p: float) -> Place:
+    """The point at a parameter."""
+    if p < 0.0:
+        kind, size, shape = outline.left_kind, outline.left_size, outline.left_shape
+    else:
+        kind, size, shape = outline.right_kind, outline.right_size, outline.right_shape
+    if kind == PARABOLA:
+        t = math.tan(p)
+        square = 1.0 + t * t
+        x = t / (2.0 * size)
+        y = 0.5 * t * x
+        root = math.sqrt(square)
+        sin, cos, speed, bend = t / root, 1.0 / root, square * root / (2.0 * size), 1.0
+    elif kind == OVAL:
+        s, c = math.sin(p), math.cos(p)
+        x, y = size * s, shape * s * s / (1.0 + c)
+        square = size * size * c * c + shape * shape * s * s
+        speed, bend = math.sqrt(square), size * shape / square
+        sin, cos = shape * s / speed, size * c / speed
+    elif kind == POWER_LAW:
+        of_offset, of_slope = max(1.0, 1.0 / (shape - 1.0)), max(1.0, shape - 1.0)
+        flat, steep = abs(p) ** (of_offset - 1.0), abs(p) ** (of_slope - 1.0)
+        steepness = size * shape * steep * p
+        square = 1.0 + steepness * steepness
+        root = math.sqrt(square)
+        x, y = flat * p, size * flat * steep * p * p
+        sin, cos = steepness / root, 1.0 / root
+        speed, bend = of_offset * flat * root, size * shape * of_slope * steep / square
+    elif kind == SLOPES:
+        x, y, speed = _by_slope(outline.table, outline.sign * p)
+        x *= outline.sign
+        sin, cos, bend = math.sin(p), math.cos(p), 1.0
+    else:
+        x, y, alpha, speed, bend = _by_cell(outline.table, outline.sign * p)
+        x *= outline.sign
+        sin, cos = math.sin(outline.sign * alpha), math.cos(alpha)
+    d = outline.standoff
+    return Place(outline.x + x + d * sin, outline.y + y - d * cos, sin, cos, speed + d * bend, bend)
+
+
+@compiled
+def _by_slope(table: Floats, alpha: float) -> tuple[float, float, float]:
+    """Point and radius of curvature at a slope angle: polynomials of fifth degree through what is known beside it."""
+    cells = table.shape[0] - 1
+    way = (alpha + _UPRIGHT) * (cells / (2.0 * _UPRIGHT))
+    cell = min(max(int(way), 0), cells - 1)
+    t = way - cell
+    x, x_rate = _between(table, cell, 0, t)
+    y, y_rate = _between(table, cell, 1, t)
+    return x, y, (x_rate * math.cos(alpha) + y_rate * math.sin(alpha)) * (cells / (2.0 * _UPRIGHT))
+
+
+@inlined
+def _between(table: Floats, cell: int, axis: int, t: float) -> tuple[float, float]:
+    """A coordinate and its rate, as `tactile_bayes.contours.smooth` has them."""
+    start, rate, bend = table[cell, axis], table[cell, axis + 2], table[cell, axis + 4]
+    rise = table[cell + 1, axis] - start - rate - 0.5 * bend
+    rate_rise = table[cell + 1, axis + 2] - rate - bend
+    bend_rise = table[cell + 1, axis + 4] - bend
+    c = 10.0 * rise - 4.0 * rate_rise + 0.5 * bend_rise
+    d = -15.0 * rise + 7.0 * rate_rise - bend_rise
+    e = 6.0 * rise - 3.0 * rate_rise + 0.5 * bend_rise
+    value = start + t * (rate + t * (0.5 * bend + t * (c + t * (d + t * e))))
+    return value, rate + t * (bend + t * (3.0 * c + t * (4.0 * d + t * 5.0 * e)))
+
+
+@compiled
+def _by_cell(table: Floats, p: float) -> tuple[float, float, float, float, float]:
+    """Point, slope angle, and rates of arc length and slope angle: Chebyshev series in the contour's own parameter.
+
+    A row holds where its cell begins and ends, and coefficients of x, y and slope angle.
+    """
+    first, last = 0, table.shape[0] - 1
+    while first < last:
+        middle = (first + last + 1) // 2
+        if table[middle, 0] <= p:
+            first = middle
+        else:
+            last = middle - 1
+    begin, end = table[first, 0], table[first, 1]
+    size = (table.shape[1] - 2) // 3
+    twice = 4.0 * min(max((p - begin) / (end - begin), 0.0), 1.0) - 2.0
+    # T is followed upward, U one step behind: the derivative of T_k is k U_(k−1).
+    t_before, t = 1.0, 0.5 * twice
+    u_before, u = 0.0, 1.0
+    x, y, alpha = table[first, 2], table[first, 2 + size], table[first, 2 + 2 * size]
+    x_rate, y_rate, alpha_rate = 0.0, 0.0, 0.0
+    for k in range(1, size):
+        a, b, c = table[first, 2 + k], table[first, 2 + size + k], table[first, 2 + 2 * size + k]
+        x, y, alpha = x + a * t, y + b * t, alpha + c * t
+        ku = k * u
+        x_rate, y_rate, alpha_rate = x_rate + a * ku, y_rate + b * ku, alpha_rate + c * ku
+        t_before, t = t, twice * t - t_before
+        u_before, u = u, twice * u - u_before
+    scale = 2.0 / (end - begin)
+    speed = (x_rate * math.cos(alpha) + y_rate * math.sin(alpha)) * scale
+    return x, y, alpha, max(speed, 0.0), max(alpha_rate * scale, 0.0)
+
+
+@inlined
+def frame(at: Place) -> tuple[float, float]:
+    """The vector from the pivot to the contour along the contour and into the object."""
+    return at.x * at.cos + at.y * at.sin, at.y * at.cos - at.x * at.sin
+
+
+@compiled
+def bearing(outline: Outline, p: float) -> float:
+    """Direction in which the point at a parameter lies from the pivot."""
+    at = place(outline, p)
+    return math.atan2(at.y, at.x)
+
+
+@compiled
+def ends(outline: Outline) -> tuple[float, float]:
+    """Least and greatest parameter, brought in to just beyond the rod's reach where the outline runs on.
+
+    So are ends so far away that rounding would hide in which direction they are.
+    """
+    return _end(outline, -1.0), _end(outline, 1.0)
+
+
+@compiled
+def _end(outline: Outline, outward: float) -> float:
+    kind = outline.left_kind if outward < 0.0 else outline.right_kind
+    if kind == PARABOLA:
+        end = outward * np.nextafter(_UPRIGHT, 0.0)
+    elif kind == OVAL:
+        end = outward * _UPRIGHT
+    elif kind == POWER_LAW:
+        end = outward
+        while not outward * place(outline, end).x > 1.0:
+            end *= 2.0
+    else:
+        return outline.low if outward < 0.0 else outline.high
+    if outward * place(outline, end).x <= _FAR:
+        return end
+    return _parameter_of_x(outline, 2.0 * outward)
+
+
+@compiled
+def _parameter_of_x(outline: Outline, x: float) -> float:
+    offset = x - outline.x
+    if offset < 0.0:
+        kind, size, shape = outline.left_kind, outline.left_size, outline.left_shape
+    else:
+        kind, size, shape = outline.right_kind, outline.right_size, outline.right_shape
+    if kind == PARABOLA:
+        return math.atan(2.0 * size * offset)
+    if kind == OVAL:
+        return math.asin(offset / size)
+    return math.copysign(abs(offset) ** (1.0 / max(1.0, 1.0 / (shape - 1.0))), offset)

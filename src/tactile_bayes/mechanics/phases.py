@@ -1,0 +1,11 @@
+"""How a rod touches, in numbers and in words."""
+
+from __future__ import annotations
+
+__all__ = ["NONE", "PHASE_NAMES", "TANGENTIAL", "TIP"]
+
+NONE, TIP, TANGENTIAL = 0, 1, 2
+"""Codes of the contact phase: no contact, Phase A (the tip touches), Phase B (the rod touches tangentially)."""
+
+PHASE_NAMES = ("none", "tip", "tangential")
+"""Words for the contact phases, by code."""

@@ -1,0 +1,148 @@
+"""Where a path may run: whether a rod reaches its contour, where it first touches, and where no lever arm is left."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.fates import CLEARANCE, Reach
+from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
+
+__all__ = ["Limits", "clear_angle", "limits"]
+
+_LEVER, _TURNED, _WITHIN = 0, 1, 2
+_TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reach.TOUCHES), int(Reach.TOO_FAR), int(Reach.CUTS_PIVOT)
+_ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reach.ENDS), int(Reach.TOO_CLOSE), int(Reach.RUNS_OUT)
+_CLEARANCE = CLEARANCE
+
+
+class Limits(NamedTuple):
+    """How far the path of an outline can run; parameters are the contour's own."""
+
+    reach: int
+    """A `Reach`."""
+    distance: float
+    """Least distance of contour and pivot, in rod lengths."""
+    begin: float
+    """First contact."""
+    end: float
+    """Where the line of force passes through the pivot, or the rod's length is used up again, or the contour ends."""
+    tip_first: bool
+    """Whether the tip touches first, or a tangent line from the pivot."""
+    runs_out: bool
+    """Whether it is the contour that ends."""
+
+
+@compiled
+def _missing(outline: Outline, what: int, turned: float, p: float) -> tuple[float, float]:
+    """What is sought vanishes at its root, and falls away from the pivot's side; with its derivative."""
+    at = place(outline, p)
+    along, facing = frame(at)
+    if what == _LEVER:
+        return along, at.speed + facing * at.bend
+    if what == _WITHIN:
+        return 1.0 - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
+    # How much less the line from the pivot is turned from the contour's direction: the farther to the left the more it
+    # is, as long as the contour faces the pivot. It jumps below the pivot, where no contour is.
+    bearing = math.atan2(-at.x, at.y) + 0.5 * math.pi
+    rate = facing * at.speed / (at.x * at.x + at.y * at.y) + at.bend
+    return turned - (bearing - math.atan2(at.sin, at.cos)), rate
+
+
+@compiled
+def _root(outline: Outline, what: int, turned: float, positive: float, negative: float, last_step: float) -> float:
+    """Newton kept in its bracket; the last step is a share of that."""
+    p, before = 0.5 * (positive + negative), abs(negative - positive)
+    settled = last_step * before
+    for _ in range(100):
+        value, slope = _missing(outline, what, turned, p)
+        if value > 0.0:
+            positive = p
+        else:
+            negative = p
+        new = p - value / slope
+        # Steps that do not shrink by half go round in circles, for instance about a kink.
+        if (new - positive) * (new - negative) <= 0.0 and abs(new - p) <= 0.5 * before:
+            before = abs(new - p)
+        elif value == 0.0:
+            break
+        else:
+            new = 0.5 * (positive + negative)
+            before = abs(negative - positive)
+        step = abs(new - p)
+        p = new
+        if not step > settled or value == 0.0:
+            break
+    return p
+
+
+@compiled
+def _nearest(outline: Outline, low: float, high: float, last_step: float) -> tuple[float, bool, bool]:
+    """Parameter of the nearest point, and whether it lies beyond the greatest or the least one."""
+    beyond_high = _missing(outline, _LEVER, 0.0, high)[0] <= 0.0
+    beyond_low = _missing(outline, _LEVER, 0.0, low)[0] >= 0.0
+    if beyond_high:
+        return high, beyond_high, beyond_low
+    if beyond_low:
+        return low, beyond_high, beyond_low
+    return _root(outline, _LEVER, 0.0, high, low, last_step), beyond_high, beyond_low
+
+
+@inlined
+def _is_out(outline: Outline, p: float) -> bool:
+    at = place(outline, p)
+    return math.hypot(at.x, at.y) > 1.0
+
+
+@compiled
+def _first(outline: Outline, high: float, nearest: float, last_step: float) -> tuple[float, bool]:
+    """Parameter of first contact, and whether the tip touches first."""
+    tangent = _root(outline, _TURNED, 0.0, high, nearest, last_step)
+    if _is_out(outline, tangent):
+        return _root(outline, _WITHIN, 0.0, nearest, tangent, last_step), True
+    return tangent, False
+
+
+@compiled
+def limits(outline: Outline, delta: float, last_step: float) -> Limits:
+    """Where the path can run with a friction angle δ [rad]; roots are found to a share of their brackets."""
+    low, high = ends(outline)
+    nearest, beyond_high, beyond_low = _nearest(outline, low, high, last_step)
+    at = place(outline, nearest)
+    distance, below = math.hypot(at.x, at.y), frame(at)[1] > 0.0
+    begin, tip_first = _first(outline, high, nearest, last_step)
+
+    # A force that friction turns passes through the pivot only beyond the nearest point, if not out of reach.
+    end = nearest
+    if delta > 0.0:
+        largest = 0.5 * math.pi + delta
+        if _missing(outline, _TURNED, largest, low)[0] >= 0.0:
+            end = low
+        else:
+            end = _root(outline, _TURNED, largest, nearest, low, last_step)
+        if _is_out(outline, end):
+            end = _root(outline, _WITHIN, 0.0, nearest, end, last_step)
+
+    at_high = place(outline, high)
+    open_end = frame(at_high)[1] > 0.0 and math.hypot(at_high.x, at_high.y) <= 1.0
+    reach = _TOUCHES
+    if not below:
+        reach = _RUNS_OUT if beyond_low and not beyond_high else _CUTS_PIVOT
+    elif distance < _CLEARANCE:
+        reach = _TOO_CLOSE
+    elif distance >= 1.0:
+        reach = _TOO_FAR
+    elif beyond_high or open_end:
+        reach = _ENDS
+    return Limits(reach, distance, begin, end, tip_first, end == low)
+
+
+@compiled
+def clear_angle(outline: Outline, last_step: float) -> float:
+    """Drive angle from which on a straight rod is past the contour: there the opposite sweep would first touch."""
+    opposite = mirrored(outline)
+    low, high = ends(opposite)
+    begin, _ = _first(opposite, high, _nearest(opposite, low, high, last_step)[0], last_step)
+    at = place(opposite, begin)
+    return math.pi - math.atan2(at.y, at.x)

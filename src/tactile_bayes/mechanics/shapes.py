@@ -1,0 +1,39 @@
+"""Contours as the compiled forward model takes them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contours.cells import in_cells
+
+if TYPE_CHECKING:
+    from tactile_bayes.contours.base import Contour
+    from tactile_bayes.mechanics.sweeps import Shapes
+
+__all__ = ["shapes_of"]
+
+Floats = NDArray[np.float64]
+
+
+def shapes_of(contours: Contour, low: Floats | None = None, high: Floats | None = None) -> Shapes:
+    """Contours with parameters of shape (n,), by their formula, or by tables from a parameter to another."""
+    from tactile_bayes.mechanics.sweeps import Shapes  # numba takes a second to load
+
+    halves = contours.halves
+    if halves is None:
+        assert low is not None
+        assert high is not None
+        halves = in_cells(contours, low, high)
+    (count,) = contours.shape
+    columns = np.empty((count, 6))
+    for k, column in enumerate((*halves.left[1:], *halves.right[1:], halves.x, halves.y)):
+        columns[:, k] = column
+    tables = np.empty((count, 0, 0)) if halves.tables is None else np.ascontiguousarray(halves.tables)
+    knots = np.empty((count, len(contours.knots)))
+    for k, knot in enumerate(contours.knots):
+        knots[:, k] = knot
+    knots.sort(axis=1)
+    return Shapes((halves.left.kind, halves.right.kind), columns, tables, knots)

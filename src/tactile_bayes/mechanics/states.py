@@ -1,0 +1,286 @@
+"""One state of a rod in contact, exactly or from tables: contact → what the base feels, and back.
+
+Dimensionless (length L, moment EI/L, force EI/L²), relative to the pivot, forward contacts. A contact force of
+magnitude f acts on the rod along (sin β, −cos β), with β = α + δ for slope angle α and friction angle δ. With ψ = φ − β
+the rod obeys κ' = f cos ψ and κ(s1) = 0 (equations 19, 20 and 27 of Merker et al. 2018, doi 10.1155/2018/1613945): a
+piece of Euler's elastica that begins at a point of zero curvature, the contact (`arc`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.mechanics.arc import (
+    SHORT_COSINE,
+    Arc,
+    arc_and_slopes,
+    arc_at,
+    chord_rate,
+    slack,
+    slack_rate,
+)
+from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
+from tactile_bayes.mechanics.compiler import compiled, inlined, kept
+from tactile_bayes.mechanics.outline import Place, frame
+from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.tables import (
+    AMPLITUDE,
+    FORCE,
+    MOST_FRICTION,
+    SMALL,
+    STRETCH,
+    TURN,
+    Room,
+    Tables,
+    combine,
+    in_polar,
+    prepare,
+    series,
+)
+
+__all__ = [
+    "NOWHERE",
+    "QuickState",
+    "State",
+    "contacts",
+    "exact_excess",
+    "exact_state",
+    "tabled_excess",
+    "tabled_state",
+    "wrenches",
+]
+
+Floats = NDArray[np.float64]
+
+_BEYOND = 1e-12
+"""By how much rounding may turn a chord beyond where the line of force passes through the pivot [rad]."""
+
+_WIDE = 1.25
+"""Angle of a tip contact in its table from which on the small one misses by ten times as much [rad]."""
+
+_NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
+
+
+class State(NamedTuple):
+    """What the base feels in a contact, and how it changes; NaN where the rod cannot make it."""
+
+    drive_angle: float
+    holding_moment: float
+    force_x: float
+    force_y: float
+    arclength: float
+    tip_angle: float
+    by_slope: float
+    by_distance: float
+    """As in `Wrench`."""
+
+
+class QuickState(NamedTuple):
+    """The part of it that a likelihood needs."""
+
+    drive_angle: float
+    holding_moment: float
+    force_x: float
+    force_y: float
+
+
+NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+
+
+@compiled
+def _touch(x: float, y: float, alpha: float, delta: float, room: Room) -> tuple[float, Arc, Arc]:
+    """Arc length that tangential contact takes, its arc, and the arc's derivatives by amplitude."""
+    sin, cos = math.sin(alpha), math.cos(alpha)
+    along, across = x * cos + y * sin, y * cos - x * sin
+    angle, largest = math.atan2(across, along), 0.5 * math.pi + delta
+    if not (across >= 0.0 and angle <= largest + _BEYOND and abs(alpha) <= 0.5 * math.pi):
+        return math.nan, _NO_ARC, _NO_ARC
+    angle = min(angle, largest)
+    m = 0.5 * (1.0 + math.sin(delta))
+    if delta <= MOST_FRICTION:
+        guess = math.sqrt(max(angle * series(room.lying, AMPLITUDE, room.lying.shape[1], angle / largest), 0.0))
+    else:
+        guess = min(math.sqrt(3.0 * angle / math.sqrt(m * (1.0 - m))), math.pi)
+    chi, arc, by_chi = tangential_arc(angle, m, guess)
+    length = math.sqrt(x * x + y * y)
+    if chi > 0.0:
+        length *= arc.length / math.hypot(arc.length - arc.shortfall, arc.offset)
+    return length, arc, by_chi
+
+
+@inlined
+def _lying(x: float, y: float, alpha: float, delta: float, length: float, arc: Arc, by_chi: Arc) -> State:
+    """Phase B."""
+    force = (arc.length / length) ** 2
+    turning = by_chi.turn / chord_rate(arc, by_chi) if arc.turn > 0.0 else 3.0
+    beta = alpha + delta
+    sin, cos = math.sin(beta), math.cos(beta)
+    moment = force * (x * cos + y * sin)
+    return State(alpha + arc.turn, moment, -force * sin, force * cos, length, alpha, 1.0 - turning, 0.0)
+
+
+@compiled
+def _ending(x: float, y: float, alpha: float, delta: float, known: Tables, room: Room) -> State:
+    """Phase A: distance and direction of the tip give amplitude and direction at the contact."""
+    larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
+    slack2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
+    if not slack2 >= 0.0:
+        return NOWHERE
+    beta = alpha + delta
+    sin, cos = math.sin(beta), math.cos(beta)
+    u, v = x * cos + y * sin, y * cos - x * sin
+    lack, tilt = math.sqrt(slack2), max(math.atan2(u, v), 0.0)
+    table = known.tip[1] if delta == 0.0 else known.tip[2]
+    angle, share = in_polar(table, lack, tilt, room)
+    guess = math.sqrt(max(angle * combine(table.chi2, room), 0.0))
+    chi, tilt1, arc = tip_arc(lack, tilt, guess, combine(table.tilt, room) * share)
+    by_slope, by_distance = math.nan, -math.inf
+    if chi > 0.0:
+        _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * tilt1) ** 2)
+        angle_x, angle_1, value = chord_rate(arc, by_chi), 1.0 + chord_rate(arc, by_psi1), slack(arc)
+        value_x, value_1 = slack_rate(arc, value, by_chi), slack_rate(arc, value, by_psi1)
+        det = value_x * angle_1 - value_1 * angle_x
+        by_slope = 1.0 - (value_x * (1.0 + by_psi1.turn) - value_1 * by_chi.turn) / det
+        by_distance = -0.5 * (angle_1 * by_chi.turn - angle_x * (1.0 + by_psi1.turn)) / det / value
+    force, tip_angle = arc.length * arc.length, beta + 0.5 * math.pi - tilt1
+    return State(tip_angle + arc.turn, force * u, -force * sin, force * cos, 1.0, tip_angle, by_slope, by_distance)
+
+
+@compiled
+def exact_state(x: float, y: float, alpha: float, delta: float, tip: bool, known: Tables, room: Room) -> State:
+    """A contact of known phase to rounding, in a room prepared for the friction angle."""
+    if tip:
+        return _ending(x, y, alpha, delta, known, room)
+    length, arc, by_chi = _touch(x, y, alpha, delta, room)
+    return _lying(x, y, alpha, delta, length, arc, by_chi)
+
+
+@compiled
+def exact_excess(x: float, y: float, alpha: float, delta: float, room: Room) -> float:
+    """Arc length that tangential contact takes, less that of the rod, to rounding."""
+    return _touch(x, y, alpha, delta, room)[0] - 1.0
+
+
+@kept
+def wrenches(columns: Floats, known: Tables, room: Room, phase: NDArray[np.int8], out: Floats) -> None:
+    """States, and arc lengths of tangential contact, of contacts seen as forward ones.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, 4)
+        Contact point, slope angle, friction angle.
+    phase : ndarray, shape (n,)
+        Known phases; where it is `NONE` it is found, and stored.
+    out : ndarray, shape (n, 9)
+    """
+    prepared = math.nan
+    for i in range(columns.shape[0]):
+        x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
+        if delta != prepared:
+            prepare(known, delta, room)
+            prepared = delta
+        out[i] = math.nan
+        if phase[i] != TIP:
+            length, arc, by_chi = _touch(x, y, alpha, delta, room)
+            out[i, 8] = length
+            if phase[i] == TANGENTIAL or length <= 1.0:
+                _store(_lying(x, y, alpha, delta, length, arc, by_chi), out[i])
+                phase[i] = TANGENTIAL
+        if phase[i] == TIP or (phase[i] == NONE and out[i, 8] > 1.0):
+            ending = _ending(x, y, alpha, delta, known, room)
+            _store(ending, out[i])
+            phase[i] = NONE if math.isnan(ending.arclength) else TIP
+
+
+@inlined
+def _store(state: State, out: Floats) -> None:
+    for k in range(8):
+        out[k] = state[k]
+
+
+@kept
+def contacts(columns: Floats, out: Floats) -> None:
+    """Where rods touch, from what their bases feel, seen as forward contacts.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, 5)
+        Drive angle, holding moment and support reaction, friction angle.
+    out : ndarray, shape (n, 6)
+        As `Contact`.
+    """
+    for i in range(columns.shape[0]):
+        phi0, moment, fx, fy, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4]
+        out[i] = math.nan
+        force = math.sqrt(fx * fx + fy * fy)
+        if not force > 0.0:
+            continue
+        root = math.sqrt(force)
+        beta = math.atan2(-fx, fy)
+        psi0 = phi0 - beta
+        quarter = 0.25 * math.pi - 0.5 * (psi0 - 2.0 * math.pi * math.floor((psi0 + 0.5 * math.pi) / (2.0 * math.pi)))
+        a, a_cos, b = math.sin(quarter), math.cos(quarter), 0.5 * moment / root
+        modulus = a * a + b * b
+        out[i, 5] = modulus
+        complement = (a_cos - b) * (a_cos + b)
+        # A force without moment passes through the pivot of a straight rod: it may be anywhere.
+        if not (complement > 0.0 and modulus > 0.0 and (b > 0.0 or (b == 0.0 and a < 0.0)) and force < math.inf):
+            continue
+        # θ0 = atan2(a, b) is linked to χ by tan χ = cot θ0 / √(1 − m).
+        width = a_cos * math.sqrt(modulus)
+        cos_chi = a * math.sqrt(complement) / width
+        arc = arc_at(b / width, cos_chi, modulus)
+        tip_angle = phi0 - arc.turn
+        along, across = (arc.length - arc.shortfall) / root, arc.offset / root
+        if cos_chi < SHORT_COSINE:
+            # In a rod bent far round, m0 = f u keeps more digits; the rest of the contact lies along the force.
+            u, v = moment / force, along * (1.0 - 2.0 * modulus) + across * 2.0 * math.sqrt(modulus * complement)
+            x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
+        else:
+            cos, sin = math.cos(tip_angle), math.sin(tip_angle)
+            x, y = along * cos - across * sin, along * sin + across * cos
+        out[i, 0], out[i, 1], out[i, 2] = x, y, beta - delta
+        out[i, 3], out[i, 4] = arc.length / root, tip_angle
+
+
+@compiled
+def tabled_state(at: Place, delta: float, tip: bool, large: bool, known: Tables, room: Room) -> QuickState:
+    """A contact of known phase from tables, in a room prepared for the friction angle, at most `MOST_FRICTION`."""
+    along, across = frame(at)
+    sin, cos = at.sin, at.cos
+    slope = math.atan2(sin, cos)
+    distance2 = at.x * at.x + at.y * at.y
+    if delta > 0.0:
+        turn_sin, turn_cos = math.sin(delta), math.cos(delta)
+        sin, cos = sin * turn_cos + cos * turn_sin, cos * turn_cos - sin * turn_sin
+    u, v = at.x * cos + at.y * sin, at.y * cos - at.x * sin
+    if across < 0.0 or u < -_BEYOND or (tip and distance2 > 1.0):
+        return QuickState(math.nan, math.nan, math.nan, math.nan)
+    if tip:
+        lack, tilt = math.sqrt(1.0 - distance2), max(math.atan2(u, v), 0.0)
+        which = 2 if delta > 0.0 else int(large or math.atan2(lack, tilt) > _WIDE)
+        table = known.tip[which]
+        angle, share = in_polar(table, lack, tilt, room)
+        force = combine(table.force, room) * angle
+        turn = combine(table.turn, room) * angle
+        drive_angle = slope + delta + 0.5 * math.pi - combine(table.tilt, room) * share + turn
+    else:
+        size = room.lying.shape[1] if large or delta > 0.0 else SMALL
+        angle = math.atan2(across, along)
+        level = min(angle / (0.5 * math.pi + delta), 1.0)
+        force = series(room.lying, FORCE, size, level) * angle / distance2
+        drive_angle = slope + series(room.lying, TURN, size, level) * angle
+    return QuickState(drive_angle, force * u, -force * sin, force * cos)
+
+
+@compiled
+def tabled_excess(at: Place, delta: float, large: bool, room: Room) -> float:
+    """Arc length that tangential contact takes, less that of the rod, from a table."""
+    along, across = frame(at)
+    size = room.lying.shape[1] if large or delta > 0.0 else SMALL
+    level = min(math.atan2(max(across, 0.0), along) / (0.5 * math.pi + delta), 1.0)
+    return math.sqrt(at.x * at.x + at.y * at.y) * series(room.lying, STRETCH, size, level) - 1.0

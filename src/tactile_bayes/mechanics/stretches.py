@@ -1,0 +1,202 @@
+"""Smooth stretches of an equilibrium path: cut where the phase changes and where the contour's curvature jumps."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.outline import Outline, Place, place
+from tactile_bayes.mechanics.reach import Limits
+from tactile_bayes.mechanics.series import Nodes, change_of, crossing, tail, value, weighted
+from tactile_bayes.mechanics.states import exact_excess, tabled_excess
+from tactile_bayes.mechanics.tables import Room
+
+__all__ = ["BRIEF", "Accuracy", "Stretch", "along", "cut"]
+
+Floats = NDArray[np.float64]
+
+BRIEF = 1e-6
+"""Share of a path so short that what changes on it may be lost in rounding."""
+
+_NOTHING = 1e-13
+"""Share of a path that is no stretch of it."""
+
+_HALVINGS = 8
+"""How often a piece is halved in search of changes of the phase; where it is not smooth that is never enough."""
+
+
+class Accuracy(NamedTuple):
+    """How accurately a path is followed."""
+
+    exact: bool
+    """Whether states and events are computed to rounding; else from tables, and as good as interpolation."""
+    resolved: float
+    """Share of the change of the drive angle on a stretch by which an interpolant may miss it."""
+    sharp: float
+    """Error that the drive angle of an event may have [rad]."""
+    halvings: int
+    """How often a stretch is halved at most; where something is not smooth at its end that is never enough."""
+    last_step: float
+    """Newton step, as a share of the bracket, after which a root is taken for found."""
+    settled: float
+    """Share of a stretch by which an exact state may miss its drive angle, for the interpolant to make up for it."""
+
+
+class Stretch(NamedTuple):
+    """A smooth part of a path."""
+
+    begin: float
+    """Contour parameter where it begins, the greater one."""
+    end: float
+    tip: bool
+    """Whether the tip touches here."""
+    rooted: bool
+    """Whether contact begins here with the tip: loads then grow like the square root of the arc since."""
+    halvings: int
+    large: bool
+    """Whether small tables will not do."""
+
+
+@inlined
+def along(stretch: Stretch, way: float) -> float:
+    """Contour parameter a way of 0 to 1 along, in which loads are smooth."""
+    return stretch.begin + (stretch.end - stretch.begin) * (way * way if stretch.rooted else way)
+
+
+@inlined
+def _excess(at: Place, delta: float, exact: bool, room: Room) -> float:
+    if exact:
+        return exact_excess(at.x, at.y, math.atan2(at.sin, at.cos), delta, room)
+    return tabled_excess(at, delta, False, room)
+
+
+@compiled
+def cut(
+    outline: Outline,
+    limit: Limits,
+    knots: Floats,
+    delta: float,
+    accuracy: Accuracy,
+    tabled: bool,
+    on: Nodes,
+    room: Room,
+    series: Floats,
+    out: Floats,
+) -> int:
+    """Cut a path at knots, and where tangential contact takes exactly the rod's length.
+
+    Parameters
+    ----------
+    knots : ndarray, shape (k,)
+        Where the contour may not be smooth, decreasing.
+    tabled : bool
+        Whether tables know the friction angle.
+    series : ndarray, shape (3, order)
+        Room.
+    out : ndarray, shape (most, 3)
+        Begin and end of every stretch, in the order of the path, and whether the tip touches.
+
+    Returns
+    -------
+    int
+        How many there are; as many as there is room for, at most.
+    """
+    whole, count = limit.begin - limit.end, 0
+    begin = limit.begin
+    for k in range(knots.size + 1):
+        end = limit.end if k == knots.size else min(max(knots[k], limit.end), limit.begin)
+        if not begin - end > _NOTHING * whole:
+            continue
+        count = _cut_piece(outline, begin, end, whole, delta, accuracy, tabled, on, room, series, out, count)
+        begin = end
+    return count
+
+
+@compiled
+def _cut_piece(
+    outline: Outline,
+    first: float,
+    last: float,
+    whole: float,
+    delta: float,
+    accuracy: Accuracy,
+    tabled: bool,
+    on: Nodes,
+    room: Room,
+    series: Floats,
+    out: Floats,
+    count: int,
+) -> int:
+    """Cut a smooth piece of a contour, in as large parts as polynomials follow the arc length of tangential contact."""
+    exact = accuracy.exact or not tabled
+    values, excess, slope = series[0], series[1], series[2]
+    order, least = on.nodes.size, (first - last) * 0.5**_HALVINGS
+    begin, end = first, last
+    while begin > last and count < out.shape[0] - order - 2:
+        for k in range(order):
+            values[k] = _excess(place(outline, begin + (end - begin) * on.nodes[k]), delta, exact, room)
+        weighted(on.fit, values, excess)
+        span = begin - end
+        if tail(excess) > accuracy.resolved * change_of(excess) and span > least and span > BRIEF * whole:
+            end = begin - 0.5 * span
+            continue
+        weighted(on.slopes, excess, slope)
+        count = _cut_smooth(outline, begin, end, _NOTHING * whole, delta, accuracy, on, room, series, out, count)
+        begin, end = end, last
+    return count
+
+
+@compiled
+def _cut_smooth(
+    outline: Outline,
+    begin: float,
+    end: float,
+    nothing: float,
+    delta: float,
+    accuracy: Accuracy,
+    on: Nodes,
+    room: Room,
+    series: Floats,
+    out: Floats,
+    count: int,
+) -> int:
+    """Cut where a polynomial changes its sign."""
+    values, excess, slope = series[0], series[1], series[2]
+    span, order, started, old = end - begin, on.nodes.size, 0.0, 0.0
+    beyond = value(excess, 0.0) > 0.0
+    for k in range(order + 1):
+        new = 1.0 if k == order else on.nodes[k]
+        at_new = value(excess, 1.0) if k == order else values[k]
+        if (at_new > 0.0) != beyond:
+            left, right = (old, new) if beyond else (new, old)
+            change = crossing(excess, slope, 0.0, left, right, 0.5 * (old + new), accuracy.last_step)
+            if accuracy.exact:
+                change = _polished(outline, begin, span, change, min(change - started, 1.0 - change), delta, room)
+            if abs(span) * (change - started) > nothing:  # else it is rounding where a piece begins
+                out[count, 0], out[count, 1], out[count, 2] = begin + span * started, begin + span * change, beyond
+                count += 1
+            started, beyond = change, not beyond
+        old = new
+    out[count, 0], out[count, 1], out[count, 2] = begin + span * started, end, beyond
+    return count + 1
+
+
+@compiled
+def _polished(
+    outline: Outline, begin: float, span: float, change: float, most: float, delta: float, room: Room
+) -> float:
+    """A change of the phase to rounding, by secants from the interpolant's answer."""
+    old, now = change + 1e-4 * most, change
+    at_old = _excess(place(outline, begin + span * old), delta, True, room)
+    at_now = _excess(place(outline, begin + span * now), delta, True, room)
+    for _ in range(4):
+        step = at_now * (now - old) / (at_now - at_old)
+        if not abs(step) < 0.1 * most:
+            break
+        old, at_old, now = now, at_now, now - step
+        at_now = _excess(place(outline, begin + span * now), delta, True, room)
+    return now

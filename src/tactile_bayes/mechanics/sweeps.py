@@ -1,0 +1,252 @@
+"""Many sweeps: every lane is one contour as one rod sees it from one pivot, in one direction."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
+from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.mechanics.fates import Reach
+from tactile_bayes.mechanics.outline import Outline, mirrored
+from tactile_bayes.mechanics.path import (
+    MOST_CHANGES,
+    STATE_COLUMNS,
+    Found,
+    Rig,
+    Samples,
+    Work,
+    follow,
+    work,
+)
+from tactile_bayes.mechanics.reach import clear_angle
+from tactile_bayes.mechanics.series import Nodes, nodes_of
+from tactile_bayes.mechanics.stretches import Accuracy
+from tactile_bayes.mechanics.tables import Tables, room, tables
+
+__all__ = ["Answers", "Lanes", "Shapes", "Strokes", "answered"]
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_TOUCHES = int(Reach.TOUCHES)
+
+_EXACT = Accuracy(exact=True, resolved=1e-8, sharp=np.inf, halvings=8, last_step=4e-16, settled=1e-14)
+"""States and events to rounding."""
+
+_FAST = Accuracy(exact=False, resolved=1e-3, sharp=1e-6, halvings=12, last_step=1e-4, settled=1e-7)
+"""As well as noise asks."""
+
+_EXACT_ORDER, _FAST_ORDER = 32, 16
+"""Nodes on a stretch."""
+
+_NEVER_MISSED = np.full(3, np.inf)
+
+
+class Shapes(NamedTuple):
+    """Contours in their own unit of length."""
+
+    kinds: tuple[int, int]
+    """Of the left and the right half of all of them."""
+    halves: Floats
+    """Sizes and shapes of left and right half, and the vertex, shape (n, 6)."""
+    tables: Floats
+    """Shape (n, rows, columns), without rows if there are formulas."""
+    knots: Floats
+    """Where contours may not be smooth, increasing, shape (n, knots)."""
+
+
+class Lanes(NamedTuple):
+    """Sweeps that are asked for, arrays of shape (lanes,)."""
+
+    contour: Index
+    """Which of the contours; loads of a contour's lanes are put together."""
+    stroke: Index
+    """Which of the strokes of samples."""
+    base_x: Floats
+    base_y: Floats
+    length: Floats
+    standoff: Floats
+    backward: NDArray[np.bool_]
+    friction_angle: Floats
+    compliance: Floats
+    offset: Floats
+    """What the encoder reads too much, in the world's sense [rad]."""
+
+
+class Strokes(NamedTuple):
+    """Samples that are seen together lie side by side."""
+
+    first: Index
+    """Where the samples of every stroke begin, and at last their number."""
+    rows: Index
+    """Where what is found of a sample goes."""
+    angles: Floats
+    """Drive angles, as read and as seen in forward sweeps."""
+
+
+class Answers(NamedTuple):
+    """What is found. Drive angles are as seen in forward sweeps; events are of shape (lanes,), NaN where none is."""
+
+    loads: Floats
+    """In the world's signs, in EI/L and EI/L², zero out of contact, shape (contours, rows, 3)."""
+    states: Floats
+    """Exact states, see `Found`, shape (contours, rows or 0, columns)."""
+    changes: Floats
+    """See `Found`, shape (lanes, phases or 0, 2)."""
+    phases: Index
+    """How many there are."""
+    reach: NDArray[np.int8]
+    distance: Floats
+    first_angle: Floats
+    first_parameter: Floats
+    snap_angle: Floats
+    snap_parameter: Floats
+    snap_off: NDArray[np.int8]
+    curvature: Floats
+    """The largest one of the rod up to snap-off [1/L], where states are wanted."""
+    clear_angle: Floats
+    """From which on the straight rod is clear; NaN if it is not asked."""
+
+
+@compiled
+def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tuple[float, float]:
+    if kind == PARABOLA:
+        return size * length, shape
+    if kind == OVAL:
+        return size / length, shape / length
+    if kind == POWER_LAW:
+        return size * length ** (shape - 1.0), shape
+    return size, shape
+
+
+@compiled
+def _outline(shapes: Shapes, lanes: Lanes, i: int, table: Floats) -> Outline:
+    """As the rod of a lane sees it; the table is put where there is room for it."""
+    c, length = lanes.contour[i], lanes.length[i]
+    left, right = shapes.kinds
+    of = shapes.halves[c]
+    l_size, l_shape = _in_rod_lengths(left, of[0], of[1], length)
+    r_size, r_shape = _in_rod_lengths(right, of[2], of[3], length)
+    if left in (SLOPES, CELLS):
+        begin, end = (2, 2 + 2 * (table.shape[1] - 2) // 3) if left == CELLS else (0, table.shape[1])
+        for r in range(table.shape[0]):
+            for k in range(table.shape[1]):
+                table[r, k] = shapes.tables[c, r, k] / (length if begin <= k < end else 1.0)
+    x, y = (of[4] - lanes.base_x[i]) / length, (of[5] - lanes.base_y[i]) / length
+    low, high = (-l_size if left == SLOPES else l_size), r_size
+    outline = Outline(
+        left, l_size, l_shape, right, r_size, r_shape, low, high, 1.0, x, y, lanes.standoff[i] / length, table
+    )
+    return mirrored(outline) if lanes.backward[i] else outline
+
+
+@kept
+def _sweep(
+    shapes: Shapes,
+    lanes: Lanes,
+    strokes: Strokes,
+    accuracy: Accuracy,
+    tolerance: Floats,
+    asks_clearance: bool,
+    known: Tables,
+    on: Nodes,
+    room: Work,
+    table: Floats,
+    answers: Answers,
+) -> None:
+    """Follow the path of every lane, and put what its samples feel into the answers.
+
+    Parameters
+    ----------
+    tolerance : ndarray, shape (3,)
+        By how much loads may miss, of moment and forces [EI/L and EI/L²].
+    room : Work
+    table : ndarray, shape (rows, columns)
+        Room for the table of one contour.
+    """
+    count = shapes.knots.shape[1]
+    knots = np.empty(count)
+    for i in range(lanes.contour.size):
+        outline = _outline(shapes, lanes, i, table)
+        c, sign = lanes.contour[i], -1.0 if lanes.backward[i] else 1.0
+        for k in range(count):
+            knots[k] = -shapes.knots[c, k] if lanes.backward[i] else shapes.knots[c, count - 1 - k]
+        first, last = strokes.first[lanes.stroke[i]], strokes.first[lanes.stroke[i] + 1]
+        samples = Samples(strokes.angles[first:last], strokes.rows[first:last])
+        rig = Rig(lanes.friction_angle[i], lanes.compliance[i], sign * lanes.offset[i], sign)
+        found = Found(answers.loads[c], answers.states[c], answers.changes[i])
+        ends = follow(outline, knots, rig, samples, accuracy, tolerance, known, on, room, found)
+        answers.reach[i], answers.distance[i] = ends.reach, ends.distance
+        answers.first_angle[i], answers.first_parameter[i] = ends.first_angle, ends.first_parameter
+        answers.snap_angle[i], answers.snap_parameter[i] = ends.snap_angle, ends.snap_parameter
+        answers.snap_off[i], answers.phases[i], answers.curvature[i] = ends.snap_off, ends.phases, ends.curvature
+        answers.clear_angle[i] = math.nan
+        if asks_clearance and ends.reach == _TOUCHES:
+            answers.clear_angle[i] = clear_angle(outline, accuracy.last_step)
+
+
+def answered(
+    shapes: Shapes,
+    lanes: Lanes,
+    strokes: Strokes,
+    shape: tuple[int, int],
+    *,
+    tolerance: Floats | None = None,
+    states: bool = False,
+    asks_clearance: bool = True,
+) -> Answers:
+    """Follow paths, and tell what samples feel.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    lanes : Lanes
+    strokes : Strokes
+    shape : (int, int)
+        How many contours, and rows for each.
+    tolerance : ndarray, shape (3,), optional
+        By how much loads may miss, of moment and forces [EI/L and EI/L²]; by default events are exact, and loads right
+        to some 1e-8 of the largest.
+    states : bool
+        Whether exact states are wanted.
+    asks_clearance : bool
+        Whether it is asked from which angle on the straight rod is clear.
+    """
+    accuracy, order = (_EXACT, _EXACT_ORDER) if tolerance is None else (_FAST, _FAST_ORDER)
+    count, rows = shape
+    sweeps = lanes.contour.size
+    distance, first_angle, first_parameter, snap_angle, snap_parameter, curvature, clear = np.empty((7, sweeps))
+    answers = Answers(
+        loads=np.zeros((count, rows, 3)),
+        states=np.zeros((count, rows if states else 0, STATE_COLUMNS)),
+        changes=np.empty((sweeps, MOST_CHANGES if states else 0, 2)),
+        phases=np.empty(sweeps, dtype=np.intp),
+        reach=np.empty(sweeps, dtype=np.int8),
+        distance=distance,
+        first_angle=first_angle,
+        first_parameter=first_parameter,
+        snap_angle=snap_angle,
+        snap_parameter=snap_parameter,
+        snap_off=np.empty(sweeps, dtype=np.int8),
+        curvature=curvature,
+        clear_angle=clear,
+    )
+    longest = int(np.diff(strokes.first).max(initial=0))
+    _sweep(
+        shapes,
+        lanes,
+        strokes,
+        accuracy,
+        _NEVER_MISSED if tolerance is None else tolerance,
+        asks_clearance,
+        tables(),
+        nodes_of(order),
+        work(longest, order, shapes.knots.shape[1], room()),
+        np.empty(shapes.tables.shape[1:]),
+        answers,
+    )
+    return answers
