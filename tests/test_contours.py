@@ -495,7 +495,6 @@ def test_seen_from_the_pivot(family, mirror, data):
         assert np.all(np.abs(integral - np.diff(value)) <= off + rounding + 64 * EPS * locus.arclength_rate.max())
     lo, hi = seen.domain()
     assert np.all(lo < hi)
-    assert seen.knots().shape == (len(contour.knots), 3)
 
 
 def test_an_open_end_is_brought_in_to_beyond_the_rods_reach():

@@ -94,8 +94,8 @@ def test_against_an_independent_sum(rig):
         present = ~np.isnan(values[0])
         deviation = np.array([cell.standard_deviations[name] for name in CHANNELS])[present]
         units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])[present]
-        for exact in (False,) if missing else (False, True):
-            likelihood = RecordLikelihood(measured, cell, friction, exact)
+        for exactly in (False,) if missing else (False, True):
+            likelihood = RecordLikelihood(measured, cell, friction, exactly)
             found = likelihood.log_likelihood(stack([true, other]), scale[:, None])
             pointwise = likelihood.log_likelihood(stack([true, other]), scale[:, None], pointwise=True)
             np.testing.assert_allclose(pointwise.sum(axis=1), found, rtol=1e-12)
@@ -103,7 +103,7 @@ def test_against_an_independent_sum(rig):
                 sigma = scale[k] * deviation
                 densities = stats.norm.logpdf(values[:, present], loads[:, present], sigma).sum(axis=1)
                 expected = densities + np.log(units).sum()  # densities of dimensionless loads
-                error = SHARE[exact] * np.abs(loads[:, present]).max(axis=0)
+                error = SHARE[exactly] * np.abs(loads[:, present]).max(axis=0)
                 slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
                 assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
 

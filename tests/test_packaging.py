@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-OPTIONAL = ("matplotlib", "distributed", "dask", "jinja2", "numba", "arviz", "emcee", "rich", "sklearn")
+OPTIONAL = ("matplotlib", "distributed", "dask", "jinja2", "arviz", "emcee", "rich", "sklearn")
 
 
 @pytest.fixture(scope="module")
@@ -71,11 +71,13 @@ def test_the_metadata_says_what_it_is(built):
 
 
 def test_it_starts_without_what_is_loaded_when_used():
-    """With matplotlib, Dask, Jinja and others out of sight, importing and a scan work."""
+    """With matplotlib, Dask, Jinja and others out of sight, importing and a scan work; importing does without Numba."""
     code = f"""
 import sys
 sys.modules.update(dict.fromkeys({OPTIONAL!r}))
 import tactile_bayes as tb
+from tactile_bayes import contours, elastica, load_cell, record
+assert "numba" not in sys.modules
 measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(
     tb.scan(tb.contours.paper_profile("II", q=0.5), drive_step=0.2).record, seed=1
 )

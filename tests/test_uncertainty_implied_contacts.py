@@ -129,7 +129,7 @@ def test_an_inferred_offset_is_taken_off_the_drive_angle_draw_by_draw(name):
             for column in COLUMNS:
                 np.testing.assert_allclose(draw[column], there[f"truth_{column}"], rtol=0.0, atol=1e-9, equal_nan=True)
             touched = there.truth_contact_phase.values != "none"
-            np.testing.assert_allclose(draw.drive_angle, np.where(touched, np.sort(angles), np.nan), atol=1e-15)
+            np.testing.assert_allclose(draw.drive_angle, np.where(touched, np.sort(angles), np.nan), atol=1e-14)
 
 
 def test_inferred_friction_and_compliance_go_into_the_paths_draw_by_draw():

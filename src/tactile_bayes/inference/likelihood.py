@@ -320,8 +320,11 @@ class RecordLikelihood:
             samples, angles = [], []
             for row, stroke in zip(self._angles, self.strokes, strict=True):
                 shifts = errors if stroke.backward else -errors
-                angles.append((row[: stroke.samples.size] + shifts[:, None]).ravel())
-                samples.append((stroke.samples + len(self.measured) * np.arange(errors.size)[:, None]).ravel())
+                seen = (row[: stroke.samples.size] + shifts[:, None]).ravel()
+                order = np.argsort(seen, kind="stable")
+                angles.append(seen[order])
+                rows = stroke.samples + len(self.measured) * np.arange(errors.size)[:, None]
+                samples.append(rows.ravel()[order])
             first = np.cumsum([0, *(part.size for part in samples)])
             strokes = Strokes(first, np.concatenate(samples), np.concatenate(angles))
             self._strokes = key, strokes

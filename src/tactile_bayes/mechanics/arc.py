@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = [
     "SHORT_COSINE",
@@ -89,7 +89,7 @@ class _Amplitude(NamedTuple):
     """Δ²."""
 
 
-@inlined
+@compiled
 def _amplitude(chi: float, m: float) -> _Amplitude:
     half, half_cos = math.sin(0.5 * chi), math.cos(0.5 * chi)
     sin, cos = 2.0 * half * half_cos, (half_cos - half) * (half_cos + half)
@@ -125,13 +125,13 @@ def arc_and_slopes(chi: float, m: float) -> tuple[Arc, Arc, Arc]:
     return Arc(F, C, S, _turn(at)), _by_chi(at), Arc(F_1, C_1, S_1, turn)
 
 
-@inlined
+@compiled
 def _turn(at: _Amplitude) -> float:
     w = at.half * at.half
     return 2.0 * math.atan2(at.c * w, 1.0 - 2.0 * at.m * w)
 
 
-@inlined
+@compiled
 def _by_chi(at: _Amplitude) -> Arc:
     """The integrands."""
     w = at.half * at.half
@@ -140,7 +140,7 @@ def _by_chi(at: _Amplitude) -> Arc:
     return Arc(1.0 / d, kernel * cw, kernel * (1.0 - 2.0 * at.m * w), at.c * at.sin / at.d2)
 
 
-@inlined
+@compiled
 def _arc(at: _Amplitude) -> Arc:
     if at.cos > SHORT_COSINE:
         F, first, second = 0.0, 0.0, 0.0
@@ -162,7 +162,7 @@ def _arc(at: _Amplitude) -> Arc:
     return Arc(F, 2.0 * m * (P - (1.0 - 2.0 * m) * Q), at.c * (P + 2.0 * m * Q), _turn(at))
 
 
-@inlined
+@compiled
 def _short(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
     """F, C and S, and their derivatives by ψ1 with dm/dψ1 = −c/2 and dc/dψ1 = −p, of a short arc; p = sin ψ1."""
     m, c = at.m, at.c
@@ -190,7 +190,7 @@ def _short(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
     return F, 2.0 * c * c * second, 2.0 * c * leaning, -c * (first - second), C_1, S_1
 
 
-@inlined
+@compiled
 def _long(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
     """The same of a long arc."""
     sin, m, c = at.sin, at.m, at.c
@@ -209,7 +209,7 @@ def _long(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
     return F, 2.0 * m * (P - p * Q), c * (P + 2.0 * m * Q), -0.5 * c * F_m, C_1, S_1
 
 
-@inlined
+@compiled
 def _legendre(at: _Amplitude) -> tuple[float, float]:
     """F and D = (F − E)/m by duplication, which they share.
 
@@ -248,13 +248,13 @@ def _legendre(at: _Amplitude) -> tuple[float, float]:
     return F, D
 
 
-@inlined
+@compiled
 def chord_angle(arc: Arc) -> float:
     """Angle of the chord over the direction at the contact."""
     return math.atan2(arc.offset, arc.length - arc.shortfall)
 
 
-@inlined
+@compiled
 def chord_rate(arc: Arc, by: Arc) -> float:
     """Its derivative."""
     along = arc.length - arc.shortfall
@@ -262,14 +262,14 @@ def chord_rate(arc: Arc, by: Arc) -> float:
     return across / (along * along + arc.offset * arc.offset)
 
 
-@inlined
+@compiled
 def slack(arc: Arc) -> float:
     """√(1 − r²) for a rod of length one, r its chord; without cancellation."""
     F, C, S = arc.length, arc.shortfall, arc.offset
     return math.sqrt(max(2.0 * F * C - C * C - S * S, 0.0)) / F
 
 
-@inlined
+@compiled
 def slack_rate(arc: Arc, value: float, by: Arc) -> float:
     F, C, S = arc.length, arc.shortfall, arc.offset
     half = (F - C) * by.shortfall + C * by.length - S * by.offset

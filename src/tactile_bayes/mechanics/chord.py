@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from tactile_bayes.mechanics.arc import Arc, arc_and_slopes, arc_to, chord_angle, chord_rate, slack, slack_rate
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = ["tangential_arc", "tip_arc"]
 
@@ -67,7 +67,7 @@ def tip_arc(lack: float, tilt: float, chi: float, tilt1: float) -> tuple[float, 
     return math.nan, math.nan, Arc(math.nan, math.nan, math.nan, math.nan)
 
 
-@inlined
+@compiled
 def _moved(arc: Arc, by: Arc, step: float) -> Arc:
     """An arc after a small step."""
     return Arc(

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
+from numba.core import event
 
 __all__ = ["compiled", "inlined", "kept"]
+
+_NOTICE = "tactile-bayes: compiling the forward model; this takes a while the first time, and is kept for later"
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def compiled(function: Function) -> Function:
     """Machine code, as a part of what calls it."""
-    made: Function = numba.njit(function, error_model="numpy", nogil=True)
+    options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # no other calls it
+    made: Function = numba.njit(function, error_model="numpy", nogil=True, **options)
     return made
 
 
@@ -38,8 +43,27 @@ def kept(function: Function) -> Function:
     try:
         made: Function = numba.njit(function, error_model="numpy", nogil=True, cache=True)
     except RuntimeError:  # neither beside the file nor in the user's cache may anything be written
-        made = compiled(function)
+        made = numba.njit(function, error_model="numpy", nogil=True)
     return made
+
+
+class _Notice(event.Listener):
+    """Says once that something is compiled, to whoever waits at a terminal."""
+
+    def __init__(self) -> None:
+        self.said = False
+
+    def on_start(self, event: Any) -> None:
+        ours = event.data["dispatcher"].py_func.__module__.startswith(__package__)
+        if ours and not self.said and sys.stderr.isatty():
+            print(_NOTICE, file=sys.stderr, flush=True)
+            self.said = True
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _Notice())
 
 
 @functools.cache

@@ -30,9 +30,12 @@ class Outline(NamedTuple):
     left_kind: int
     left_size: float
     left_shape: float
+    left_unit: float
+    """What the contour's own parameter is one of in rod lengths, for a power law; 1 for others."""
     right_kind: int
     right_size: float
     right_shape: float
+    right_unit: float
     low: float
     high: float
     """Least and greatest parameter where there is a table, else of no meaning."""
@@ -67,9 +70,11 @@ def mirrored(outline: Outline) -> Outline:
         outline.right_kind,
         outline.right_size,
         outline.right_shape,
+        outline.right_unit,
         outline.left_kind,
         outline.left_size,
         outline.left_shape,
+        outline.left_unit,
         -outline.high,
         -outline.low,
         -outline.sign,
@@ -84,9 +89,9 @@ def mirrored(outline: Outline) -> Outline:
 def place(outline: Outline, p: float) -> Place:
     """The point at a parameter."""
     if p < 0.0:
-        kind, size, shape = outline.left_kind, outline.left_size, outline.left_shape
+        kind, size, shape, unit = outline.left_kind, outline.left_size, outline.left_shape, outline.left_unit
     else:
-        kind, size, shape = outline.right_kind, outline.right_size, outline.right_shape
+        kind, size, shape, unit = outline.right_kind, outline.right_size, outline.right_shape, outline.right_unit
     if kind == PARABOLA:
         t = math.tan(p)
         square = 1.0 + t * t
@@ -101,6 +106,7 @@ def place(outline: Outline, p: float) -> Place:
         speed, bend = math.sqrt(square), size * shape / square
         sin, cos = shape * s / speed, size * c / speed
     elif kind == POWER_LAW:
+        p /= unit
         of_offset, of_slope = max(1.0, 1.0 / (shape - 1.0)), max(1.0, shape - 1.0)
         flat, steep = abs(p) ** (of_offset - 1.0), abs(p) ** (of_slope - 1.0)
         steepness = size * shape * steep * p
@@ -108,7 +114,7 @@ def place(outline: Outline, p: float) -> Place:
         root = math.sqrt(square)
         x, y = flat * p, size * flat * steep * p * p
         sin, cos = steepness / root, 1.0 / root
-        speed, bend = of_offset * flat * root, size * shape * of_slope * steep / square
+        speed, bend = of_offset * flat * root / unit, size * shape * of_slope * steep / square / unit
     elif kind == SLOPES:
         x, y, speed = _by_slope(outline.table, outline.sign * p)
         x *= outline.sign
@@ -210,7 +216,7 @@ def _end(outline: Outline, outward: float) -> float:
     elif kind == OVAL:
         end = outward * _UPRIGHT
     elif kind == POWER_LAW:
-        end = outward
+        end = outward * (outline.left_unit if outward < 0.0 else outline.right_unit)
         while not outward * place(outline, end).x > 1.0:
             end *= 2.0
     else:
@@ -224,11 +230,11 @@ def _end(outline: Outline, outward: float) -> float:
 def _parameter_of_x(outline: Outline, x: float) -> float:
     offset = x - outline.x
     if offset < 0.0:
-        kind, size, shape = outline.left_kind, outline.left_size, outline.left_shape
+        kind, size, shape, unit = outline.left_kind, outline.left_size, outline.left_shape, outline.left_unit
     else:
-        kind, size, shape = outline.right_kind, outline.right_size, outline.right_shape
+        kind, size, shape, unit = outline.right_kind, outline.right_size, outline.right_shape, outline.right_unit
     if kind == PARABOLA:
         return math.atan(2.0 * size * offset)
     if kind == OVAL:
         return math.asin(offset / size)
-    return math.copysign(abs(offset) ** (1.0 / max(1.0, 1.0 / (shape - 1.0))), offset)
+    return math.copysign(unit * abs(offset) ** (1.0 / max(1.0, 1.0 / (shape - 1.0))), offset)

@@ -23,7 +23,17 @@ from tactile_bayes.mechanics.fates import Reach, SnapOff
 from tactile_bayes.mechanics.outline import Outline, Place, bearing, frame, place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.reach import limits
-from tactile_bayes.mechanics.series import Nodes, at_all, change_of, crossing, tail, value, value_and_slope, weighted
+from tactile_bayes.mechanics.series import (
+    Nodes,
+    at_all,
+    change_of,
+    crossing,
+    tail,
+    three_at_all,
+    value,
+    value_and_slope,
+    weighted,
+)
 from tactile_bayes.mechanics.states import State, exact_state, tabled_state
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 from tactile_bayes.mechanics.tables import MOST_FRICTION, Room, Tables, prepare
@@ -45,7 +55,7 @@ _MOST_MORE = 64
 """Stretches beyond those that are cut from which on none is halved: what is rough everywhere, like a contour whose
 curvature is interpolated, is not smooth in smaller pieces either."""
 
-_SMALL_ERROR, _RUBBING_ERROR = 1.3e-7, 1e-7
+_SMALL_ERROR, _RUBBING_ERROR = 1.3e-7, 2e-7
 """Largest errors of tables: of loads over the loads, and of the drive angle [rad]."""
 
 _NEAR = 1e-3
@@ -82,7 +92,7 @@ class Samples(NamedTuple):
     """What is asked for."""
 
     angles: Floats
-    """Drive angles, as read and as seen in forward sweeps."""
+    """Drive angles, as read and as seen in forward sweeps, increasing."""
     rows: NDArray[np.intp]
     """Where their loads and states go."""
 
@@ -127,13 +137,14 @@ class Work(NamedTuple):
     """Those of the way and of the loads over the drive angle."""
     states: Room
     on_grid: Floats
-    there: NDArray[np.intp]
-    """Samples on the stretch."""
     wanted: Floats
+    """Drive angles of samples on the stretch, and below what is made of them."""
     twice: Floats
     rate: Floats
     now: Floats
     before: Floats
+    found: Floats
+    """Loads of samples, shape (3, samples)."""
     pieces: Floats
     """Stretches as they are cut."""
     waiting: Floats
@@ -152,12 +163,12 @@ def work(samples: int, order: int, knots: int, states: Room) -> Work:
         over_angle=np.empty((4, order)),
         states=states,
         on_grid=np.empty(2 * order + 1),
-        there=np.empty(samples, dtype=np.intp),
         wanted=wanted,
         twice=twice,
         rate=rate,
         now=now,
         before=before,
+        found=np.empty((3, samples)),
         pieces=np.empty((most, 3)),
         waiting=np.empty((most + _MOST_MORE, 6)),
     )
@@ -275,17 +286,36 @@ def _stretched(angle: float, begin: float, end: float, steadiness: float) -> flo
 
 
 @compiled
-def _on_stretch(samples: Samples, offset: float, span: tuple[float, float], steadiness: float, room: Work) -> int:
-    """How many samples lie on a stretch; in the room their rows, drive angles and stretched ones z, as 4z − 2."""
+def _on_stretch(
+    samples: Samples, offset: float, span: tuple[float, float], steadiness: float, room: Work
+) -> tuple[int, int]:
+    """The first sample on a stretch and how many there are; in the room their drive angles and stretched ones z, as
+    4z − 2."""
     begin, end = span
-    there, wanted, twice, count = room.there, room.wanted, room.twice, 0
-    for j in range(samples.angles.size):
-        angle = samples.angles[j] - offset
-        if begin <= angle <= end:
-            there[count], wanted[count] = samples.rows[j], angle
-            twice[count] = 4.0 * _stretched(angle, begin, end, steadiness) - 2.0
-            count += 1
-    return count
+    first, last = _before(samples.angles, begin + offset), _before(samples.angles, end + offset)
+    while last < samples.angles.size and samples.angles[last] - offset <= end:
+        last += 1
+    wanted, twice, count = room.wanted, room.twice, last - first
+    for j in range(count):
+        wanted[j] = samples.angles[first + j] - offset
+        left = min(max((end - wanted[j]) / (end - begin), 0.0), 1.0)
+        root = math.sqrt(steadiness * steadiness + 4.0 * (1.0 - steadiness) * left)
+        ahead = 2.0 * left / (steadiness + root)
+        twice[j] = 2.0 - 4.0 * (ahead if left > 0.0 else 0.0)
+    return first, count
+
+
+@compiled
+def _before(angles: Floats, angle: float) -> int:
+    """How many angles, which increase, are less than one."""
+    low, high = 0, angles.size
+    while low < high:
+        middle = (low + high) // 2
+        if angles[middle] < angle:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @compiled
@@ -313,7 +343,15 @@ def _look_for(accuracy: Accuracy, stop: float, count: int, room: Work) -> None:
 
 @compiled
 def _write_loads(
-    accuracy: Accuracy, sign: float, stop: float, count: int, tolerance: Floats, room: Work, out: Floats
+    samples: Samples,
+    first: int,
+    count: int,
+    accuracy: Accuracy,
+    sign: float,
+    stop: float,
+    tolerance: Floats,
+    room: Work,
+    out: Floats,
 ) -> None:
     """Loads of the samples on a stretch: over the drive angle if they are smooth functions of it, else over the way."""
     smooth = True
@@ -323,11 +361,11 @@ def _write_loads(
     if not smooth:
         _look_for(accuracy, stop, count, room)
         loads = room.series
-    for c in range(3):
-        at_all(loads[c + 1], room.twice, count, room.now, room.before)
-        factor = 1.0 if c == 2 else sign
-        for j in range(count):
-            out[room.there[j], c] = factor * room.now[j]
+    three_at_all(loads, room.twice, count, room.now, room.before, room.found)
+    for j in range(count):
+        row = samples.rows[first + j]
+        out[row, 0], out[row, 1] = sign * room.found[0, j], sign * room.found[1, j]
+        out[row, 2] = room.found[2, j]
 
 
 @compiled
@@ -339,6 +377,8 @@ def _write_states(
     stop: float,
     span: tuple[float, float],
     steadiness: float,
+    samples: Samples,
+    first: int,
     count: int,
     known: Tables,
     on: Nodes,
@@ -350,7 +390,7 @@ def _write_states(
     delta, stiff, over_angle = rig.friction_angle, rig.compliance == 0.0, room.over_angle
     weighted(on.slopes, over_angle[0], room.bend)
     for j in range(count):
-        row, target = room.there[j], 0.25 * (room.twice[j] + 2.0)
+        row, target = samples.rows[first + j], 0.25 * (room.twice[j] + 2.0)
         way, pace = value_and_slope(over_angle[0], room.bend, target)
         way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle is less again
         low, high, before = 0.0, stop, stop
@@ -440,7 +480,7 @@ def follow(
     delta = rig.friction_angle
     tabled = delta <= MOST_FRICTION
     prepare(known, delta, room.states)
-    limit = limits(outline, delta, accuracy.last_step)
+    limit = limits(outline, delta, accuracy.first_step)
     if limit.reach != _TOUCHES:
         return _nothing(limit.reach, limit.distance)
     pieces, waiting = room.pieces, room.waiting
@@ -498,14 +538,27 @@ def follow(
         if not folds:
             steadiness = min(max(value(room.slope, stop) * stop / (at_end - at_begin), 0.0), 1.0)
         _over_drive_angle(accuracy, stop, at_begin, at_end, steadiness, on, room)
-        there = _on_stretch(samples, rig.offset, (at_begin, at_end), steadiness, room)
+        first_there, there = _on_stretch(samples, rig.offset, (at_begin, at_end), steadiness, room)
         if wants_states:
             _write_states(
-                outline, stretch, rig, accuracy, stop, (at_begin, at_end), steadiness, there, known, on, room, found
+                outline,
+                stretch,
+                rig,
+                accuracy,
+                stop,
+                (at_begin, at_end),
+                steadiness,
+                samples,
+                first_there,
+                there,
+                known,
+                on,
+                room,
+                found,
             )
             largest = max(_largest_curvature(stop, rig, room), 0.0 if math.isnan(largest) else largest)
         else:
-            _write_loads(accuracy, rig.sign, stop, there, tolerance, room, found.loads)
+            _write_loads(samples, first_there, there, accuracy, rig.sign, stop, tolerance, room, found.loads)
         if found.changes.shape[0] > changes and (not changes or (found.changes[changes - 1, 1] > 0.0) != stretch.tip):
             found.changes[changes, 0], found.changes[changes, 1] = stretch.begin, stretch.tip
             changes += 1

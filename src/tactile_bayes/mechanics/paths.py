@@ -207,8 +207,10 @@ def _swept(
     from tactile_bayes.mechanics.sweeps import Strokes, answered
 
     count, each = lanes.contour.size, np.shape(drive_angles)[-1]
-    angles = np.array(np.broadcast_to(drive_angles, (count, each)), dtype=float).ravel()
-    strokes = Strokes(each * np.arange(count + 1), np.tile(np.arange(each), count), angles)
+    angles = np.broadcast_to(np.asarray(drive_angles, dtype=float), (count, each))
+    order = np.argsort(angles, axis=1, kind="stable")
+    increasing = np.take_along_axis(angles, order, axis=1)
+    strokes = Strokes(each * np.arange(count + 1), order.ravel(), increasing.ravel())
     return answered(shapes, lanes, strokes, (count, each), tolerance=tolerance, states=states)
 
 

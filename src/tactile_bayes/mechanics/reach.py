@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.mechanics.compiler import compiled, inlined
@@ -11,7 +12,18 @@ from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, plac
 
 __all__ = ["Limits", "clear_angle", "limits"]
 
-_LEVER, _TURNED, _WITHIN = 0, 1, 2
+
+class _Sought(IntEnum):
+    """What vanishes at a root, and falls away from the pivot's side."""
+
+    LEVER = 0
+    """The lever arm of a force across the contour."""
+    TURNED = 1
+    """How much less the line from the pivot is turned from the contour's direction."""
+    WITHIN = 2
+    """How far inside the rod's reach it is."""
+
+
 _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reach.TOUCHES), int(Reach.TOO_FAR), int(Reach.CUTS_PIVOT)
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reach.ENDS), int(Reach.TOO_CLOSE), int(Reach.RUNS_OUT)
 _CLEARANCE = CLEARANCE
@@ -35,13 +47,13 @@ class Limits(NamedTuple):
 
 
 @compiled
-def _missing(outline: Outline, what: int, turned: float, p: float) -> tuple[float, float]:
-    """What is sought vanishes at its root, and falls away from the pivot's side; with its derivative."""
+def _missing(outline: Outline, what: _Sought, turned: float, p: float) -> tuple[float, float]:
+    """What is sought, with its derivative."""
     at = place(outline, p)
     along, facing = frame(at)
-    if what == _LEVER:
+    if what == _Sought.LEVER:
         return along, at.speed + facing * at.bend
-    if what == _WITHIN:
+    if what == _Sought.WITHIN:
         return 1.0 - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
     # How much less the line from the pivot is turned from the contour's direction: the farther to the left the more it
     # is, as long as the contour faces the pivot. It jumps below the pivot, where no contour is.
@@ -51,7 +63,7 @@ def _missing(outline: Outline, what: int, turned: float, p: float) -> tuple[floa
 
 
 @compiled
-def _root(outline: Outline, what: int, turned: float, positive: float, negative: float, last_step: float) -> float:
+def _root(outline: Outline, what: _Sought, turned: float, positive: float, negative: float, last_step: float) -> float:
     """Newton kept in its bracket; the last step is a share of that."""
     p, before = 0.5 * (positive + negative), abs(negative - positive)
     settled = last_step * before
@@ -80,13 +92,13 @@ def _root(outline: Outline, what: int, turned: float, positive: float, negative:
 @compiled
 def _nearest(outline: Outline, low: float, high: float, last_step: float) -> tuple[float, bool, bool]:
     """Parameter of the nearest point, and whether it lies beyond the greatest or the least one."""
-    beyond_high = _missing(outline, _LEVER, 0.0, high)[0] <= 0.0
-    beyond_low = _missing(outline, _LEVER, 0.0, low)[0] >= 0.0
+    beyond_high = _missing(outline, _Sought.LEVER, 0.0, high)[0] <= 0.0
+    beyond_low = _missing(outline, _Sought.LEVER, 0.0, low)[0] >= 0.0
     if beyond_high:
         return high, beyond_high, beyond_low
     if beyond_low:
         return low, beyond_high, beyond_low
-    return _root(outline, _LEVER, 0.0, high, low, last_step), beyond_high, beyond_low
+    return _root(outline, _Sought.LEVER, 0.0, high, low, last_step), beyond_high, beyond_low
 
 
 @inlined
@@ -98,9 +110,9 @@ def _is_out(outline: Outline, p: float) -> bool:
 @compiled
 def _first(outline: Outline, high: float, nearest: float, last_step: float) -> tuple[float, bool]:
     """Parameter of first contact, and whether the tip touches first."""
-    tangent = _root(outline, _TURNED, 0.0, high, nearest, last_step)
+    tangent = _root(outline, _Sought.TURNED, 0.0, high, nearest, last_step)
     if _is_out(outline, tangent):
-        return _root(outline, _WITHIN, 0.0, nearest, tangent, last_step), True
+        return _root(outline, _Sought.WITHIN, 0.0, nearest, tangent, last_step), True
     return tangent, False
 
 
@@ -117,12 +129,12 @@ def limits(outline: Outline, delta: float, last_step: float) -> Limits:
     end = nearest
     if delta > 0.0:
         largest = 0.5 * math.pi + delta
-        if _missing(outline, _TURNED, largest, low)[0] >= 0.0:
+        if _missing(outline, _Sought.TURNED, largest, low)[0] >= 0.0:
             end = low
         else:
-            end = _root(outline, _TURNED, largest, nearest, low, last_step)
+            end = _root(outline, _Sought.TURNED, largest, nearest, low, last_step)
         if _is_out(outline, end):
-            end = _root(outline, _WITHIN, 0.0, nearest, end, last_step)
+            end = _root(outline, _Sought.WITHIN, 0.0, nearest, end, last_step)
 
     at_high = place(outline, high)
     open_end = frame(at_high)[1] > 0.0 and math.hypot(at_high.x, at_high.y) <= 1.0

@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 from tactile_bayes import chebyshev
 from tactile_bayes.mechanics.compiler import compiled, inlined
 
-__all__ = ["Nodes", "at_all", "change_of", "crossing", "nodes_of", "tail", "value", "value_and_slope", "weighted"]
+__all__ = [
+    "Nodes",
+    "at_all",
+    "change_of",
+    "crossing",
+    "nodes_of",
+    "tail",
+    "three_at_all",
+    "value",
+    "value_and_slope",
+    "weighted",
+]
 
 Floats = NDArray[np.float64]
 
@@ -85,6 +96,27 @@ def at_all(coefficients: Floats, twice: Floats, count: int, now: Floats, before:
             now[j] = new
     for j in range(count):
         now[j] = coefficients[0] + 0.5 * twice[j] * now[j] - before[j]
+
+
+@compiled
+def three_at_all(rows: Floats, twice: Floats, count: int, now: Floats, before: Floats, out: Floats) -> None:
+    """Three series, those in the rows after the first, at many z, given as 4 z − 2: Chebyshev's polynomials go by in
+    `now` and `before`, side by side for all z, and the sums are in `out`, shape (3, at least count)."""
+    order = rows.shape[1]
+    for j in range(count):
+        before[j], now[j] = 1.0, 0.5 * twice[j]
+        out[0, j] = rows[1, 0] + rows[1, 1] * now[j]
+        out[1, j] = rows[2, 0] + rows[2, 1] * now[j]
+        out[2, j] = rows[3, 0] + rows[3, 1] * now[j]
+    for k in range(2, order):
+        a, b, c = rows[1, k], rows[2, k], rows[3, k]
+        for j in range(count):
+            new = twice[j] * now[j] - before[j]
+            before[j] = now[j]
+            now[j] = new
+            out[0, j] += a * new
+            out[1, j] += b * new
+            out[2, j] += c * new
 
 
 @inlined

@@ -27,7 +27,7 @@ def shapes_of(contours: Contour, low: Floats | None = None, high: Floats | None 
         assert low is not None
         assert high is not None
         halves = in_cells(contours, low, high)
-    (count,) = contours.shape
+    count = contours.shape[0] if contours.shape else halves.x.size
     columns = np.empty((count, 6))
     for k, column in enumerate((*halves.left[1:], *halves.right[1:], halves.x, halves.y)):
         columns[:, k] = column

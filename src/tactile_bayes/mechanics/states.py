@@ -33,10 +33,12 @@ from tactile_bayes.mechanics.tables import (
     MOST_FRICTION,
     SMALL,
     STRETCH,
+    TILT,
     TURN,
     Room,
     Tables,
     combine,
+    combined,
     in_polar,
     prepare,
     series,
@@ -136,8 +138,9 @@ def _ending(x: float, y: float, alpha: float, delta: float, known: Tables, room:
     lack, tilt = math.sqrt(slack2), max(math.atan2(u, v), 0.0)
     table = known.tip[1] if delta == 0.0 else known.tip[2]
     angle, share = in_polar(table, lack, tilt, room)
-    guess = math.sqrt(max(angle * combine(table.chi2, room), 0.0))
-    chi, tilt1, arc = tip_arc(lack, tilt, guess, combine(table.tilt, room) * share)
+    combine(table, 4, room)
+    guess = math.sqrt(max(angle * combined(table, AMPLITUDE, room), 0.0))
+    chi, tilt1, arc = tip_arc(lack, tilt, guess, combined(table, TILT, room) * share)
     by_slope, by_distance = math.nan, -math.inf
     if chi > 0.0:
         _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * tilt1) ** 2)
@@ -265,9 +268,9 @@ def tabled_state(at: Place, delta: float, tip: bool, large: bool, known: Tables,
         which = 2 if delta > 0.0 else int(large or math.atan2(lack, tilt) > _WIDE)
         table = known.tip[which]
         angle, share = in_polar(table, lack, tilt, room)
-        force = combine(table.force, room) * angle
-        turn = combine(table.turn, room) * angle
-        drive_angle = slope + delta + 0.5 * math.pi - combine(table.tilt, room) * share + turn
+        combine(table, 3, room)
+        force, turn = combined(table, FORCE, room) * angle, combined(table, TURN, room) * angle
+        drive_angle = slope + delta + 0.5 * math.pi - combined(table, TILT, room) * share + turn
     else:
         size = room.lying.shape[1] if large or delta > 0.0 else SMALL
         angle = math.atan2(across, along)

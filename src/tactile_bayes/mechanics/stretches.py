@@ -40,8 +40,10 @@ class Accuracy(NamedTuple):
     """Error that the drive angle of an event may have [rad]."""
     halvings: int
     """How often a stretch is halved at most; where something is not smooth at its end that is never enough."""
+    first_step: float
+    """Newton step, as a share of the bracket, after which first contact is taken for found."""
     last_step: float
-    """Newton step, as a share of the bracket, after which a root is taken for found."""
+    """The same of what is found on a stretch."""
     settled: float
     """Share of a stretch by which an exact state may miss its drive angle, for the interpolant to make up for it."""
 
@@ -111,7 +113,7 @@ def cut(
         end = limit.end if k == knots.size else min(max(knots[k], limit.end), limit.begin)
         if not begin - end > _NOTHING * whole:
             continue
-        count = _cut_piece(outline, begin, end, whole, delta, accuracy, tabled, on, room, series, out, count)
+        count += _cut_piece(outline, begin, end, whole, delta, accuracy, tabled, on, room, series, out[count:])
         begin = end
     return count
 
@@ -129,13 +131,12 @@ def _cut_piece(
     room: Room,
     series: Floats,
     out: Floats,
-    count: int,
 ) -> int:
     """Cut a smooth piece of a contour, in as large parts as polynomials follow the arc length of tangential contact."""
     exact = accuracy.exact or not tabled
     values, excess, slope = series[0], series[1], series[2]
     order, least = on.nodes.size, (first - last) * 0.5**_HALVINGS
-    begin, end = first, last
+    begin, end, count = first, last, 0
     while begin > last and count < out.shape[0] - order - 2:
         for k in range(order):
             values[k] = _excess(place(outline, begin + (end - begin) * on.nodes[k]), delta, exact, room)
@@ -145,7 +146,9 @@ def _cut_piece(
             end = begin - 0.5 * span
             continue
         weighted(on.slopes, excess, slope)
-        count = _cut_smooth(outline, begin, end, _NOTHING * whole, delta, accuracy, on, room, series, out, count)
+        count += _cut_smooth(
+            outline, begin, end, _NOTHING * whole, delta, accuracy, exact, on, room, series, out[count:]
+        )
         begin, end = end, last
     return count
 
@@ -158,15 +161,15 @@ def _cut_smooth(
     nothing: float,
     delta: float,
     accuracy: Accuracy,
+    exact: bool,
     on: Nodes,
     room: Room,
     series: Floats,
     out: Floats,
-    count: int,
 ) -> int:
     """Cut where a polynomial changes its sign."""
     values, excess, slope = series[0], series[1], series[2]
-    span, order, started, old = end - begin, on.nodes.size, 0.0, 0.0
+    span, order, started, old, count = end - begin, on.nodes.size, 0.0, 0.0, 0
     beyond = value(excess, 0.0) > 0.0
     for k in range(order + 1):
         new = 1.0 if k == order else on.nodes[k]
@@ -174,8 +177,8 @@ def _cut_smooth(
         if (at_new > 0.0) != beyond:
             left, right = (old, new) if beyond else (new, old)
             change = crossing(excess, slope, 0.0, left, right, 0.5 * (old + new), accuracy.last_step)
-            if accuracy.exact:
-                change = _polished(outline, begin, span, change, min(change - started, 1.0 - change), delta, room)
+            most = min(change - started, 1.0 - change)
+            change = _polished(outline, begin, span, change, most, delta, accuracy.first_step, exact, room)
             if abs(span) * (change - started) > nothing:  # else it is rounding where a piece begins
                 out[count, 0], out[count, 1], out[count, 2] = begin + span * started, begin + span * change, beyond
                 count += 1
@@ -187,16 +190,26 @@ def _cut_smooth(
 
 @compiled
 def _polished(
-    outline: Outline, begin: float, span: float, change: float, most: float, delta: float, room: Room
+    outline: Outline,
+    begin: float,
+    span: float,
+    change: float,
+    most: float,
+    delta: float,
+    last_step: float,
+    exact: bool,
+    room: Room,
 ) -> float:
-    """A change of the phase to rounding, by secants from the interpolant's answer."""
+    """A change of the phase beyond the interpolant's answer, by secants until a step is as small as given."""
     old, now = change + 1e-4 * most, change
-    at_old = _excess(place(outline, begin + span * old), delta, True, room)
-    at_now = _excess(place(outline, begin + span * now), delta, True, room)
+    at_old = _excess(place(outline, begin + span * old), delta, exact, room)
+    at_now = _excess(place(outline, begin + span * now), delta, exact, room)
     for _ in range(4):
         step = at_now * (now - old) / (at_now - at_old)
         if not abs(step) < 0.1 * most:
             break
         old, at_old, now = now, at_now, now - step
-        at_now = _excess(place(outline, begin + span * now), delta, True, room)
+        if abs(step) <= last_step:
+            break
+        at_now = _excess(place(outline, begin + span * now), delta, exact, room)
     return now

@@ -34,10 +34,10 @@ Index = NDArray[np.intp]
 
 _TOUCHES = int(Reach.TOUCHES)
 
-_EXACT = Accuracy(exact=True, resolved=1e-8, sharp=np.inf, halvings=8, last_step=4e-16, settled=1e-14)
+_EXACT = Accuracy(exact=True, resolved=1e-8, sharp=np.inf, halvings=8, first_step=4e-16, last_step=4e-16, settled=1e-14)
 """States and events to rounding."""
 
-_FAST = Accuracy(exact=False, resolved=1e-3, sharp=1e-6, halvings=12, last_step=1e-4, settled=1e-7)
+_FAST = Accuracy(exact=False, resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, settled=1e-7)
 """As well as noise asks."""
 
 _EXACT_ORDER, _FAST_ORDER = 32, 16
@@ -85,7 +85,7 @@ class Strokes(NamedTuple):
     rows: Index
     """Where what is found of a sample goes."""
     angles: Floats
-    """Drive angles, as read and as seen in forward sweeps."""
+    """Drive angles, as read and as seen in forward sweeps, increasing in each stroke."""
 
 
 class Answers(NamedTuple):
@@ -113,14 +113,14 @@ class Answers(NamedTuple):
 
 
 @compiled
-def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tuple[float, float]:
+def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tuple[float, float, float]:
     if kind == PARABOLA:
-        return size * length, shape
+        return size * length, shape, 1.0
     if kind == OVAL:
-        return size / length, shape / length
+        return size / length, shape / length, 1.0
     if kind == POWER_LAW:
-        return size * length ** (shape - 1.0), shape
-    return size, shape
+        return size * length ** (shape - 1.0), shape, length ** min(1.0, shape - 1.0)
+    return size, shape, 1.0
 
 
 @compiled
@@ -129,8 +129,8 @@ def _outline(shapes: Shapes, lanes: Lanes, i: int, table: Floats) -> Outline:
     c, length = lanes.contour[i], lanes.length[i]
     left, right = shapes.kinds
     of = shapes.halves[c]
-    l_size, l_shape = _in_rod_lengths(left, of[0], of[1], length)
-    r_size, r_shape = _in_rod_lengths(right, of[2], of[3], length)
+    l_size, l_shape, l_unit = _in_rod_lengths(left, of[0], of[1], length)
+    r_size, r_shape, r_unit = _in_rod_lengths(right, of[2], of[3], length)
     if left in (SLOPES, CELLS):
         begin, end = (2, 2 + 2 * (table.shape[1] - 2) // 3) if left == CELLS else (0, table.shape[1])
         for r in range(table.shape[0]):
@@ -138,8 +138,9 @@ def _outline(shapes: Shapes, lanes: Lanes, i: int, table: Floats) -> Outline:
                 table[r, k] = shapes.tables[c, r, k] / (length if begin <= k < end else 1.0)
     x, y = (of[4] - lanes.base_x[i]) / length, (of[5] - lanes.base_y[i]) / length
     low, high = (-l_size if left == SLOPES else l_size), r_size
+    standoff = lanes.standoff[i] / length
     outline = Outline(
-        left, l_size, l_shape, right, r_size, r_shape, low, high, 1.0, x, y, lanes.standoff[i] / length, table
+        left, l_size, l_shape, l_unit, right, r_size, r_shape, r_unit, low, high, 1.0, x, y, standoff, table
     )
     return mirrored(outline) if lanes.backward[i] else outline
 
@@ -186,7 +187,7 @@ def _sweep(
         answers.snap_off[i], answers.phases[i], answers.curvature[i] = ends.snap_off, ends.phases, ends.curvature
         answers.clear_angle[i] = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
-            answers.clear_angle[i] = clear_angle(outline, accuracy.last_step)
+            answers.clear_angle[i] = clear_angle(outline, accuracy.first_step)
 
 
 def answered(

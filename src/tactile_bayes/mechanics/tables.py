@@ -32,6 +32,7 @@ __all__ = [
     "Tables",
     "TipTable",
     "combine",
+    "combined",
     "in_polar",
     "prepare",
     "room",
@@ -44,18 +45,18 @@ Floats = NDArray[np.float64]
 MOST_FRICTION = 0.4
 """Friction angle up to which there are tables [rad]: the nearer to where the map folds, the longer their series."""
 
-FORCE, TURN, AMPLITUDE, TILT, STRETCH = 0, 1, 2, 3, 3
-"""What the rows of tables hold: force times the square of the chord (of the rod, for a tip) and turn, both over the
-angle; χ² over the angle; ε1 over the share in tip contact; arc length over chord in tangential contact."""
+FORCE, TURN, TILT, STRETCH, AMPLITUDE = 0, 1, 2, 2, 3
+"""What tables hold: force times the square of the chord (of the rod, for a tip) and turn, both over the angle; ε1 over
+the share in tip contact, arc length over chord in tangential contact; χ² over the angle."""
 
 SMALL = 16
-"""Number of coefficients in each direction of small tables, without friction: to 3e-6, mostly to 1.3e-7."""
+"""Number of coefficients in each direction of small tables, without friction: to 2e-7, and 3e-6 in a corner."""
 
 _LARGE = 30, 26
-"""Of large ones, over the angle and over the share: to 1e-10."""
+"""Of large ones, over the angle and over the share: to 5e-10."""
 
-_RUBBING = 30, 30
-"""With friction: to 3e-8, mostly to 1e-9."""
+_RUBBING = 24, 36
+"""With friction: to 6e-7, mostly to 1e-7."""
 
 _LYING = 30, 16
 """Over the angle in tangential contact, and over the friction angle."""
@@ -67,21 +68,20 @@ _CHI_MAX = 3.2
 
 
 class TipTable(NamedTuple):
-    """Arrays of their own, because making views of parts of one takes as long as a series."""
+    """What belongs to tip contact."""
 
     radius: Floats
-    """The largest one, over the angle."""
-    force: Floats
-    turn: Floats
-    chi2: Floats
-    tilt: Floats
+    """The largest one, over the angle, shape (angles,)."""
+    rows: Floats
+    """What is tabulated, side by side, so that one loop runs over all: force, turn, tilt and then the amplitude, shape
+    (shares, 4 · angles)."""
 
 
 class Tables(NamedTuple):
     """All of them."""
 
     lying: Floats
-    """Tangential contact, shape (4, angles, friction angles)."""
+    """Tangential contact, shape (4, friction angles, angles)."""
     tip: tuple[TipTable, TipTable, TipTable]
     """Tip contact: small, large, with friction."""
 
@@ -94,11 +94,12 @@ class Room(NamedTuple):
     by_angle: Floats
     by_share: Floats
     row: Floats
+    """Of the size of four series over the angle."""
 
 
 def room() -> Room:
     most = max(*_LARGE, *_RUBBING, SMALL)
-    return Room(np.empty((4, _LYING[0])), np.empty(most), np.empty(most), np.empty(most))
+    return Room(np.empty((4, _LYING[0])), np.empty(most), np.empty(most), np.empty(4 * most))
 
 
 @functools.cache
@@ -112,13 +113,13 @@ def tables() -> Tables:
     )
     angles, frictions = _LYING
     lying = _lying_on(chebyshev.nodes(angles), MOST_FRICTION * chebyshev.nodes(frictions))
-    return Tables(np.stack([_fit(values) for values in lying]), tips)
+    return Tables(np.stack([np.ascontiguousarray(_fit(values).T) for values in lying]), tips)
 
 
 def _tip_table(angles: int, shares: int, largest: float) -> TipTable:
     radius, values = _tips_on(0.5 * np.pi * chebyshev.nodes(angles), chebyshev.nodes(shares), largest)
-    force, turn, chi2, tilt = (np.ascontiguousarray(_fit(table).T) for table in values)
-    return TipTable(chebyshev.coefficients(radius), force, turn, chi2, tilt)
+    rows = np.stack([_fit(table).T for table in values], axis=1)
+    return TipTable(chebyshev.coefficients(radius), rows.reshape(shares, -1))
 
 
 def _fit(values: Floats) -> Floats:
@@ -169,13 +170,13 @@ def _tips_on(angles: Floats, shares: Floats, largest: float) -> tuple[Floats, Fl
 @compiled
 def prepare(known: Tables, friction_angle: float, room: Room) -> None:
     """Series of tangential contact at a friction angle, into the room."""
-    _polynomials(min(friction_angle / MOST_FRICTION, 1.0), known.lying.shape[2], room.row)
+    _polynomials(min(friction_angle / MOST_FRICTION, 1.0), known.lying.shape[1], room.row)
+    room.lying[:] = 0.0
     for k in range(4):
-        for i in range(room.lying.shape[1]):
-            total = 0.0
-            for j in range(known.lying.shape[2]):
-                total += known.lying[k, i, j] * room.row[j]
-            room.lying[k, i] = total
+        for j in range(known.lying.shape[1]):
+            weight = room.row[j]
+            for i in range(room.lying.shape[1]):
+                room.lying[k, i] += weight * known.lying[k, j, i]
 
 
 @inlined
@@ -200,7 +201,7 @@ def _polynomials(z: float, size: int, out: Floats) -> None:
 @inlined
 def in_polar(table: TipTable, lack: float, tilt: float, room: Room) -> tuple[float, float]:
     """Angle and share of the largest radius; their polynomials go into the room."""
-    shares, angles = table.force.shape
+    shares, angles = table.rows.shape[0], table.radius.size
     angle = math.atan2(lack, tilt)
     _polynomials(angle / (0.5 * math.pi), angles, room.by_angle)
     largest = 0.0
@@ -212,17 +213,21 @@ def in_polar(table: TipTable, lack: float, tilt: float, room: Room) -> tuple[flo
 
 
 @inlined
-def combine(table: Floats, room: Room) -> float:
-    """A series in both directions."""
-    shares, angles = table.shape
-    row = room.row
-    for a in range(angles):
-        row[a] = 0.0
-    for s in range(shares):
+def combine(table: TipTable, count: int, room: Room) -> None:
+    """Series over the angle, into the room, of as many of what is tabulated as wanted."""
+    row, size = room.row, count * table.radius.size
+    for i in range(size):
+        row[i] = 0.0
+    for s in range(table.rows.shape[0]):
         weight = room.by_share[s]
-        for a in range(angles):
-            row[a] += weight * table[s, a]
-    total = 0.0
-    for a in range(angles):
-        total += row[a] * room.by_angle[a]
+        for i in range(size):
+            row[i] += weight * table.rows[s, i]
+
+
+@inlined
+def combined(table: TipTable, k: int, room: Room) -> float:
+    """One of them at the angle."""
+    total, first = 0.0, k * table.radius.size
+    for a in range(table.radius.size):
+        total += room.row[first + a] * room.by_angle[a]
     return total
