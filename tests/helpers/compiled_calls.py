@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 __all__ = ["by_number"]
 
 
+@functools.cache
 def by_number(function: Callable[..., Any], outputs: int) -> Callable[..., Any]:
     """From arrays of shape (n,) to what the function makes of each entry, flat, shape (n, outputs).
 
