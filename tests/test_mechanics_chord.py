@@ -40,7 +40,7 @@ def _lying(row):
 
 @numba.njit(error_model="numpy")
 def _ending(row):
-    chi, tilt1, arc = _tip_arc(row[0], row[1], row[2], row[3])
+    chi, tilt1, arc, _, _ = _tip_arc(row[0], row[1], row[2], row[3])
     return chi, tilt1, arc.length, arc.shortfall, arc.offset, arc.turn
 
 

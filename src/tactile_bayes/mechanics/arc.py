@@ -36,6 +36,7 @@ __all__ = [
     "chord_rate",
     "slack",
     "slack_rate",
+    "slopes_by_chi",
 ]
 
 Floats = NDArray[np.float64]
@@ -109,6 +110,12 @@ def arc_to(chi: float, m: float) -> tuple[Arc, Arc]:
     """Arc to amplitude χ ∈ [0, 3π/2) of parameter m ∈ (0, 1), and its derivatives by χ."""
     at = _amplitude(chi, m)
     return _arc(at), _by_chi(at)
+
+
+@compiled
+def slopes_by_chi(chi: float, m: float) -> Arc:
+    """The derivatives alone."""
+    return _by_chi(_amplitude(chi, m))
 
 
 @compiled

@@ -8,7 +8,16 @@ from __future__ import annotations
 
 import math
 
-from tactile_bayes.mechanics.arc import Arc, arc_and_slopes, arc_to, chord_angle, chord_rate, slack, slack_rate
+from tactile_bayes.mechanics.arc import (
+    Arc,
+    arc_and_slopes,
+    arc_to,
+    chord_angle,
+    chord_rate,
+    slack,
+    slack_rate,
+    slopes_by_chi,
+)
 from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = ["tangential_arc", "tip_arc"]
@@ -36,14 +45,15 @@ def tangential_arc(angle: float, m: float, guess: float) -> tuple[float, Arc, Ar
             root = math.sqrt(chord_angle(arc))
             step = (root - target) * 2.0 * root / chord_rate(arc, by_chi)
         if abs(step) <= _SETTLED * x:
-            return x - step, _moved(arc, by_chi, -step), arc_to(x - step, m)[1]
+            return x - step, _moved(arc, by_chi, -step), slopes_by_chi(x - step, m)
         x = min(max(x - step, 0.5 * x), math.pi)
     return math.nan, Arc(math.nan, math.nan, math.nan, math.nan), Arc(math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
-def tip_arc(lack: float, tilt: float, chi: float, tilt1: float) -> tuple[float, float, Arc]:
-    """Amplitude χ ∈ [0, π], ε1 = π/2 − ψ1 and arc of a rod of length one whose chord is √(1 − lack²) long.
+def tip_arc(lack: float, tilt: float, chi: float, tilt1: float) -> tuple[float, float, Arc, Arc, Arc]:
+    """Amplitude χ ∈ [0, π], ε1 = π/2 − ψ1 and arc of a rod of length one whose chord is √(1 − lack²) long; and the
+    arc's derivatives by χ and ψ1, to 1e-8.
 
     `tilt` ∈ [0, π/2 + δ] is π/2 minus the chord's angle over the direction across the force; `chi` and `tilt1` are a
     first guess. NaN where Newton's method does not end.
@@ -61,10 +71,11 @@ def tip_arc(lack: float, tilt: float, chi: float, tilt1: float) -> tuple[float, 
             dx = (miss * (1.0 - angle_t) - value_t * miss_tilt) / det
             dt = (value_x * miss_tilt + angle_x * miss) / det
         if abs(dx) <= _SETTLED * x and abs(dt) <= _SETTLED * t:
-            return x - dx, t - dt, _moved(_moved(arc, by_chi, -dx), by_psi1, dt)
+            return x - dx, t - dt, _moved(_moved(arc, by_chi, -dx), by_psi1, dt), by_chi, by_psi1
         x = min(max(x - dx, 0.5 * x), min(1.5 * x, _CHI_MAX))
         t = min(max(t - dt, 0.5 * t), 0.5 * (t + math.pi))
-    return math.nan, math.nan, Arc(math.nan, math.nan, math.nan, math.nan)
+    nowhere = Arc(math.nan, math.nan, math.nan, math.nan)
+    return math.nan, math.nan, nowhere, nowhere, nowhere
 
 
 @compiled

@@ -25,6 +25,9 @@ __all__ = ["Paths", "States", "trace"]
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+_SETTLED = 1e-8
+"""Share of a stretch by which contacts that many paths are asked for together may be off: half the time."""
+
 
 class States(NamedTuple):
     """States on paths."""
@@ -110,7 +113,7 @@ class Paths:
         return _as_states(found.states[lane, rank])
 
     def loaded_states(self) -> tuple[Index, Index, States]:
-        """Exact states at the drive angles that `trace` was asked for, of those in contact only.
+        """States at the drive angles that `trace` was asked for, of those in contact only.
 
         Returns
         -------
@@ -150,7 +153,7 @@ def trace(
         By how much loads may miss [EI/L and EI/L²], which is what a likelihood needs and several times faster; by
         default events are computed to rounding.
     drive_angles : ndarray, shape (k,) or (lanes, k), optional
-        At which states are wanted.
+        At which states are wanted, contacts to 1e-8 of the path.
     """
     from tactile_bayes.mechanics.sweeps import Lanes  # numba takes a second to load
 
@@ -171,7 +174,7 @@ def trace(
         offset=np.zeros(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
-    answers = _swept(shapes, lanes, tolerance, angles, states=True)
+    answers = _swept(shapes, lanes, tolerance, angles, states=True, settled=_SETTLED)
     there = np.arange(answers.changes.shape[1]) < answers.phases[:, None]
     most = int(answers.phases.max(initial=0))
     return Paths(
@@ -200,9 +203,7 @@ def _each(values: Any, count: int) -> Floats:
     return np.array(np.broadcast_to(values, (count,)), dtype=float)
 
 
-def _swept(
-    shapes: Shapes, lanes: Lanes, tolerance: Floats | None, drive_angles: Floats, *, states: bool = False
-) -> Answers:
+def _swept(shapes: Shapes, lanes: Lanes, tolerance: Floats | None, drive_angles: Floats, **options: Any) -> Answers:
     """What is found at drive angles, shape (k,) or (lanes, k), as seen in forward sweeps, a stroke for each lane."""
     from tactile_bayes.mechanics.sweeps import Strokes, answered
 
@@ -211,7 +212,7 @@ def _swept(
     order = np.argsort(angles, axis=1, kind="stable")
     increasing = np.take_along_axis(angles, order, axis=1)
     strokes = Strokes(each * np.arange(count + 1), order.ravel(), increasing.ravel())
-    return answered(shapes, lanes, strokes, (count, each), tolerance=tolerance, states=states)
+    return answered(shapes, lanes, strokes, (count, each), tolerance=tolerance, **options)
 
 
 def _as_states(columns: Floats) -> States:

@@ -126,8 +126,11 @@ def _lying(x: float, y: float, alpha: float, delta: float, length: float, arc: A
 
 
 @compiled
-def _ending(x: float, y: float, alpha: float, delta: float, known: Tables, room: Room) -> State:
-    """Phase A: distance and direction of the tip give amplitude and direction at the contact."""
+def _ending(x: float, y: float, alpha: float, delta: float, precise: bool, known: Tables, room: Room) -> State:
+    """Phase A: distance and direction of the tip give amplitude and direction at the contact.
+
+    Derivatives are right to rounding, or, if they need not be precise, to 1e-8.
+    """
     larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
     slack2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
     if not slack2 >= 0.0:
@@ -140,10 +143,11 @@ def _ending(x: float, y: float, alpha: float, delta: float, known: Tables, room:
     angle, share = in_polar(table, lack, tilt, room)
     combine(table, 4, room)
     guess = math.sqrt(max(angle * combined(table, AMPLITUDE, room), 0.0))
-    chi, tilt1, arc = tip_arc(lack, tilt, guess, combined(table, TILT, room) * share)
+    chi, tilt1, arc, by_chi, by_psi1 = tip_arc(lack, tilt, guess, combined(table, TILT, room) * share)
     by_slope, by_distance = math.nan, -math.inf
     if chi > 0.0:
-        _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * tilt1) ** 2)
+        if precise:
+            _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * tilt1) ** 2)
         angle_x, angle_1, value = chord_rate(arc, by_chi), 1.0 + chord_rate(arc, by_psi1), slack(arc)
         value_x, value_1 = slack_rate(arc, value, by_chi), slack_rate(arc, value, by_psi1)
         det = value_x * angle_1 - value_1 * angle_x
@@ -155,9 +159,9 @@ def _ending(x: float, y: float, alpha: float, delta: float, known: Tables, room:
 
 @compiled
 def exact_state(x: float, y: float, alpha: float, delta: float, tip: bool, known: Tables, room: Room) -> State:
-    """A contact of known phase to rounding, in a room prepared for the friction angle."""
+    """A contact of known phase to rounding, its derivatives to 1e-8, in a room prepared for the friction angle."""
     if tip:
-        return _ending(x, y, alpha, delta, known, room)
+        return _ending(x, y, alpha, delta, False, known, room)
     length, arc, by_chi = _touch(x, y, alpha, delta, room)
     return _lying(x, y, alpha, delta, length, arc, by_chi)
 
@@ -194,7 +198,7 @@ def wrenches(columns: Floats, known: Tables, room: Room, phase: NDArray[np.int8]
                 _store(_lying(x, y, alpha, delta, length, arc, by_chi), out[i])
                 phase[i] = TANGENTIAL
         if phase[i] == TIP or (phase[i] == NONE and out[i, 8] > 1.0):
-            ending = _ending(x, y, alpha, delta, known, room)
+            ending = _ending(x, y, alpha, delta, True, known, room)
             _store(ending, out[i])
             phase[i] = NONE if math.isnan(ending.arclength) else TIP
 

@@ -198,6 +198,7 @@ def answered(
     *,
     tolerance: Floats | None = None,
     states: bool = False,
+    settled: float = _EXACT.settled,
     asks_clearance: bool = True,
 ) -> Answers:
     """Follow paths, and tell what samples feel.
@@ -213,11 +214,13 @@ def answered(
         By how much loads may miss, of moment and forces [EI/L and EI/L²]; by default events are exact, and loads right
         to some 1e-8 of the largest.
     states : bool
-        Whether exact states are wanted.
+        Whether states are wanted.
+    settled : float
+        Share of a stretch by which their contacts may be off; loads are as good as they can be.
     asks_clearance : bool
         Whether it is asked from which angle on the straight rod is clear.
     """
-    accuracy, order = (_EXACT, _EXACT_ORDER) if tolerance is None else (_FAST, _FAST_ORDER)
+    accuracy, order = (_EXACT._replace(settled=settled), _EXACT_ORDER) if tolerance is None else (_FAST, _FAST_ORDER)
     count, rows = shape
     sweeps = lanes.contour.size
     distance, first_angle, first_parameter, snap_angle, snap_parameter, curvature, clear = np.empty((7, sweeps))

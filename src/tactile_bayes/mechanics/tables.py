@@ -161,7 +161,7 @@ def _tips_on(angles: Floats, shares: Floats, largest: float) -> tuple[Floats, Fl
         chi, tilt1 = low, largest
         for j in range(shares.size - 1, -1, -1):
             lack, tilt = math.sin(angles[i]) * radius[i] * shares[j], math.cos(angles[i]) * radius[i] * shares[j]
-            chi, tilt1, arc = tip_arc(lack, tilt, chi, tilt1)
+            chi, tilt1, arc, _, _ = tip_arc(lack, tilt, chi, tilt1)
             out[FORCE, i, j], out[TURN, i, j] = arc.length * arc.length / angles[i], arc.turn / angles[i]
             out[AMPLITUDE, i, j], out[TILT, i, j] = chi * chi / angles[i], tilt1 / shares[j]
     return radius, out
