@@ -298,7 +298,9 @@ def _recorded(spec: Specification, paths: Paths, good: NDArray[np.bool_], units:
     if spec.has_thickness:
         found["largest_strain"] = np.nan_to_num(paths.largest_curvature * paths.seen.standoff / paths.seen.length)
     as_seen = np.where(paths.seen.mirrored[:, None], np.pi - angles, angles)
-    samples = sweep_samples(trace(paths.seen, friction_angle=paths.friction_angle, drive_angles=as_seen), units)
+    samples = sweep_samples(
+        trace(paths.seen, friction_angle=paths.friction_angle, drive_angles=as_seen, quickly=True), units
+    )
     found["drive_angle"] = angles
     found |= {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
     return {name: by_record(values) for name, values in found.items()}
