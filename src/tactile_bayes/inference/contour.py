@@ -93,7 +93,7 @@ def infer_contour(
         "moment_bias", "force_x_bias", "force_y_bias"), "lever" (where the cell takes its moment, from the pivot along
         its axes, or "lever_x", "lever_y"), "backlash" (what the encoder reads more in forward than in backward motion
         [rad]), "drift" (of all, or "moment_drift" and so on: by how much a zero moves evenly from the first sample to
-        the last; a bias is that in the middle), "gain" (likewise), "friction" (Coulomb's coefficient; several times
+        the last; a bias is that in the middle), "gain" (likewise), "friction" (Coulomb's coefficient; a fifth
         slower), "suspension_compliance" (turn of the pivot per holding moment). By default the first five, but no lever
         of a record without the moment, and no backlash of one in a single direction, which cannot tell them; an empty
         list takes all as stated. "base": how much the second and further pivots of a record are off, as "base_2_x",
