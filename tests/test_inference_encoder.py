@@ -45,7 +45,7 @@ def finely(likelihood, count=1501):
     fine.__dict__.update(likelihood.__dict__)
     fine.encoder = EncoderErrors(likelihood.load_cell)
     z = np.linspace(-6.0, 6.0, count)
-    fine.encoder.errors, fine._strokes = noise * z, None
+    fine.encoder.errors = noise * z
     fine.encoder.log_weights = -0.5 * z**2 - np.log(np.exp(-0.5 * z**2).sum())
     return fine
 

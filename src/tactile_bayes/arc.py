@@ -20,22 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "SHORT_COSINE",
-    "Arc",
-    "ArcSlopes",
-    "arc_and_slopes",
-    "arc_at",
-    "arc_to",
-    "chord_angle",
-    "slack",
-    "slack_slope",
-    "slopes_by_chi",
-]
+__all__ = ["ArcSlopes", "arc_and_slopes", "arc_to"]
 
 Floats = NDArray[np.float64]
 
-SHORT_COSINE = float(np.cos(1.0))
+_SHORT_COSINE = float(np.cos(1.0))
 """Cosine of the amplitude below which an arc is short: quadrature then, since the closed forms of C and S cancel."""
 
 
@@ -99,12 +88,6 @@ class _Amplitude(NamedTuple):
         return cls(sin, cos, half, m, 2.0 * np.sqrt(m * (1.0 - m)), 1.0 - m * sin * sin)
 
 
-def arc_at(sin: Floats, cos: Floats, m: Floats) -> Arc:
-    """Arc to the amplitude χ ∈ [0, π] of this sine and cosine, of parameter m ∈ (0, 1); one-dimensional arrays."""
-    twice = 2.0 + 2.0 * np.abs(cos)
-    return _arc(_Amplitude.made_of(sin, cos, np.where(cos > 0.0, sin / np.sqrt(twice), 0.5 * np.sqrt(twice)), m))[0]
-
-
 def arc_to(chi: Floats, m: Floats) -> tuple[Arc, ArcSlopes]:
     """Arc to amplitude χ ∈ [0, 3π/2) of parameter m ∈ (0, 1), one-dimensional arrays, and its derivatives by χ."""
     at = _Amplitude.of(chi, m)
@@ -121,11 +104,6 @@ def arc_and_slopes(chi: Floats, m: Floats) -> tuple[Arc, ArcSlopes, ArcSlopes]:
     return arc, _by_chi(at), ArcSlopes(F_1, C_1, S_1, turn)
 
 
-def slopes_by_chi(chi: Floats, m: Floats) -> ArcSlopes:
-    """Derivatives by χ: the integrands."""
-    return _by_chi(_Amplitude.of(chi, m))
-
-
 def _by_chi(at: _Amplitude) -> ArcSlopes:
     w = at.half * at.half
     cw, d = at.c * w, np.sqrt(at.d2)
@@ -136,7 +114,7 @@ def _by_chi(at: _Amplitude) -> ArcSlopes:
 def _arc(at: _Amplitude, by_psi1: bool = False) -> tuple[Arc, Floats]:
     """The arc, and the derivatives of F, C and S by ψ1 if they are wanted."""
     integrals = np.empty((6 if by_psi1 else 3, at.m.size))
-    short = at.cos > SHORT_COSINE
+    short = at.cos > _SHORT_COSINE
     for chosen, integrate in ((short, _by_quadrature), (~short, _in_closed_form)):
         where = np.flatnonzero(chosen)
         if where.size:
@@ -238,25 +216,3 @@ def _legendre(at: _Amplitude, d: Floats) -> tuple[Floats, Floats]:
     e2, e3, e4 = ab - 6.0 * gg, (3.0 * ab - 8.0 * gg) * g, (ab - gg) * gg
     D += scale / (3.0 * mean * np.sqrt(mean)) * (1.0 + e2 * (9.0 / 88.0 * e2 - 3.0 / 14.0) + e3 / 6.0 - 9.0 / 22.0 * e4)
     return F, D
-
-
-def chord_angle(arc: Arc, slopes: ArcSlopes) -> tuple[Floats, Floats]:
-    """Angle of the chord over the direction at the contact, and its derivative."""
-    along = arc.length - arc.shortfall
-    angle = np.arctan2(arc.offset, along)
-    across = along * slopes.offset - arc.offset * (slopes.length - slopes.shortfall)
-    with np.errstate(invalid="ignore"):
-        return angle, across / (along**2 + arc.offset**2)
-
-
-def slack(arc: Arc) -> Floats:
-    """√(1 − r²) for a rod of length one, r its chord; without cancellation."""
-    F, C, S = arc.length, arc.shortfall, arc.offset
-    with np.errstate(invalid="ignore"):
-        return np.sqrt(np.maximum(2.0 * F * C - C * C - S * S, 0.0)) / F
-
-
-def slack_slope(arc: Arc, slack: Floats, slopes: ArcSlopes) -> Floats:
-    F, C, S = arc.length, arc.shortfall, arc.offset
-    half = (F - C) * slopes.shortfall + C * slopes.length - S * slopes.offset
-    return (half / (slack * F) - slack * slopes.length) / F

@@ -24,7 +24,7 @@ from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.sweeps import Lanes, Shapes, Strokes
+    from tactile_bayes.mechanics.sweeps import Answers, Lanes, Shapes, Strokes
 
 __all__ = ["RecordLikelihood", "Rig", "bases_of", "without_errors"]
 
@@ -128,7 +128,7 @@ class RecordLikelihood:
         self._pivots = np.array([stroke.pivot for stroke in self.strokes])
         self._signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
         longest = max(stroke.samples.size for stroke in self.strokes)
-        self._strokes: tuple[bytes, Strokes] | None = None
+        self._strokes: dict[bytes, Strokes] = {}
         self._angles = np.full((len(self.strokes), longest), np.nan)
         for row, stroke in zip(self._angles, self.strokes, strict=True):
             seen = angle[stroke.samples]
@@ -179,8 +179,7 @@ class RecordLikelihood:
     def snap_offs(self, contours: Contour, rig: Rig | None = None) -> Floats:
         """Drive angles at which contact ends, as read and as seen in forward sweeps, shape (n, strokes)."""
         rig = self._rig_of(rig, contours.shape[0])
-        ends = self.paths(contours, rig, exact=False).snap_angle.reshape(len(self.strokes), -1).T
-        return np.asarray(ends + self._signs * self._misread(rig))
+        return self._events(self._answers(contours, rig), rig)[..., 1]
 
     def misread(self, rig: Rig) -> Floats:
         """What the encoder reads too much, beyond what the data sheet says [rad], shape (n or 1, samples)."""
@@ -227,11 +226,7 @@ class RecordLikelihood:
 
     def usable(self, contours: Contour, rig: Rig | None = None) -> NDArray[np.bool_]:
         """Contours that every stroke can reach, and that the rod is past after snap-off, shape (n,)."""
-        paths = self.paths(contours, rig, exact=False)
-        usable = paths.reach == Reach.TOUCHES
-        if not self.is_always_clear:
-            usable &= paths.is_clear()
-        return np.asarray(usable.reshape(len(self.strokes), -1).all(axis=0))
+        return self._usable(self._answers(contours, self._rig_of(rig, contours.shape[0])))
 
     def predict(self, contours: Contour, rig: Rig | None = None) -> tuple[Floats, NDArray[np.bool_]]:
         """Noise-free loads, shape (n, samples, 3), and which contours are usable, shape (n,).
@@ -254,30 +249,40 @@ class RecordLikelihood:
         return loads[:, 0], reached, events
 
     def _predict(self, contours: Contour, rig: Rig | None, errors: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
-        from tactile_bayes.mechanics.sweeps import answered  # numba takes a second to load
-
-        (count,) = contours.shape
-        rig = self._rig_of(rig, count)
-        found = answered(
-            self._shapes(contours, rig),
-            self._lanes(rig),
-            self._strokes_with(errors),
-            (count, errors.size * len(self.measured)),
-            tolerance=None if self.exact else self._tolerance,
-            asks_clearance=not self.is_always_clear,
-        )
-        usable = found.reach == Reach.TOUCHES
-        if not self.is_always_clear:
-            usable &= found.snap_angle > found.clear_angle
-        events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(-1, count, 2).swapaxes(0, 1)
-        events = events + (self._signs * self._misread(rig))[..., None]
-        predicted = found.loads.reshape(count, errors.size, *self.measured.shape)
+        rig = self._rig_of(rig, contours.shape[0])
+        found = self._answers(contours, rig, errors)
+        predicted = found.loads.reshape(-1, errors.size, *self.measured.shape)
         if self._turn is not None:
             turn = self._turn - self.misread(rig)[:, None] - errors[:, None]
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
         if np.any(rig.rigidity_scale != 1.0):
             predicted *= rig.rigidity_scale[:, None, None, None]
-        return predicted, usable.reshape(-1, count).all(axis=0), events
+        return predicted, self._usable(found), self._events(found, rig)
+
+    def _answers(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Answers:
+        """Of the forward model, lane k·n + i for contour i in stroke k; of no samples if no errors are given."""
+        from tactile_bayes.mechanics.sweeps import answered  # numba takes a second to load
+
+        errors = np.empty(0) if errors is None else errors
+        return answered(
+            self._shapes(contours, rig),
+            self._lanes(rig),
+            self._strokes_with(errors),
+            (contours.shape[0], errors.size * len(self.measured)),
+            tolerance=None if self.exact else self._tolerance,
+            asks_clearance=not self.is_always_clear,
+        )
+
+    def _usable(self, found: Answers) -> NDArray[np.bool_]:
+        usable = found.reach == Reach.TOUCHES
+        if not self.is_always_clear:
+            usable &= found.snap_angle > found.clear_angle
+        return np.asarray(usable.reshape(len(self.strokes), -1).all(axis=0))
+
+    def _events(self, found: Answers, rig: Rig) -> Floats:
+        """First contact and snap-off, as read and as seen in forward sweeps, shape (n, strokes, 2)."""
+        events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(len(self.strokes), -1, 2)
+        return np.asarray(events.swapaxes(0, 1) + (self._signs * self._misread(rig))[..., None])
 
     def _shapes(self, contours: Contour, rig: Rig) -> Shapes:
         if contours.halves is not None:
@@ -316,7 +321,7 @@ class RecordLikelihood:
         from tactile_bayes.mechanics.sweeps import Strokes
 
         key = errors.tobytes()
-        if self._strokes is None or self._strokes[0] != key:
+        if key not in self._strokes:
             samples, angles = [], []
             for row, stroke in zip(self._angles, self.strokes, strict=True):
                 shifts = errors if stroke.backward else -errors
@@ -326,9 +331,8 @@ class RecordLikelihood:
                 rows = stroke.samples + len(self.measured) * np.arange(errors.size)[:, None]
                 samples.append(rows.ravel()[order])
             first = np.cumsum([0, *(part.size for part in samples)])
-            strokes = Strokes(first, np.concatenate(samples), np.concatenate(angles))
-            self._strokes = key, strokes
-        return self._strokes[1]
+            self._strokes[key] = Strokes(first, np.concatenate(samples), np.concatenate(angles))
+        return self._strokes[key]
 
     def log_likelihood(
         self, contours: Contour, noise_scale: Any = 1.0, rig: Rig | None = None, *, pointwise: bool = False

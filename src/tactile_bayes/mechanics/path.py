@@ -35,7 +35,7 @@ from tactile_bayes.mechanics.series import (
     weighted,
 )
 from tactile_bayes.mechanics.states import State, exact_state, tabled_state
-from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
+from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, along_rate, cut
 from tactile_bayes.mechanics.tables import MOST_FRICTION, Room, Tables, prepare
 
 __all__ = ["MOST_CHANGES", "STATE_COLUMNS", "Ends", "Found", "Rig", "Samples", "Work", "follow", "work"]
@@ -70,7 +70,6 @@ _NO_MOMENT = 1e-12
 _STRAINED = 65
 """Ways along a stretch at which its largest curvature is sought."""
 
-_NONE, _TIP, _TANGENTIAL = 0, TIP, TANGENTIAL
 _TOUCHES, _RUNS_OUT = int(Reach.TOUCHES), int(Reach.RUNS_OUT)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 
@@ -181,7 +180,7 @@ def _sample(outline: Outline, stretch: Stretch, rig: Rig, exact: bool, known: Ta
     for k in range(on.nodes.size):
         at = place(outline, along(stretch, on.nodes[k]))
         if exact:
-            state = exact_state(at.x, at.y, math.atan2(at.sin, at.cos), delta, stretch.tip, known, room.states)
+            state = exact_state(at, delta, stretch.tip, known, room.states)
             values[0, k], values[1, k] = state.drive_angle, state.holding_moment
             values[2, k], values[3, k] = state.force_x, state.force_y
         else:
@@ -224,9 +223,8 @@ def _first_fall(accuracy: Accuracy, is_first: bool, on: Nodes, room: Work) -> fl
 def _angle_rate(outline: Outline, stretch: Stretch, way: float, rig: Rig, known: Tables, room: Work) -> float:
     """Derivative of the exact drive angle by the way, of a stiff suspension."""
     at = place(outline, along(stretch, way))
-    delta = rig.friction_angle
-    state = exact_state(at.x, at.y, math.atan2(at.sin, at.cos), delta, stretch.tip, known, room.states)
-    return _rate(at, state) * (stretch.end - stretch.begin) * (2.0 * way if stretch.rooted else 1.0)
+    state = exact_state(at, rig.friction_angle, stretch.tip, known, room.states)
+    return _rate(at, state) * along_rate(stretch, way)
 
 
 @inlined
@@ -276,13 +274,12 @@ def _over_drive_angle(
 
 
 @inlined
-def _stretched(angle: float, begin: float, end: float, steadiness: float) -> float:
-    """Drive angle on a stretch from 0 to 1, stretched toward its end so that states are smooth functions of it."""
+def _ahead(angle: float, begin: float, end: float, steadiness: float) -> float:
+    """What is left of a stretch from 1 to 0, stretched toward its end so that states are smooth functions of it."""
     left = min(max((end - angle) / (end - begin), 0.0), 1.0)
-    if not left > 0.0:
-        return 1.0
     root = math.sqrt(steadiness * steadiness + 4.0 * (1.0 - steadiness) * left)
-    return 1.0 - 2.0 * left / (steadiness + root)
+    ahead = 2.0 * left / (steadiness + root)
+    return ahead if left > 0.0 else 0.0
 
 
 @compiled
@@ -298,10 +295,7 @@ def _on_stretch(
     wanted, twice, count = room.wanted, room.twice, last - first
     for j in range(count):
         wanted[j] = samples.angles[first + j] - offset
-        left = min(max((end - wanted[j]) / (end - begin), 0.0), 1.0)
-        root = math.sqrt(steadiness * steadiness + 4.0 * (1.0 - steadiness) * left)
-        ahead = 2.0 * left / (steadiness + root)
-        twice[j] = 2.0 - 4.0 * (ahead if left > 0.0 else 0.0)
+        twice[j] = 2.0 - 4.0 * _ahead(wanted[j], begin, end, steadiness)
     return first, count
 
 
@@ -397,11 +391,10 @@ def _write_states(
         for _ in range(100):
             p = along(stretch, way)
             at = place(outline, p)
-            alpha = math.atan2(at.sin, at.cos)
-            state = exact_state(at.x, at.y, alpha, delta, stretch.tip, known, room.states)
+            state = exact_state(at, delta, stretch.tip, known, room.states)
             driven = state.drive_angle + rig.compliance * state.holding_moment
             # But for rounding, which may undo the very first contact.
-            turned = _stretched(driven, begin, end, steadiness) if math.isfinite(driven) else 0.0
+            turned = 1.0 - _ahead(driven, begin, end, steadiness) if math.isfinite(driven) else 0.0
             missing = target - turned
             if abs(missing) <= accuracy.settled or not high > low:
                 break
@@ -409,7 +402,7 @@ def _write_states(
                 low = way
             else:
                 high = way
-            rate = _rate(at, state) * (stretch.end - stretch.begin) * (2.0 * way if stretch.rooted else 1.0)
+            rate = _rate(at, state) * along_rate(stretch, way)
             newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (end - begin) / rate
             # Much nearer to the end than the goal is, the rate may be zero or rounding: the interpolant's serves.
             sound = stiff and newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target)
@@ -423,10 +416,10 @@ def _write_states(
         if not math.isfinite(driven):
             continue
         # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
-        reached = _stretched(driven, begin, end, steadiness)
+        reached = 1.0 - _ahead(driven, begin, end, steadiness)
         states = found.states[row]
-        states[0] = _TIP if stretch.tip else _TANGENTIAL
-        states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
+        states[0] = TIP if stretch.tip else TANGENTIAL
+        states[1], states[2], states[3], states[4] = p, at.x, at.y, math.atan2(at.sin, at.cos)
         for c in range(8):
             states[5 + c] = state[c]
         for c in range(3):
@@ -442,12 +435,12 @@ def _largest_curvature(stop: float, rig: Rig, room: Work) -> float:
         z = stop * k / (_STRAINED - 1.0)
         angle, moment = value_and_slope(room.series[0], room.series[1], z)
         force_x, force_y = value_and_slope(room.series[2], room.series[3], z)
-        largest = max(largest, curvature(angle - rig.compliance * moment, moment, force_x, force_y))
+        largest = max(largest, _curvature(angle - rig.compliance * moment, moment, force_x, force_y))
     return largest
 
 
 @inlined
-def curvature(drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
+def _curvature(drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
     """Largest curvature of the rod between pivot and contact, of a forward contact [1/L]."""
     cos, sin = math.cos(drive_angle), math.sin(drive_angle)
     lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
@@ -492,7 +485,8 @@ def follow(
         row[3] = k == 0 and limit.tip_first and row[2] > 0.0
         row[4], row[5] = 0.0, 0.0
     whole = limit.begin - limit.end
-    first, at_begin = bearing(outline, limit.begin), bearing(outline, limit.begin)
+    first = bearing(outline, limit.begin)
+    at_begin = first
     snap_parameter, kind, changes, largest = limit.begin, _THRUST, 0, math.nan
     wants_states, is_first, stretches = found.changes.shape[0] > 0, True, count
     ended = False
@@ -530,7 +524,7 @@ def follow(
         at_end, moment_left = value(room.series[0], stop), 1.0
         if accuracy.exact:
             at = place(outline, snap_parameter)
-            state = exact_state(at.x, at.y, math.atan2(at.sin, at.cos), delta, stretch.tip, known, room.states)
+            state = exact_state(at, delta, stretch.tip, known, room.states)
             driven, moment_left = state.drive_angle + rig.compliance * state.holding_moment, state.holding_moment
             if math.isfinite(driven):
                 at_end = driven

@@ -25,8 +25,8 @@ __all__ = ["Paths", "States", "trace"]
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_ROUNDING, _QUICKLY = 1e-14, 1e-8
-"""Share of a stretch by which contacts may be off."""
+_QUICKLY = 1e-8
+"""Share of a stretch by which contacts may be off where that is enough."""
 
 
 class States(NamedTuple):
@@ -50,7 +50,6 @@ class Paths:
 
     seen: SeenContour
     friction_angle: Floats
-    suspension_compliance: Floats
     reach: NDArray[np.int8]
     distance: Floats
     """Least distance of the contour from the pivot, in rod lengths."""
@@ -74,10 +73,6 @@ class Paths:
     lanes: Lanes
     sampled: Floats
     """What is found at the drive angles that `trace` was asked for."""
-
-    def driven_angle(self, lane: Index, wrench: Wrench) -> Floats:
-        """What the drive stands at in a state: the rod's slope at the pivot and the turn of the suspension."""
-        return np.asarray(wrench.drive_angle + self.suspension_compliance[lane] * wrench.holding_moment)
 
     def is_clear(self) -> NDArray[np.bool_]:
         """Whether the straight rod is free of the object after snap-off, as far as that is known; shape (lanes,)."""
@@ -178,13 +173,13 @@ def trace(
         offset=np.zeros(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
-    answers = _swept(shapes, lanes, tolerance, angles, states=True, settled=_QUICKLY if quickly else _ROUNDING)
+    settled = {"settled": _QUICKLY} if quickly else {}
+    answers = _swept(shapes, lanes, tolerance, angles, states=True, **settled)
     there = np.arange(answers.changes.shape[1]) < answers.phases[:, None]
     most = int(answers.phases.max(initial=0))
     return Paths(
         seen=seen,
         friction_angle=friction_angle,
-        suspension_compliance=compliance,
         reach=answers.reach,
         distance=answers.distance,
         first_angle=answers.first_angle,

@@ -158,18 +158,19 @@ def _ending(x: float, y: float, alpha: float, delta: float, precise: bool, known
 
 
 @compiled
-def exact_state(x: float, y: float, alpha: float, delta: float, tip: bool, known: Tables, room: Room) -> State:
+def exact_state(at: Place, delta: float, tip: bool, known: Tables, room: Room) -> State:
     """A contact of known phase to rounding, its derivatives to 1e-8, in a room prepared for the friction angle."""
+    alpha = math.atan2(at.sin, at.cos)
     if tip:
-        return _ending(x, y, alpha, delta, False, known, room)
-    length, arc, by_chi = _touch(x, y, alpha, delta, room)
-    return _lying(x, y, alpha, delta, length, arc, by_chi)
+        return _ending(at.x, at.y, alpha, delta, False, known, room)
+    length, arc, by_chi = _touch(at.x, at.y, alpha, delta, room)
+    return _lying(at.x, at.y, alpha, delta, length, arc, by_chi)
 
 
 @compiled
-def exact_excess(x: float, y: float, alpha: float, delta: float, room: Room) -> float:
+def exact_excess(at: Place, delta: float, room: Room) -> float:
     """Arc length that tangential contact takes, less that of the rod, to rounding."""
-    return _touch(x, y, alpha, delta, room)[0] - 1.0
+    return _touch(at.x, at.y, math.atan2(at.sin, at.cos), delta, room)[0] - 1.0
 
 
 @kept
@@ -285,9 +286,9 @@ def tabled_state(at: Place, delta: float, tip: bool, large: bool, known: Tables,
 
 
 @compiled
-def tabled_excess(at: Place, delta: float, large: bool, room: Room) -> float:
+def tabled_excess(at: Place, delta: float, room: Room) -> float:
     """Arc length that tangential contact takes, less that of the rod, from a table."""
     along, across = frame(at)
-    size = room.lying.shape[1] if large or delta > 0.0 else SMALL
+    size = room.lying.shape[1] if delta > 0.0 else SMALL
     level = min(math.atan2(max(across, 0.0), along) / (0.5 * math.pi + delta), 1.0)
     return math.sqrt(at.x * at.x + at.y * at.y) * series(room.lying, STRETCH, size, level) - 1.0

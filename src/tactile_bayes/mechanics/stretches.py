@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from tactile_bayes.mechanics.series import Nodes, change_of, crossing, tail, val
 from tactile_bayes.mechanics.states import exact_excess, tabled_excess
 from tactile_bayes.mechanics.tables import Room
 
-__all__ = ["BRIEF", "Accuracy", "Stretch", "along", "cut"]
+__all__ = ["BRIEF", "Accuracy", "Stretch", "along", "along_rate", "cut"]
 
 Floats = NDArray[np.float64]
 
@@ -70,10 +69,16 @@ def along(stretch: Stretch, way: float) -> float:
 
 
 @inlined
+def along_rate(stretch: Stretch, way: float) -> float:
+    """Its derivative."""
+    return (stretch.end - stretch.begin) * (2.0 * way if stretch.rooted else 1.0)
+
+
+@inlined
 def _excess(at: Place, delta: float, exact: bool, room: Room) -> float:
     if exact:
-        return exact_excess(at.x, at.y, math.atan2(at.sin, at.cos), delta, room)
-    return tabled_excess(at, delta, False, room)
+        return exact_excess(at, delta, room)
+    return tabled_excess(at, delta, room)
 
 
 @compiled
