@@ -34,8 +34,8 @@ _UNFELT = 2e-3
 """Error of loads over their noise that 360 samples together do not show: it moves their log-likelihood by less than
 0.05 in 999 of 1000 records."""
 
-_LEAST = 1e-9
-"""Error of loads that is not asked for to be less, over the largest load: large tables are no better."""
+_LEAST = 1e-8
+"""Error of loads that is not asked for to be less, over the largest load: tables are no better."""
 
 
 @dataclass(frozen=True)

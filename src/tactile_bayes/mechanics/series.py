@@ -18,7 +18,6 @@ __all__ = [
     "crossing",
     "nodes_of",
     "tail",
-    "three_at_all",
     "value",
     "value_and_slope",
     "weighted",
@@ -65,12 +64,12 @@ def weighted(rows: Floats, weights: Floats, out: Floats) -> None:
 
 @compiled
 def value(coefficients: Floats, z: float) -> float:
-    """By Clenshaw's recurrence."""
+    """By Clenshaw's recurrence, so bracketed that one step waits for the last as short as may be."""
     twice = 4.0 * z - 2.0
     now, before = 0.0, 0.0
     for k in range(coefficients.size - 1, 0, -1):
-        now, before = coefficients[k] + twice * now - before, now
-    return coefficients[0] + 0.5 * twice * now - before
+        now, before = (coefficients[k] - before) + twice * now, now
+    return (coefficients[0] - before) + 0.5 * twice * now
 
 
 @inlined
@@ -79,44 +78,29 @@ def value_and_slope(one: Floats, other: Floats, z: float) -> tuple[float, float]
     twice = 4.0 * z - 2.0
     a, a_before, b, b_before = 0.0, 0.0, 0.0, 0.0
     for k in range(one.size - 1, 0, -1):
-        a, a_before = one[k] + twice * a - a_before, a
-        b, b_before = other[k] + twice * b - b_before, b
-    return one[0] + 0.5 * twice * a - a_before, other[0] + 0.5 * twice * b - b_before
+        a, a_before = (one[k] - a_before) + twice * a, a
+        b, b_before = (other[k] - b_before) + twice * b, b
+    return (one[0] - a_before) + 0.5 * twice * a, (other[0] - b_before) + 0.5 * twice * b
 
 
 @compiled
-def at_all(coefficients: Floats, twice: Floats, count: int, now: Floats, before: Floats) -> None:
-    """A series at many z, given as 4 z − 2, side by side in the inner loop; the values are in `now`."""
-    for j in range(count):
-        now[j], before[j] = 0.0, 0.0
-    for k in range(coefficients.size - 1, 0, -1):
-        for j in range(count):
-            new = coefficients[k] + twice[j] * now[j] - before[j]
-            before[j] = now[j]
-            now[j] = new
-    for j in range(count):
-        now[j] = coefficients[0] + 0.5 * twice[j] * now[j] - before[j]
-
-
-@compiled
-def three_at_all(rows: Floats, twice: Floats, count: int, now: Floats, before: Floats, out: Floats) -> None:
-    """Three series, those in the rows after the first, at many z, given as 4 z − 2: Chebyshev's polynomials go by in
-    `now` and `before`, side by side for all z, and the sums are in `out`, shape (3, at least count)."""
-    order = rows.shape[1]
+def at_all(rows: Floats, twice: Floats, count: int, now: Floats, before: Floats, out: Floats) -> None:
+    """Series, one in each row, at many z, given as 4 z − 2: Chebyshev's polynomials go by in `now` and `before`, side
+    by side for all z, and the sums are in `out`, shape (at least rows, at least count)."""
     for j in range(count):
         before[j], now[j] = 1.0, 0.5 * twice[j]
-        out[0, j] = rows[1, 0] + rows[1, 1] * now[j]
-        out[1, j] = rows[2, 0] + rows[2, 1] * now[j]
-        out[2, j] = rows[3, 0] + rows[3, 1] * now[j]
-    for k in range(2, order):
-        a, b, c = rows[1, k], rows[2, k], rows[3, k]
+    for c in range(rows.shape[0]):
+        for j in range(count):
+            out[c, j] = rows[c, 0] + rows[c, 1] * now[j]
+    for k in range(2, rows.shape[1]):
         for j in range(count):
             new = twice[j] * now[j] - before[j]
             before[j] = now[j]
             now[j] = new
-            out[0, j] += a * new
-            out[1, j] += b * new
-            out[2, j] += c * new
+        for c in range(rows.shape[0]):
+            coefficient = rows[c, k]
+            for j in range(count):
+                out[c, j] += coefficient * now[j]
 
 
 @inlined

@@ -31,14 +31,10 @@ from tactile_bayes.mechanics.tables import (
     AMPLITUDE,
     FORCE,
     MOST_FRICTION,
-    SMALL,
     STRETCH,
-    TILT,
     TURN,
     Room,
     Tables,
-    combine,
-    combined,
     in_polar,
     prepare,
     series,
@@ -60,9 +56,6 @@ Floats = NDArray[np.float64]
 
 _BEYOND = 1e-12
 """By how much rounding may turn a chord beyond where the line of force passes through the pivot [rad]."""
-
-_WIDE = 1.25
-"""Angle of a tip contact in its table from which on the small one misses by ten times as much [rad]."""
 
 _NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
 
@@ -104,7 +97,7 @@ def _touch(x: float, y: float, alpha: float, delta: float, room: Room) -> tuple[
     angle = min(angle, largest)
     m = 0.5 * (1.0 + math.sin(delta))
     if delta <= MOST_FRICTION:
-        guess = math.sqrt(max(angle * series(room.lying, AMPLITUDE, room.lying.shape[1], angle / largest), 0.0))
+        guess = math.sqrt(max(angle * series(room, AMPLITUDE, angle / largest), 0.0))
     else:
         guess = min(math.sqrt(3.0 * angle / math.sqrt(m * (1.0 - m))), math.pi)
     chi, arc, by_chi = tangential_arc(angle, m, guess)
@@ -139,11 +132,8 @@ def _ending(x: float, y: float, alpha: float, delta: float, precise: bool, known
     sin, cos = math.sin(beta), math.cos(beta)
     u, v = x * cos + y * sin, y * cos - x * sin
     lack, tilt = math.sqrt(slack2), max(math.atan2(u, v), 0.0)
-    table = known.tip[1] if delta == 0.0 else known.tip[2]
-    angle, share = in_polar(table, lack, tilt, room)
-    combine(table, 4, room)
-    guess = math.sqrt(max(angle * combined(table, AMPLITUDE, room), 0.0))
-    chi, tilt1, arc, by_chi, by_psi1 = tip_arc(lack, tilt, guess, combined(table, TILT, room) * share)
+    angle, share, by_angle, by_share = in_polar(known, lack, tilt, AMPLITUDE, room)
+    chi, tilt1, arc, by_chi, by_psi1 = tip_arc(lack, tilt, math.sqrt(max(angle * by_angle, 0.0)), share * by_share)
     by_slope, by_distance = math.nan, -math.inf
     if chi > 0.0:
         if precise:
@@ -256,7 +246,7 @@ def contacts(columns: Floats, out: Floats) -> None:
 
 
 @compiled
-def tabled_state(at: Place, delta: float, tip: bool, large: bool, known: Tables, room: Room) -> QuickState:
+def tabled_state(at: Place, delta: float, tip: bool, known: Tables, room: Room) -> QuickState:
     """A contact of known phase from tables, in a room prepared for the friction angle, at most `MOST_FRICTION`."""
     along, across = frame(at)
     sin, cos = at.sin, at.cos
@@ -270,18 +260,14 @@ def tabled_state(at: Place, delta: float, tip: bool, large: bool, known: Tables,
         return QuickState(math.nan, math.nan, math.nan, math.nan)
     if tip:
         lack, tilt = math.sqrt(1.0 - distance2), max(math.atan2(u, v), 0.0)
-        which = 2 if delta > 0.0 else int(large or math.atan2(lack, tilt) > _WIDE)
-        table = known.tip[which]
-        angle, share = in_polar(table, lack, tilt, room)
-        combine(table, 3, room)
-        force, turn = combined(table, FORCE, room) * angle, combined(table, TURN, room) * angle
-        drive_angle = slope + delta + 0.5 * math.pi - combined(table, TILT, room) * share + turn
+        angle, _, force, turn = in_polar(known, lack, tilt, FORCE, room)
+        force *= angle
+        drive_angle = slope + delta + 0.5 * math.pi + turn
     else:
-        size = room.lying.shape[1] if large or delta > 0.0 else SMALL
         angle = math.atan2(across, along)
         level = min(angle / (0.5 * math.pi + delta), 1.0)
-        force = series(room.lying, FORCE, size, level) * angle / distance2
-        drive_angle = slope + series(room.lying, TURN, size, level) * angle
+        force = series(room, FORCE, level) * angle / distance2
+        drive_angle = slope + series(room, TURN, level) * angle
     return QuickState(drive_angle, force * u, -force * sin, force * cos)
 
 
@@ -289,6 +275,5 @@ def tabled_state(at: Place, delta: float, tip: bool, large: bool, known: Tables,
 def tabled_excess(at: Place, delta: float, room: Room) -> float:
     """Arc length that tangential contact takes, less that of the rod, from a table."""
     along, across = frame(at)
-    size = room.lying.shape[1] if delta > 0.0 else SMALL
     level = min(math.atan2(max(across, 0.0), along) / (0.5 * math.pi + delta), 1.0)
-    return math.sqrt(at.x * at.x + at.y * at.y) * series(room.lying, STRETCH, size, level) - 1.0
+    return math.sqrt(at.x * at.x + at.y * at.y) * series(room, STRETCH, level) - 1.0

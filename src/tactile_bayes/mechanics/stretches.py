@@ -58,8 +58,8 @@ class Stretch(NamedTuple):
     rooted: bool
     """Whether contact begins here with the tip: loads then grow like the square root of the arc since."""
     halvings: int
-    large: bool
-    """Whether small tables will not do."""
+    brief: bool
+    """Whether half of the nodes may do."""
 
 
 @inlined
@@ -88,7 +88,7 @@ def cut(
     knots: Floats,
     delta: float,
     accuracy: Accuracy,
-    tabled: bool,
+    exact: bool,
     on: Nodes,
     room: Room,
     series: Floats,
@@ -100,8 +100,8 @@ def cut(
     ----------
     knots : ndarray, shape (k,)
         Where the contour may not be smooth, decreasing.
-    tabled : bool
-        Whether tables know the friction angle.
+    exact : bool
+        Whether tables will not do.
     series : ndarray, shape (3, order)
         Room.
     out : ndarray, shape (most, 3)
@@ -118,7 +118,7 @@ def cut(
         end = limit.end if k == knots.size else min(max(knots[k], limit.end), limit.begin)
         if not begin - end > _NOTHING * whole:
             continue
-        count += _cut_piece(outline, begin, end, whole, delta, accuracy, tabled, on, room, series, out[count:])
+        count += _cut_piece(outline, begin, end, whole, delta, accuracy, exact, on, room, series, out[count:])
         begin = end
     return count
 
@@ -131,14 +131,13 @@ def _cut_piece(
     whole: float,
     delta: float,
     accuracy: Accuracy,
-    tabled: bool,
+    exact: bool,
     on: Nodes,
     room: Room,
     series: Floats,
     out: Floats,
 ) -> int:
     """Cut a smooth piece of a contour, in as large parts as polynomials follow the arc length of tangential contact."""
-    exact = accuracy.exact or not tabled
     values, excess, slope = series[0], series[1], series[2]
     order, least = on.nodes.size, (first - last) * 0.5**_HALVINGS
     begin, end, count = first, last, 0

@@ -10,22 +10,14 @@ from numpy.typing import NDArray
 
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.mechanics.curves import Rig, Scene
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.outline import Outline, mirrored
-from tactile_bayes.mechanics.path import (
-    MOST_CHANGES,
-    STATE_COLUMNS,
-    Found,
-    Rig,
-    Samples,
-    Work,
-    follow,
-    work,
-)
+from tactile_bayes.mechanics.path import MOST_CHANGES, Work, follow, work
 from tactile_bayes.mechanics.reach import clear_angle
-from tactile_bayes.mechanics.series import Nodes, nodes_of
+from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
 from tactile_bayes.mechanics.stretches import Accuracy
-from tactile_bayes.mechanics.tables import Tables, room, tables
+from tactile_bayes.mechanics.tables import Room, Tables, room, tables
 
 __all__ = ["Answers", "Lanes", "Shapes", "Strokes", "answered"]
 
@@ -154,7 +146,7 @@ def _sweep(
     tolerance: Floats,
     asks_clearance: bool,
     known: Tables,
-    on: Nodes,
+    states: Room,
     room: Work,
     table: Floats,
     answers: Answers,
@@ -165,7 +157,8 @@ def _sweep(
     ----------
     tolerance : ndarray, shape (3,)
         By how much loads may miss, of moment and forces [EI/L and EI/L²].
-    room : Work
+    states, room
+        Room for one state, and for one path.
     table : ndarray, shape (rows, columns)
         Room for the table of one contour.
     """
@@ -180,7 +173,7 @@ def _sweep(
         samples = Samples(strokes.angles[first:last], strokes.rows[first:last])
         rig = Rig(lanes.friction_angle[i], lanes.compliance[i], sign * lanes.offset[i], sign)
         found = Found(answers.loads[c], answers.states[c], answers.changes[i])
-        ends = follow(outline, knots, rig, samples, accuracy, tolerance, known, on, room, found)
+        ends = follow(Scene(outline, rig, known, states), knots, samples, accuracy, tolerance, room, found)
         answers.reach[i], answers.distance[i] = ends.reach, ends.distance
         answers.first_angle[i], answers.first_parameter[i] = ends.first_angle, ends.first_parameter
         answers.snap_angle[i], answers.snap_parameter[i] = ends.snap_angle, ends.snap_parameter
@@ -248,8 +241,8 @@ def answered(
         _NEVER_MISSED if tolerance is None else tolerance,
         asks_clearance,
         tables(),
-        nodes_of(order),
-        work(longest, order, shapes.knots.shape[1], room()),
+        room(),
+        work(longest, order, shapes.knots.shape[1]),
         np.empty(shapes.tables.shape[1:]),
         answers,
     )

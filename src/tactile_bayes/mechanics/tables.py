@@ -2,8 +2,9 @@
 
 In tangential contact they are series in the angle of the chord over the contour's tangent, as a share of the largest
 one, and in the friction angle; in tip contact in polar coordinates of (tilt, lack): the angle, and the radius as a
-share of the largest one. What makes a quantity vanish at first contact is divided out. Tables are made once a process,
-from exact arcs, in a few milliseconds.
+share of the largest one. What makes a quantity vanish at first contact is divided out. Toward where the maps fold they
+are divided into cells, so that few terms serve everywhere: loads and drive angles are right to 5e-8 (`tests/`). Tables
+are made once a process, from exact arcs, in a few milliseconds.
 """
 
 from __future__ import annotations
@@ -24,15 +25,11 @@ __all__ = [
     "AMPLITUDE",
     "FORCE",
     "MOST_FRICTION",
-    "SMALL",
     "STRETCH",
     "TILT",
     "TURN",
     "Room",
     "Tables",
-    "TipTable",
-    "combine",
-    "combined",
     "in_polar",
     "prepare",
     "room",
@@ -45,21 +42,24 @@ Floats = NDArray[np.float64]
 MOST_FRICTION = 0.4
 """Friction angle up to which there are tables [rad]: the nearer to where the map folds, the longer their series."""
 
-FORCE, TURN, TILT, STRETCH, AMPLITUDE = 0, 1, 2, 2, 3
-"""What tables hold: force times the square of the chord (of the rod, for a tip) and turn, both over the angle; ε1 over
-the share in tip contact, arc length over chord in tangential contact; χ² over the angle."""
+FORCE, TURN, AMPLITUDE, STRETCH, TILT = 0, 1, 2, 3, 3
+"""What tables hold. Tangential contact: force times the square of the chord, turn, and χ², all over the angle; arc
+length over chord. Tip contact: force over the angle, turn less ε1, χ² over the angle, ε1 over the share."""
 
-SMALL = 16
-"""Number of coefficients in each direction of small tables, without friction: to 2e-7, and 3e-6 in a corner."""
+_TERMS = 10
+"""Of each series in a cell of tip contact, over angle and share."""
 
-_LARGE = 30, 26
-"""Of large ones, over the angle and over the share: to 5e-10."""
+_ANGLES = np.array([0.0, 0.1, 0.25, 0.45, 0.6, 0.75, 0.9, 1.0])
+"""Where cells of tip contact begin and end, shares of the right angle."""
 
-_RUBBING = 24, 36
-"""With friction: to 6e-7, mostly to 1e-7."""
+_SHARES = np.array([0.0, 0.5, 0.75, 0.9, 0.97, 1.0])
+"""And shares of the largest radius."""
 
-_LYING = 30, 16
-"""Over the angle in tangential contact, and over the friction angle."""
+_LYING = 12, 16
+"""Terms of a cell in tangential contact, over the angle, and over the friction angle."""
+
+_LEVELS = np.array([0.0, 0.5, 0.8, 1.0])
+"""Where these cells begin and end, shares of the largest angle."""
 
 _MARGIN = 0.02
 """By how much ε1 of tables exceeds that of tangential contact."""
@@ -67,64 +67,54 @@ _MARGIN = 0.02
 _CHI_MAX = 3.2
 
 
-class TipTable(NamedTuple):
-    """What belongs to tip contact."""
-
-    radius: Floats
-    """The largest one, over the angle, shape (angles,)."""
-    rows: Floats
-    """What is tabulated, side by side, so that one loop runs over all: force, turn, tilt and then the amplitude, shape
-    (shares, 4 · angles)."""
-
-
 class Tables(NamedTuple):
     """All of them."""
 
     lying: Floats
-    """Tangential contact, shape (4, friction angles, angles)."""
-    tip: tuple[TipTable, TipTable, TipTable]
-    """Tip contact: small, large, with friction."""
+    """Tangential contact, shape (4, friction angles, cells, terms)."""
+    radius: Floats
+    """The largest one in tip contact, over the angle, shape (angles, terms)."""
+    tip: Floats
+    """Tip contact: what is tabulated side by side, so that one loop runs over all, shape (angles, shares, terms over
+    the share, 4 · terms over the angle)."""
 
 
 class Room(NamedTuple):
     """Where a state is put together, for one friction angle."""
 
     lying: Floats
-    """Series of tangential contact over the angle, shape (4, angles)."""
+    """Series of tangential contact over the angle, shape (4, cells, terms)."""
     by_angle: Floats
     by_share: Floats
     row: Floats
-    """Of the size of four series over the angle."""
+    """Two series over the angle, one after the other."""
 
 
 def room() -> Room:
-    most = max(*_LARGE, *_RUBBING, SMALL)
-    return Room(np.empty((4, _LYING[0])), np.empty(most), np.empty(most), np.empty(4 * most))
+    by_angle, by_share = np.empty((2, _TERMS))
+    row, lying = np.empty(max(2 * _TERMS, _LYING[1])), np.empty((4, _LEVELS.size - 1, _LYING[0]))
+    return Room(lying, by_angle, by_share, row)
 
 
 @functools.cache
 def tables() -> Tables:
     """Tables for any friction angle up to `MOST_FRICTION`."""
-    straight = 0.5 * np.pi + _MARGIN
-    tips = (
-        _tip_table(SMALL, SMALL, straight),
-        _tip_table(*_LARGE, straight),
-        _tip_table(*_RUBBING, straight + MOST_FRICTION),
+    angles, shares, levels = _in_cells(_ANGLES, _TERMS), _in_cells(_SHARES, _TERMS), _in_cells(_LEVELS, _LYING[0])
+    radius, tip = _tips_on(0.5 * np.pi * angles.ravel(), shares.ravel(), 0.5 * np.pi + _MARGIN + MOST_FRICTION)
+    by_share = chebyshev.coefficients(tip.reshape(4, *angles.shape, *shares.shape))
+    by_both = chebyshev.coefficients(by_share.swapaxes(-1, -2)).transpose(3, 4, 1, 2, 0)
+    lying = _lying_on(levels.ravel(), MOST_FRICTION * chebyshev.nodes(_LYING[1]))
+    by_friction = chebyshev.coefficients(lying.reshape(4, *levels.shape, -1))
+    return Tables(
+        lying=np.ascontiguousarray(chebyshev.coefficients(by_friction).transpose(2, 1, 3, 0)),
+        radius=np.ascontiguousarray(chebyshev.coefficients(radius.reshape(angles.shape)).T),
+        tip=by_both.reshape(*by_both.shape[:3], -1),
     )
-    angles, frictions = _LYING
-    lying = _lying_on(chebyshev.nodes(angles), MOST_FRICTION * chebyshev.nodes(frictions))
-    return Tables(np.stack([np.ascontiguousarray(_fit(values).T) for values in lying]), tips)
 
 
-def _tip_table(angles: int, shares: int, largest: float) -> TipTable:
-    radius, values = _tips_on(0.5 * np.pi * chebyshev.nodes(angles), chebyshev.nodes(shares), largest)
-    rows = np.stack([_fit(table).T for table in values], axis=1)
-    return TipTable(chebyshev.coefficients(radius), rows.reshape(shares, -1))
-
-
-def _fit(values: Floats) -> Floats:
-    """Coefficients of a function on a grid of nodes."""
-    return chebyshev.coefficients(chebyshev.coefficients(values))
+def _in_cells(ends: Floats, terms: int) -> Floats:
+    """Nodes in every cell, shape (cells, terms)."""
+    return np.asarray(ends[:-1, None] + np.diff(ends)[:, None] * chebyshev.nodes(terms))
 
 
 @kept
@@ -162,7 +152,7 @@ def _tips_on(angles: Floats, shares: Floats, largest: float) -> tuple[Floats, Fl
         for j in range(shares.size - 1, -1, -1):
             lack, tilt = math.sin(angles[i]) * radius[i] * shares[j], math.cos(angles[i]) * radius[i] * shares[j]
             chi, tilt1, arc, _, _ = tip_arc(lack, tilt, chi, tilt1)
-            out[FORCE, i, j], out[TURN, i, j] = arc.length * arc.length / angles[i], arc.turn / angles[i]
+            out[FORCE, i, j], out[TURN, i, j] = arc.length * arc.length / angles[i], arc.turn - tilt1
             out[AMPLITUDE, i, j], out[TILT, i, j] = chi * chi / angles[i], tilt1 / shares[j]
     return radius, out
 
@@ -170,23 +160,35 @@ def _tips_on(angles: Floats, shares: Floats, largest: float) -> tuple[Floats, Fl
 @compiled
 def prepare(known: Tables, friction_angle: float, room: Room) -> None:
     """Series of tangential contact at a friction angle, into the room."""
-    _polynomials(min(friction_angle / MOST_FRICTION, 1.0), known.lying.shape[1], room.row)
+    frictions = known.lying.shape[1]
+    _polynomials(min(friction_angle / MOST_FRICTION, 1.0), frictions, room.row)
     room.lying[:] = 0.0
     for k in range(4):
-        for j in range(known.lying.shape[1]):
+        for j in range(frictions):
             weight = room.row[j]
-            for i in range(room.lying.shape[1]):
-                room.lying[k, i] += weight * known.lying[k, j, i]
+            for c in range(room.lying.shape[1]):
+                for i in range(room.lying.shape[2]):
+                    room.lying[k, c, i] += weight * known.lying[k, j, c, i]
 
 
 @inlined
-def series(rows: Floats, k: int, size: int, z: float) -> float:
-    """So many terms of the Chebyshev series in row k, on [0, 1], by Clenshaw's recurrence."""
+def _cell(ends: Floats, z: float) -> tuple[int, float]:
+    """In which cell one is, and where in it."""
+    cell = 0
+    for k in range(1, ends.size - 1):
+        cell += z > ends[k]
+    return cell, (z - ends[cell]) / (ends[cell + 1] - ends[cell])
+
+
+@inlined
+def series(room: Room, k: int, level: float) -> float:
+    """What is tabulated of tangential contact at a share of the largest angle, by Clenshaw's recurrence."""
+    cell, z = _cell(_LEVELS, level)
     twice = 4.0 * z - 2.0
     now, before = 0.0, 0.0
-    for i in range(size - 1, 0, -1):
-        now, before = rows[k, i] + twice * now - before, now
-    return rows[k, 0] + 0.5 * twice * now - before
+    for i in range(room.lying.shape[2] - 1, 0, -1):
+        now, before = (room.lying[k, cell, i] - before) + twice * now, now
+    return (room.lying[k, cell, 0] - before) + 0.5 * twice * now
 
 
 @inlined
@@ -199,35 +201,27 @@ def _polynomials(z: float, size: int, out: Floats) -> None:
 
 
 @inlined
-def in_polar(table: TipTable, lack: float, tilt: float, room: Room) -> tuple[float, float]:
-    """Angle and share of the largest radius; their polynomials go into the room."""
-    shares, angles = table.rows.shape[0], table.radius.size
+def in_polar(known: Tables, lack: float, tilt: float, first: int, room: Room) -> tuple[float, float, float, float]:
+    """Angle, share of the largest radius, and two of what is tabulated there, from the first on."""
+    terms = room.by_angle.size
     angle = math.atan2(lack, tilt)
-    _polynomials(angle / (0.5 * math.pi), angles, room.by_angle)
+    i, z = _cell(_ANGLES, angle / (0.5 * math.pi))
+    _polynomials(z, terms, room.by_angle)
     largest = 0.0
-    for a in range(angles):
-        largest += table.radius[a] * room.by_angle[a]
+    for a in range(terms):
+        largest += known.radius[i, a] * room.by_angle[a]
     share = min(math.sqrt(lack * lack + tilt * tilt) / largest, 1.0)
-    _polynomials(share, shares, room.by_share)
-    return angle, share
-
-
-@inlined
-def combine(table: TipTable, count: int, room: Room) -> None:
-    """Series over the angle, into the room, of as many of what is tabulated as wanted."""
-    row, size = room.row, count * table.radius.size
-    for i in range(size):
-        row[i] = 0.0
-    for s in range(table.rows.shape[0]):
+    j, z = _cell(_SHARES, share)
+    _polynomials(z, terms, room.by_share)
+    begin = first * terms
+    for a in range(2 * terms):
+        room.row[a] = 0.0
+    for s in range(terms):
         weight = room.by_share[s]
-        for i in range(size):
-            row[i] += weight * table.rows[s, i]
-
-
-@inlined
-def combined(table: TipTable, k: int, room: Room) -> float:
-    """One of them at the angle."""
-    total, first = 0.0, k * table.radius.size
-    for a in range(table.radius.size):
-        total += room.row[first + a] * room.by_angle[a]
-    return total
+        for a in range(2 * terms):
+            room.row[a] += weight * known.tip[i, j, s, begin + a]
+    one, other = 0.0, 0.0
+    for a in range(terms):
+        one += room.row[a] * room.by_angle[a]
+        other += room.row[terms + a] * room.by_angle[a]
+    return angle, share, one, other

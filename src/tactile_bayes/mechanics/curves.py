@@ -1,0 +1,240 @@
+"""What the base feels along a stretch of a path, as Chebyshev series: of the way, and of the drive angle.
+
+A stretch is smooth, so that a few states tell all of it. A drive angle is looked for in the series of the way; where
+loads are smooth functions of the drive angle as well, that need not be done for every sample: the angle is stretched
+toward the end, where the drive may turn back, so that fewer terms serve.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.outline import Outline, Place, frame, place
+from tactile_bayes.mechanics.series import Nodes, change_of, crossing, nodes_of, tail, value, value_and_slope, weighted
+from tactile_bayes.mechanics.states import State, exact_state, tabled_state
+from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
+from tactile_bayes.mechanics.tables import Room, Tables
+
+__all__ = [
+    "ANGLE",
+    "Course",
+    "Curves",
+    "Rig",
+    "Scene",
+    "angle_rate",
+    "curves_of",
+    "exact_at",
+    "first_fall",
+    "largest_curvature",
+    "left_of",
+    "lay_over_angle",
+    "misses",
+    "polished_fold",
+    "sample",
+]
+
+Floats = NDArray[np.float64]
+
+ANGLE = 3
+"""Row of the drive angle, or of the way, after those of the three loads."""
+
+_LAST = 1e-13
+"""Newton step, as a share of a stretch, below which there is only rounding of its interpolants."""
+
+_STRAINED = 65
+"""Ways along a stretch at which its largest curvature is sought."""
+
+
+class Rig(NamedTuple):
+    """What loads depend on beside rod and contour."""
+
+    friction_angle: float
+    """δ = arctan μ [rad]."""
+    compliance: float
+    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
+    offset: float
+    """What the encoder reads too much, as seen in forward sweeps [rad]."""
+    sign: float
+    """−1 in backward sweeps."""
+
+
+class Scene(NamedTuple):
+    """One contour as one rod sees it from one pivot, and what is known of rods: all that a state depends on."""
+
+    outline: Outline
+    rig: Rig
+    known: Tables
+    states: Room
+
+
+class Curves(NamedTuple):
+    """Room for the series of one stretch, used again for the next."""
+
+    on: Nodes
+    series: Floats
+    """Of the three loads, the drive angle, and its derivative, over the way, shape (5, order)."""
+    bend: Floats
+    """The second derivative of the drive angle, or the first of the way by it."""
+    over_angle: Floats
+    """Of the three loads and the way over the stretched drive angle, shape (4, order)."""
+    values: Floats
+    on_grid: Floats
+
+
+class Course(NamedTuple):
+    """How the drive angle runs along a stretch."""
+
+    stop: float
+    """Way to where the stretch, or the path, ends."""
+    begin: float
+    """Drive angle at the beginning [rad]."""
+    end: float
+    steadiness: float
+    """Its rate at the end over its mean one: 0 where the drive turns back, 1 if it is even."""
+
+
+def curves_of(order: int) -> Curves:
+    """Room for so many nodes."""
+    return Curves(
+        on=nodes_of(order),
+        series=np.empty((5, order)),
+        bend=np.empty(order),
+        over_angle=np.empty((4, order)),
+        values=np.empty((4, order)),
+        on_grid=np.empty(2 * order + 1),
+    )
+
+
+@compiled
+def exact_at(scene: Scene, stretch: Stretch, p: float) -> State:
+    """The exact state at a parameter."""
+    at = place(scene.outline, p)
+    return exact_state(at, scene.rig.friction_angle, stretch.tip, scene.known, scene.states)
+
+
+@compiled
+def sample(scene: Scene, stretch: Stretch, exact: bool, curves: Curves) -> None:
+    """Series along the way of loads and drive angle."""
+    values, on, rig = curves.values, curves.on, scene.rig
+    for k in range(on.nodes.size):
+        at = place(scene.outline, along(stretch, on.nodes[k]))
+        if exact:
+            state = exact_state(at, rig.friction_angle, stretch.tip, scene.known, scene.states)
+            values[0, k], values[1, k] = state.holding_moment, state.force_x
+            values[2, k], values[ANGLE, k] = state.force_y, state.drive_angle
+        else:
+            quick = tabled_state(at, rig.friction_angle, stretch.tip, scene.known, scene.states)
+            values[0, k], values[1, k] = quick.holding_moment, quick.force_x
+            values[2, k], values[ANGLE, k] = quick.force_y, quick.drive_angle
+        values[ANGLE, k] += rig.compliance * values[0, k]
+    for c in range(4):
+        weighted(on.fit, values[c], curves.series[c])
+
+
+@compiled
+def misses(accuracy: Accuracy, tolerance: Floats, curves: Curves) -> bool:
+    """Whether the series miss the drive angle, or loads by more than a tolerance."""
+    angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
+    rough = angle > accuracy.resolved * change or angle > accuracy.sharp
+    for c in range(3):
+        loads = curves.series[c]
+        rough |= tail(loads) + angle * change_of(loads) / change > tolerance[c]
+    return rough
+
+
+@compiled
+def first_fall(accuracy: Accuracy, is_first: bool, curves: Curves) -> float:
+    """Way to where the drive angle stops growing: above 1 if it grows to the end, 0 if it does not grow at all."""
+    on, slope = curves.on, curves.series[ANGLE + 1]
+    weighted(on.slopes, curves.series[ANGLE], slope)
+    weighted(on.on_grid, slope, curves.on_grid)
+    for cell in range(1 if is_first else 0, on.grid.size):  # it always grows from first contact
+        if curves.on_grid[cell] <= 0.0:
+            if cell == 0:
+                return 0.0
+            weighted(on.slopes, slope, curves.bend)
+            left, right = on.grid[cell - 1], on.grid[cell]
+            return crossing(slope, curves.bend, 0.0, left, right, 0.5 * (left + right), accuracy.last_step)
+    return 2.0
+
+
+@inlined
+def angle_rate(at: Place, state: State) -> float:
+    """Derivative of the drive angle by the contour's parameter."""
+    lever, facing = frame(at)
+    turning = -facing * at.speed / (at.x * at.x + at.y * at.y)
+    return turning + state.by_slope * (at.bend - turning) + state.by_distance * 2.0 * lever * at.speed
+
+
+@compiled
+def _rate(scene: Scene, stretch: Stretch, way: float) -> float:
+    """Derivative of the exact drive angle by the way, of a stiff suspension."""
+    p = along(stretch, way)
+    return angle_rate(place(scene.outline, p), exact_at(scene, stretch, p)) * along_rate(stretch, way)
+
+
+@compiled
+def polished_fold(scene: Scene, stretch: Stretch, stop: float, curves: Curves) -> float:
+    """Way at which the exact derivative of the drive angle vanishes: secants, the first by the interpolant."""
+    weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
+    bend = value(curves.bend, stop)
+    at_stop, last = _rate(scene, stretch, stop), 2e-2
+    for _ in range(7):
+        step = at_stop / bend
+        if not abs(step) < 0.5 * last:
+            break
+        new = min(max(stop - step, 0.0), 1.0)
+        at_new = _rate(scene, stretch, new)
+        bend = (at_new - at_stop) / (new - stop)
+        stop, at_stop, last = new, at_new, abs(step)
+    return stop
+
+
+@compiled
+def lay_over_angle(accuracy: Accuracy, course: Course, curves: Curves) -> None:
+    """Series of the loads and of the way over the stretched drive angle."""
+    series, values, on = curves.series, curves.values, curves.on
+    steadiness, way = course.steadiness, course.stop
+    last_step = max(accuracy.last_step, _LAST)
+    for k in range(on.nodes.size):
+        ahead = 1.0 - on.nodes[k]
+        wanted = course.end - (course.end - course.begin) * ahead * (steadiness + (1.0 - steadiness) * ahead)
+        way = crossing(series[ANGLE], series[ANGLE + 1], wanted, course.stop, 0.0, course.stop * on.nodes[k], last_step)
+        values[0, k], values[1, k] = value_and_slope(series[0], series[1], way)
+        values[2, k], values[ANGLE, k] = value(series[2], way), way
+    for c in range(4):
+        weighted(on.fit, values[c], curves.over_angle[c])
+
+
+@inlined
+def left_of(angle: float, course: Course) -> float:
+    """What is left of a stretch at a drive angle, from 1 to 0, so stretched that states are smooth functions of it."""
+    left = min(max((course.end - angle) / (course.end - course.begin), 0.0), 1.0)
+    root = math.sqrt(course.steadiness * course.steadiness + 4.0 * (1.0 - course.steadiness) * left)
+    return 2.0 * left / (course.steadiness + root) if left > 0.0 else 0.0
+
+
+@compiled
+def largest_curvature(stop: float, rig: Rig, series: Floats) -> float:
+    """Largest curvature of the rod up to a way along a stretch: see `tactile_bayes.mechanics.elastica`."""
+    largest = 0.0
+    for k in range(_STRAINED):
+        z = stop * k / (_STRAINED - 1.0)
+        angle, moment = value_and_slope(series[ANGLE], series[0], z)
+        force_x, force_y = value_and_slope(series[1], series[2], z)
+        largest = max(largest, _curvature(angle - rig.compliance * moment, moment, force_x, force_y))
+    return largest
+
+
+@inlined
+def _curvature(drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
+    """Largest curvature of the rod between pivot and contact, of a forward contact [1/L]."""
+    cos, sin = math.cos(drive_angle), math.sin(drive_angle)
+    lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
+    inflated = 2.0 * (math.hypot(force_x, force_y) - lever) if across < 0.0 else 0.0
+    return math.sqrt(moment * moment + inflated)

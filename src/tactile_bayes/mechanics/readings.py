@@ -1,0 +1,203 @@
+"""What the base feels at the drive angles of samples that lie on a stretch of a path."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.curves import ANGLE, Course, Curves, Scene, angle_rate, left_of
+from tactile_bayes.mechanics.outline import place
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.series import at_all, change_of, crossing, tail, value, value_and_slope, weighted
+from tactile_bayes.mechanics.states import exact_state
+from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
+
+__all__ = ["STATE_COLUMNS", "Asked", "Found", "Samples", "asked", "find_samples", "write_loads", "write_states"]
+
+Floats = NDArray[np.float64]
+
+STATE_COLUMNS = 13
+"""Numbers that are kept of a state: phase, parameter, point, slope angle, and those of `State`."""
+
+_NEAR = 1e-3
+"""Error of the interpolated way, as a share of the stretch, from which two steps of Newton's method leave nothing."""
+
+
+class Samples(NamedTuple):
+    """What is asked for."""
+
+    angles: Floats
+    """Drive angles, as read and as seen in forward sweeps, increasing."""
+    rows: NDArray[np.intp]
+    """Where their loads and states go."""
+
+
+class Found(NamedTuple):
+    """What is known of samples and stretches."""
+
+    loads: Floats
+    """With the sign of the sweep, zero beforehand, shape (rows, 3)."""
+    states: Floats
+    """Seen in forward sweeps, zero beforehand, shape (rows, `STATE_COLUMNS`)."""
+    changes: Floats
+    """Where phases begin, as seen: parameter and whether the tip touches, shape (phases, 2), or none if no states are
+    wanted."""
+
+
+class Asked(NamedTuple):
+    """Room for samples on one stretch."""
+
+    wanted: Floats
+    """Their drive angles."""
+    twice: Floats
+    """Stretched drive angles z, or ways, as 4z − 2."""
+    now: Floats
+    before: Floats
+    found: Floats
+    """Values of up to three series, shape (3, samples)."""
+
+
+def asked(samples: int) -> Asked:
+    """Room for so many at most."""
+    wanted, twice, now, before = np.empty((4, samples))
+    return Asked(wanted, twice, now, before, np.empty((3, samples)))
+
+
+@compiled
+def find_samples(samples: Samples, offset: float, course: Course, room: Asked) -> tuple[int, int]:
+    """The first sample on a stretch, and how many there are; their drive angles go into the room."""
+    first, last = _before(samples.angles, course.begin + offset), _before(samples.angles, course.end + offset)
+    while last < samples.angles.size and samples.angles[last] - offset <= course.end:
+        last += 1
+    for j in range(last - first):
+        room.wanted[j] = samples.angles[first + j] - offset
+        room.twice[j] = 2.0 - 4.0 * left_of(room.wanted[j], course)
+    return first, last - first
+
+
+@compiled
+def _before(angles: Floats, angle: float) -> int:
+    """How many angles, which increase, are less than one."""
+    low, high = 0, angles.size
+    while low < high:
+        middle = (low + high) // 2
+        if angles[middle] < angle:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def _look_for(accuracy: Accuracy, stop: float, count: int, curves: Curves, room: Asked) -> None:
+    """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: from what interpolation says by
+    Newton's method, if that is near, or each by itself."""
+    wanted, twice, found = room.wanted, room.twice, room.found
+    if tail(curves.over_angle[ANGLE]) > _NEAR * stop:
+        angle, slope = curves.series[ANGLE], curves.series[ANGLE + 1]
+        for j in range(count):
+            way = crossing(angle, slope, wanted[j], stop, 0.0, 0.5 * stop, accuracy.last_step)
+            twice[j] = 4.0 * way - 2.0
+        return
+    at_all(curves.over_angle[ANGLE:], twice, count, room.now, room.before, found)
+    for j in range(count):
+        twice[j] = 4.0 * min(max(found[0, j], 0.0), stop) - 2.0
+    for _ in range(2):
+        at_all(curves.series[ANGLE:], twice, count, room.now, room.before, found)
+        for j in range(count):
+            way = 0.25 * (twice[j] + 2.0)
+            most = 0.5 * (stop - way) + _NEAR * _NEAR * stop
+            step = (found[0, j] - wanted[j]) / found[1, j] if found[1, j] > 0.0 else 0.0
+            twice[j] = 4.0 * min(max(way - min(max(step, -most), most), 0.0), stop) - 2.0
+
+
+@compiled
+def write_loads(
+    samples: Samples,
+    first: int,
+    count: int,
+    sign: float,
+    accuracy: Accuracy,
+    tolerance: Floats,
+    stop: float,
+    curves: Curves,
+    room: Asked,
+    out: Floats,
+) -> None:
+    """Loads of the samples on a stretch: over the drive angle if they are smooth functions of it, else over the way."""
+    smooth = True
+    for c in range(3):
+        smooth &= tail(curves.over_angle[c]) <= tolerance[c]
+    loads = curves.over_angle
+    if not smooth:
+        _look_for(accuracy, stop, count, curves, room)
+        loads = curves.series
+    at_all(loads[:ANGLE], room.twice, count, room.now, room.before, room.found)
+    for j in range(count):
+        row = samples.rows[first + j]
+        out[row, 0], out[row, 1] = sign * room.found[0, j], sign * room.found[1, j]
+        out[row, 2] = room.found[2, j]
+
+
+@compiled
+def write_states(
+    samples: Samples,
+    first: int,
+    count: int,
+    scene: Scene,
+    stretch: Stretch,
+    accuracy: Accuracy,
+    course: Course,
+    curves: Curves,
+    room: Asked,
+    out: Found,
+) -> None:
+    """Exact states at the drive angles of the samples on a stretch, by Newton in the stretched drive angle."""
+    stop, steadiness, over_angle, rig = course.stop, course.steadiness, curves.over_angle, scene.rig
+    weighted(curves.on.slopes, over_angle[ANGLE], curves.bend)
+    for j in range(count):
+        row, target = samples.rows[first + j], 0.25 * (room.twice[j] + 2.0)
+        way, pace = value_and_slope(over_angle[ANGLE], curves.bend, target)
+        way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle is less again
+        low, high, before = 0.0, stop, stop
+        for _ in range(100):
+            p = along(stretch, way)
+            at = place(scene.outline, p)
+            state = exact_state(at, rig.friction_angle, stretch.tip, scene.known, scene.states)
+            driven = state.drive_angle + rig.compliance * state.holding_moment
+            # But for rounding, which may undo the very first contact.
+            turned = 1.0 - left_of(driven, course) if math.isfinite(driven) else 0.0
+            missing = target - turned
+            if abs(missing) <= accuracy.settled or not high > low:
+                break
+            if missing > 0.0:
+                low = way
+            else:
+                high = way
+            rate = angle_rate(at, state) * along_rate(stretch, way)
+            newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
+            # Much nearer to the end than the goal is, the rate may be zero or rounding: the interpolant's serves.
+            sound = rig.compliance == 0.0 and newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target)
+            new = way + missing * (newton if sound else pace)
+            if not (low < new < high and abs(new - way) <= 0.5 * before):
+                new = 0.5 * (low + high)
+            before = abs(new - way)
+            if new == way or not before > 0.0:
+                break
+            way = new
+        if not math.isfinite(driven):
+            continue
+        # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
+        reached = 1.0 - left_of(driven, course)
+        states = out.states[row]
+        states[0] = TIP if stretch.tip else TANGENTIAL
+        states[1], states[2], states[3], states[4] = p, at.x, at.y, math.atan2(at.sin, at.cos)
+        for c in range(8):
+            states[5 + c] = state[c]
+        for c in range(3):
+            states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
+            out.loads[row, c] = (1.0 if c == 2 else rig.sign) * states[6 + c]
