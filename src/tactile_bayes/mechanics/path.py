@@ -28,7 +28,6 @@ from tactile_bayes.mechanics.curves import (
     exact_at,
     first_fall,
     largest_curvature,
-    lay_over_angle,
     misses,
     polished_fold,
     sample,
@@ -39,7 +38,7 @@ from tactile_bayes.mechanics.readings import Asked, Found, Samples, asked, find_
 from tactile_bayes.mechanics.reach import limits
 from tactile_bayes.mechanics.series import value
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
-from tactile_bayes.mechanics.tables import MOST_FRICTION, prepare
+from tactile_bayes.mechanics.tables import MOST_FRICTION
 
 __all__ = ["MOST_CHANGES", "Ends", "Work", "follow", "work"]
 
@@ -54,6 +53,9 @@ _MOST = 96
 _MOST_MORE = 64
 """Stretches beyond those that are cut from which on none is halved: what is rough everywhere, like a contour whose
 curvature is interpolated, is not smooth in smaller pieces either."""
+
+_FEWER = 0.65
+"""Share of the nodes that usually do where the tip touches."""
 
 _NO_MOMENT = 1e-12
 """Holding moment [EI/L] that is none."""
@@ -83,7 +85,7 @@ class Work(NamedTuple):
     """Room for what is computed on one path, used again for the next."""
 
     brief: Curves
-    """With half of the nodes, which do where the tip touches unless it touches for long."""
+    """With fewer nodes, which do where the tip touches unless it touches for long."""
     full: Curves
     asked: Asked
     pieces: Floats
@@ -106,7 +108,7 @@ def work(samples: int, order: int, knots: int) -> Work:
     """For so many samples at most, nodes on a stretch, and knots of the contour."""
     most = _MOST + 4 * (order + 4) + 4 * knots
     return Work(
-        brief=curves_of(order // 2),
+        brief=curves_of(int(_FEWER * order)),
         full=curves_of(order),
         asked=asked(samples),
         pieces=np.empty((most, 3)),
@@ -153,14 +155,13 @@ def _follow_stretch(
     if not folds:
         steadiness = min(max(value(curves.series[ANGLE + 1], stop) * stop / (at_end - at_begin), 0.0), 1.0)
     course = Course(stop, at_begin, at_end, steadiness)
-    lay_over_angle(accuracy, course, curves)
     first, count = find_samples(samples, scene.rig.offset, course, room)
     curvature = 0.0
     if found.changes.shape[0] > 0:
         write_states(samples, first, count, scene, stretch, accuracy, course, curves, room, found)
         curvature = largest_curvature(stop, scene.rig, curves.series)
     else:
-        write_loads(samples, first, count, scene.rig.sign, accuracy, tolerance, stop, curves, room, found.loads)
+        write_loads(samples, first, count, scene.rig.sign, accuracy, course, curves, room, found.loads)
     fate = _NEVER
     if folds:
         # At a flat vertex the maximum and the end of all moment are one, and rounding must not choose between them.
@@ -182,13 +183,14 @@ def follow(
 
     Parameters
     ----------
+    scene : Scene
+        With the room for states prepared for its friction angle.
     knots : ndarray, shape (k,)
         Where the contour may not be smooth, decreasing.
     tolerance : ndarray, shape (3,)
         By how much loads may miss, of moment and forces [EI/L and EI/L²].
     """
     outline, delta = scene.outline, scene.rig.friction_angle
-    prepare(scene.known, delta, scene.states)
     limit = limits(outline, delta, accuracy.first_step)
     if limit.reach != _TOUCHES:
         return _nothing(limit.reach, limit.distance)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.curves import ANGLE, Course, Curves, Scene, angle_rate, left_of
+from tactile_bayes.mechanics.curves import ANGLE, Course, Curves, Scene, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.series import at_all, change_of, crossing, tail, value, value_and_slope, weighted
+from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
 from tactile_bayes.mechanics.states import exact_state
 from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
 
@@ -24,7 +24,7 @@ STATE_COLUMNS = 13
 """Numbers that are kept of a state: phase, parameter, point, slope angle, and those of `State`."""
 
 _NEAR = 1e-3
-"""Error of the interpolated way, as a share of the stretch, from which two steps of Newton's method leave nothing."""
+"""Newton step, as a share of the stretch, after which nothing is left to do."""
 
 
 class Samples(NamedTuple):
@@ -93,26 +93,34 @@ def _before(angles: Floats, angle: float) -> int:
 
 
 @compiled
-def _look_for(accuracy: Accuracy, stop: float, count: int, curves: Curves, room: Asked) -> None:
-    """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: from what interpolation says by
-    Newton's method, if that is near, or each by itself."""
-    wanted, twice, found = room.wanted, room.twice, room.found
-    if tail(curves.over_angle[ANGLE]) > _NEAR * stop:
-        angle, slope = curves.series[ANGLE], curves.series[ANGLE + 1]
-        for j in range(count):
-            way = crossing(angle, slope, wanted[j], stop, 0.0, 0.5 * stop, accuracy.last_step)
-            twice[j] = 4.0 * way - 2.0
-        return
-    at_all(curves.over_angle[ANGLE:], twice, count, room.now, room.before, found)
+def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, room: Asked) -> None:
+    """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by two steps of Newton's method,
+    from between the nodes of the series, or each by itself where that is not near."""
+    wanted, twice, found, stop = room.wanted, room.twice, room.found, course.stop
+    nodes, angles = curves.on.nodes, curves.values[ANGLE]
+    k, before, after, way_before, way_after = 0, -2.0, -2.0, 0.0, 0.0
     for j in range(count):
-        twice[j] = 4.0 * min(max(found[0, j], 0.0), stop) - 2.0
+        while twice[j] > after and after < 2.0:
+            before, way_before = after, way_after
+            beyond = k == nodes.size or nodes[k] >= stop or angles[k] >= course.end
+            after = 2.0 if beyond else 2.0 - 4.0 * left_of(angles[k], course)
+            way_after = stop if beyond else nodes[k]
+            k += 1
+        share = (twice[j] - before) / (after - before) if after > before else 1.0
+        twice[j] = 4.0 * (way_before + share * (way_after - way_before)) - 2.0
     for _ in range(2):
         at_all(curves.series[ANGLE:], twice, count, room.now, room.before, found)
         for j in range(count):
             way = 0.25 * (twice[j] + 2.0)
             most = 0.5 * (stop - way) + _NEAR * _NEAR * stop
             step = (found[0, j] - wanted[j]) / found[1, j] if found[1, j] > 0.0 else 0.0
-            twice[j] = 4.0 * min(max(way - min(max(step, -most), most), 0.0), stop) - 2.0
+            found[2, j] = min(max(step, -most), most)
+            twice[j] = 4.0 * min(max(way - found[2, j], 0.0), stop) - 2.0
+    for j in range(count):
+        if abs(found[2, j]) > _NEAR * stop:
+            way = 0.25 * (twice[j] + 2.0)
+            way = crossing(curves.series[ANGLE], curves.series[ANGLE + 1], wanted[j], stop, 0.0, way, accuracy.last_step)
+            twice[j] = 4.0 * way - 2.0
 
 
 @compiled
@@ -122,21 +130,14 @@ def write_loads(
     count: int,
     sign: float,
     accuracy: Accuracy,
-    tolerance: Floats,
-    stop: float,
+    course: Course,
     curves: Curves,
     room: Asked,
     out: Floats,
 ) -> None:
-    """Loads of the samples on a stretch: over the drive angle if they are smooth functions of it, else over the way."""
-    smooth = True
-    for c in range(3):
-        smooth &= tail(curves.over_angle[c]) <= tolerance[c]
-    loads = curves.over_angle
-    if not smooth:
-        _look_for(accuracy, stop, count, curves, room)
-        loads = curves.series
-    at_all(loads[:ANGLE], room.twice, count, room.now, room.before, room.found)
+    """Loads of the samples on a stretch, from the series."""
+    _look_for(accuracy, course, count, curves, room)
+    at_all(curves.series[:ANGLE], room.twice, count, room.now, room.before, room.found)
     for j in range(count):
         row = samples.rows[first + j]
         out[row, 0], out[row, 1] = sign * room.found[0, j], sign * room.found[1, j]
@@ -158,6 +159,7 @@ def write_states(
 ) -> None:
     """Exact states at the drive angles of the samples on a stretch, by Newton in the stretched drive angle."""
     stop, steadiness, over_angle, rig = course.stop, course.steadiness, curves.over_angle, scene.rig
+    lay_over_angle(accuracy, course, curves)
     weighted(curves.on.slopes, over_angle[ANGLE], curves.bend)
     for j in range(count):
         row, target = samples.rows[first + j], 0.25 * (room.twice[j] + 2.0)

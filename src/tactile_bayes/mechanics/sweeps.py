@@ -17,7 +17,7 @@ from tactile_bayes.mechanics.path import MOST_CHANGES, Work, follow, work
 from tactile_bayes.mechanics.reach import clear_angle
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
 from tactile_bayes.mechanics.stretches import Accuracy
-from tactile_bayes.mechanics.tables import Room, Tables, room, tables
+from tactile_bayes.mechanics.tables import Room, Tables, prepare, room, tables
 
 __all__ = ["Answers", "Lanes", "Shapes", "Strokes", "answered"]
 
@@ -163,7 +163,7 @@ def _sweep(
         Room for the table of one contour.
     """
     count = shapes.knots.shape[1]
-    knots = np.empty(count)
+    knots, prepared = np.empty(count), math.nan
     for i in range(lanes.contour.size):
         outline = _outline(shapes, lanes, i, table)
         c, sign = lanes.contour[i], -1.0 if lanes.backward[i] else 1.0
@@ -171,6 +171,9 @@ def _sweep(
             knots[k] = -shapes.knots[c, k] if lanes.backward[i] else shapes.knots[c, count - 1 - k]
         first, last = strokes.first[lanes.stroke[i]], strokes.first[lanes.stroke[i] + 1]
         samples = Samples(strokes.angles[first:last], strokes.rows[first:last])
+        if lanes.friction_angle[i] != prepared:
+            prepared = lanes.friction_angle[i]
+            prepare(known, prepared, states)
         rig = Rig(lanes.friction_angle[i], lanes.compliance[i], sign * lanes.offset[i], sign)
         found = Found(answers.loads[c], answers.states[c], answers.changes[i])
         ends = follow(Scene(outline, rig, known, states), knots, samples, accuracy, tolerance, room, found)

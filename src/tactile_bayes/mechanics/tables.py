@@ -203,7 +203,7 @@ def _polynomials(z: float, size: int, out: Floats) -> None:
 @inlined
 def in_polar(known: Tables, lack: float, tilt: float, first: int, room: Room) -> tuple[float, float, float, float]:
     """Angle, share of the largest radius, and two of what is tabulated there, from the first on."""
-    terms = room.by_angle.size
+    terms = _TERMS
     angle = math.atan2(lack, tilt)
     i, z = _cell(_ANGLES, angle / (0.5 * math.pi))
     _polynomials(z, terms, room.by_angle)
