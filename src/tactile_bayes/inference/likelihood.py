@@ -255,8 +255,6 @@ class RecordLikelihood:
         if self._turn is not None:
             turn = self._turn - self.misread(rig)[:, None] - errors[:, None]
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
-        if np.any(rig.rigidity_scale != 1.0):
-            predicted *= rig.rigidity_scale[:, None, None, None]
         return predicted, self._usable(found), self._events(found, rig)
 
     def _answers(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Answers:
@@ -306,6 +304,7 @@ class RecordLikelihood:
             friction_angle=np.tile(np.arctan(rig.friction), strokes),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, strokes),
             offset=np.broadcast_to(self._misread(rig), (count, strokes)).T.ravel(),
+            rigidity=np.tile(rig.rigidity_scale, strokes),
         )
 
     def _rig_of(self, rig: Rig | None, count: int) -> Rig:

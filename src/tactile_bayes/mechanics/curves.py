@@ -61,6 +61,8 @@ class Rig(NamedTuple):
     """What the encoder reads too much, as seen in forward sweeps [rad]."""
     sign: float
     """−1 in backward sweeps."""
+    rigidity: float
+    """Factor on loads: flexural rigidity over that of their unit."""
 
 
 class Scene(NamedTuple):

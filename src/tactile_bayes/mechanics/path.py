@@ -161,7 +161,7 @@ def _follow_stretch(
         write_states(samples, first, count, scene, stretch, accuracy, course, curves, room, found)
         curvature = largest_curvature(stop, scene.rig, curves.series)
     else:
-        write_loads(samples, first, count, scene.rig.sign, accuracy, course, curves, room, found.loads)
+        write_loads(samples, first, count, scene.rig, accuracy, course, curves, room, found.loads)
     fate = _NEVER
     if folds:
         # At a flat vertex the maximum and the end of all moment are one, and rounding must not choose between them.

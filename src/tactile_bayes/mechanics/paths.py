@@ -171,6 +171,7 @@ def trace(
         friction_angle=_each(friction_angle, count),
         compliance=_each(compliance, count),
         offset=np.zeros(count),
+        rigidity=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
     settled = {"settled": _QUICKLY} if quickly else {}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.curves import ANGLE, Course, Curves, Scene, angle_rate, lay_over_angle, left_of
+from tactile_bayes.mechanics.curves import ANGLE, Course, Curves, Rig, Scene, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
@@ -40,7 +40,7 @@ class Found(NamedTuple):
     """What is known of samples and stretches."""
 
     loads: Floats
-    """With the sign of the sweep, zero beforehand, shape (rows, 3)."""
+    """With the sign of the sweep and the rod's rigidity, zero beforehand, shape (rows, 3)."""
     states: Floats
     """Seen in forward sweeps, zero beforehand, shape (rows, `STATE_COLUMNS`)."""
     changes: Floats
@@ -128,7 +128,7 @@ def write_loads(
     samples: Samples,
     first: int,
     count: int,
-    sign: float,
+    rig: Rig,
     accuracy: Accuracy,
     course: Course,
     curves: Curves,
@@ -137,11 +137,12 @@ def write_loads(
 ) -> None:
     """Loads of the samples on a stretch, from the series."""
     _look_for(accuracy, course, count, curves, room)
+    sideward = rig.sign * rig.rigidity
     at_all(curves.series[:ANGLE], room.twice, count, room.now, room.before, room.found)
     for j in range(count):
         row = samples.rows[first + j]
-        out[row, 0], out[row, 1] = sign * room.found[0, j], sign * room.found[1, j]
-        out[row, 2] = room.found[2, j]
+        out[row, 0], out[row, 1] = sideward * room.found[0, j], sideward * room.found[1, j]
+        out[row, 2] = rig.rigidity * room.found[2, j]
 
 
 @compiled
@@ -202,4 +203,4 @@ def write_states(
             states[5 + c] = state[c]
         for c in range(3):
             states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
-            out.loads[row, c] = (1.0 if c == 2 else rig.sign) * states[6 + c]
+            out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]

@@ -67,6 +67,8 @@ class Lanes(NamedTuple):
     compliance: Floats
     offset: Floats
     """What the encoder reads too much, in the world's sense [rad]."""
+    rigidity: Floats
+    """Flexural rigidity over that in the unit of loads."""
 
 
 class Strokes(NamedTuple):
@@ -84,7 +86,7 @@ class Answers(NamedTuple):
     """What is found. Drive angles are as seen in forward sweeps; events are of shape (lanes,), NaN where none is."""
 
     loads: Floats
-    """In the world's signs, in EI/L and EI/L², zero out of contact, shape (contours, rows, 3)."""
+    """In the world's signs, in EI/L and EI/L² for a rigidity of one, zero out of contact, shape (contours, rows, 3)."""
     states: Floats
     """Exact states, see `Found`, shape (contours, rows or 0, columns)."""
     changes: Floats
@@ -174,7 +176,7 @@ def _sweep(
         if lanes.friction_angle[i] != prepared:
             prepared = lanes.friction_angle[i]
             prepare(known, prepared, states)
-        rig = Rig(lanes.friction_angle[i], lanes.compliance[i], sign * lanes.offset[i], sign)
+        rig = Rig(lanes.friction_angle[i], lanes.compliance[i], sign * lanes.offset[i], sign, lanes.rigidity[i])
         found = Found(answers.loads[c], answers.states[c], answers.changes[i])
         ends = follow(Scene(outline, rig, known, states), knots, samples, accuracy, tolerance, room, found)
         answers.reach[i], answers.distance[i] = ends.reach, ends.distance
