@@ -31,8 +31,8 @@ __all__ = [
     "exact_at",
     "first_fall",
     "largest_curvature",
-    "left_of",
     "lay_over_angle",
+    "left_of",
     "misses",
     "polished_fold",
     "sample",
@@ -113,10 +113,11 @@ def curves_of(order: int) -> Curves:
 
 
 @compiled
-def exact_at(scene: Scene, stretch: Stretch, p: float) -> State:
-    """The exact state at a parameter."""
-    at = place(scene.outline, p)
-    return exact_state(at, scene.rig.friction_angle, stretch.tip, scene.known, scene.states)
+def exact_at(scene: Scene, stretch: Stretch, way: float) -> tuple[State, float]:
+    """The exact state at a way along a stretch, and the drive angle's derivative by the way, of a stiff suspension."""
+    at = place(scene.outline, along(stretch, way))
+    state = exact_state(at, scene.rig.friction_angle, stretch.tip, scene.known, scene.states)
+    return state, angle_rate(at, state) * along_rate(stretch, way)
 
 
 @compiled
@@ -174,24 +175,17 @@ def angle_rate(at: Place, state: State) -> float:
 
 
 @compiled
-def _rate(scene: Scene, stretch: Stretch, way: float) -> float:
-    """Derivative of the exact drive angle by the way, of a stiff suspension."""
-    p = along(stretch, way)
-    return angle_rate(place(scene.outline, p), exact_at(scene, stretch, p)) * along_rate(stretch, way)
-
-
-@compiled
 def polished_fold(scene: Scene, stretch: Stretch, stop: float, curves: Curves) -> float:
     """Way at which the exact derivative of the drive angle vanishes: secants, the first by the interpolant."""
     weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
     bend = value(curves.bend, stop)
-    at_stop, last = _rate(scene, stretch, stop), 2e-2
+    at_stop, last = exact_at(scene, stretch, stop)[1], 2e-2
     for _ in range(7):
         step = at_stop / bend
         if not abs(step) < 0.5 * last:
             break
         new = min(max(stop - step, 0.0), 1.0)
-        at_new = _rate(scene, stretch, new)
+        at_new = exact_at(scene, stretch, new)[1]
         bend = (at_new - at_stop) / (new - stop)
         stop, at_stop, last = new, at_new, abs(step)
     return stop

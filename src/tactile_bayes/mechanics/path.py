@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import inlined
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     Course,
@@ -34,8 +34,8 @@ from tactile_bayes.mechanics.curves import (
 )
 from tactile_bayes.mechanics.fates import Reach, SnapOff
 from tactile_bayes.mechanics.outline import bearing
-from tactile_bayes.mechanics.readings import Asked, Found, Samples, asked, find_samples, write_loads, write_states
 from tactile_bayes.mechanics.reach import limits
+from tactile_bayes.mechanics.readings import Asked, Found, Samples, asked, find_samples, write_loads, write_states
 from tactile_bayes.mechanics.series import value
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 from tactile_bayes.mechanics.tables import MOST_FRICTION
@@ -116,7 +116,7 @@ def work(samples: int, order: int, knots: int) -> Work:
     )
 
 
-@compiled
+@inlined
 def _follow_stretch(
     scene: Scene,
     stretch: Stretch,
@@ -147,7 +147,7 @@ def _follow_stretch(
     parameter = along(stretch, stop)
     at_end, moment = value(curves.series[ANGLE], stop), 1.0
     if accuracy.exact:
-        state = exact_at(scene, stretch, parameter)
+        state, _ = exact_at(scene, stretch, stop)
         driven, moment = state.drive_angle + scene.rig.compliance * state.holding_moment, state.holding_moment
         if math.isfinite(driven):
             at_end = driven
@@ -169,7 +169,7 @@ def _follow_stretch(
     return _End(fate, parameter, at_end, curvature)
 
 
-@compiled
+@inlined
 def follow(
     scene: Scene,
     knots: Floats,
@@ -211,31 +211,35 @@ def follow(
         row = waiting[count - 1]
         stretch = Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
         # What is shorter may be lost in rounding.
-        divisible = stretch.halvings < accuracy.halvings and stretches < most
-        divisible &= stretch.begin - stretch.end > BRIEF * whole
-        may_fall = limit.begin - stretch.end >= BRIEF * whole or count == 1
-        if stretch.brief:
-            end = _follow_stretch(
-                scene, stretch, accuracy, tolerance, True, may_fall, is_first, at_begin, samples, room.brief, room.asked,
-                found,
-            )
-            if end.fate == _ROUGH:
-                row[5] = 0.0
-                continue
-        else:
-            end = _follow_stretch(
-                scene, stretch, accuracy, tolerance, divisible, may_fall, is_first, at_begin, samples, room.full,
-                room.asked, found,
-            )
-            if end.fate == _ROUGH:
-                # Where loads begin like a square root the way does so with its square.
-                middle = along(stretch, 0.5)
-                above = waiting[count]
-                above[0], above[1], above[2], above[3] = row[0], middle, row[2], row[3]
-                above[4], above[5] = row[4] + 1.0, 0.0
-                row[0], row[3], row[4] = middle, 0.0, row[4] + 1.0
-                count, stretches = count + 1, stretches + 1
-                continue
+        halved = stretch.halvings < accuracy.halvings and stretches < most
+        halved &= stretch.begin - stretch.end > BRIEF * whole
+        curves = room.brief if stretch.brief else room.full
+        end = _follow_stretch(
+            scene,
+            stretch,
+            accuracy,
+            tolerance,
+            stretch.brief or halved,
+            limit.begin - stretch.end >= BRIEF * whole or count == 1,
+            is_first,
+            at_begin,
+            samples,
+            curves,
+            room.asked,
+            found,
+        )
+        if end.fate == _ROUGH and stretch.brief:
+            row[5] = 0.0
+            continue
+        if end.fate == _ROUGH:
+            # Where loads begin like a square root the way does so with its square.
+            middle = along(stretch, 0.5)
+            above = waiting[count]
+            above[0], above[1], above[2], above[3] = row[0], middle, row[2], row[3]
+            above[4], above[5] = row[4] + 1.0, 0.0
+            row[0], row[3], row[4] = middle, 0.0, row[4] + 1.0
+            count, stretches = count + 1, stretches + 1
+            continue
         count -= 1
         fate = end.fate
         if fate == _CORNER:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.curves import ANGLE, Course, Curves, Rig, Scene, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
@@ -92,7 +92,7 @@ def _before(angles: Floats, angle: float) -> int:
     return low
 
 
-@compiled
+@inlined
 def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, room: Asked) -> None:
     """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by two steps of Newton's method,
     from between the nodes of the series, or each by itself where that is not near."""
@@ -119,7 +119,9 @@ def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, ro
     for j in range(count):
         if abs(found[2, j]) > _NEAR * stop:
             way = 0.25 * (twice[j] + 2.0)
-            way = crossing(curves.series[ANGLE], curves.series[ANGLE + 1], wanted[j], stop, 0.0, way, accuracy.last_step)
+            way = crossing(
+                curves.series[ANGLE], curves.series[ANGLE + 1], wanted[j], stop, 0.0, way, accuracy.last_step
+            )
             twice[j] = 4.0 * way - 2.0
 
 

@@ -52,7 +52,7 @@ def nodes_of(order: int) -> Nodes:
     )
 
 
-@inlined
+@compiled
 def weighted(rows: Floats, weights: Floats, out: Floats) -> None:
     """Σ weights[i] · rows[i], an inner loop that has no order to keep."""
     out[:] = 0.0

@@ -57,6 +57,9 @@ Floats = NDArray[np.float64]
 _BEYOND = 1e-12
 """By how much rounding may turn a chord beyond where the line of force passes through the pivot [rad]."""
 
+_MISS = 1e-8
+"""By how much derivatives of exact states on a path miss, which only say where to look next."""
+
 _NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
 
 
@@ -119,10 +122,10 @@ def _lying(x: float, y: float, alpha: float, delta: float, length: float, arc: A
 
 
 @compiled
-def _ending(x: float, y: float, alpha: float, delta: float, precise: bool, known: Tables, room: Room) -> State:
+def _ending(x: float, y: float, alpha: float, delta: float, miss: float, known: Tables, room: Room) -> State:
     """Phase A: distance and direction of the tip give amplitude and direction at the contact.
 
-    Derivatives are right to rounding, or, if they need not be precise, to 1e-8.
+    Derivatives are right to 1e-8, or to rounding if they may not miss by anything.
     """
     larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
     slack2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
@@ -136,7 +139,7 @@ def _ending(x: float, y: float, alpha: float, delta: float, precise: bool, known
     chi, tilt1, arc, by_chi, by_psi1 = tip_arc(lack, tilt, math.sqrt(max(angle * by_angle, 0.0)), share * by_share)
     by_slope, by_distance = math.nan, -math.inf
     if chi > 0.0:
-        if precise:
+        if miss == 0.0:
             _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * tilt1) ** 2)
         angle_x, angle_1, value = chord_rate(arc, by_chi), 1.0 + chord_rate(arc, by_psi1), slack(arc)
         value_x, value_1 = slack_rate(arc, value, by_chi), slack_rate(arc, value, by_psi1)
@@ -152,7 +155,7 @@ def exact_state(at: Place, delta: float, tip: bool, known: Tables, room: Room) -
     """A contact of known phase to rounding, its derivatives to 1e-8, in a room prepared for the friction angle."""
     alpha = math.atan2(at.sin, at.cos)
     if tip:
-        return _ending(at.x, at.y, alpha, delta, False, known, room)
+        return _ending(at.x, at.y, alpha, delta, _MISS, known, room)
     length, arc, by_chi = _touch(at.x, at.y, alpha, delta, room)
     return _lying(at.x, at.y, alpha, delta, length, arc, by_chi)
 
@@ -189,7 +192,7 @@ def wrenches(columns: Floats, known: Tables, room: Room, phase: NDArray[np.int8]
                 _store(_lying(x, y, alpha, delta, length, arc, by_chi), out[i])
                 phase[i] = TANGENTIAL
         if phase[i] == TIP or (phase[i] == NONE and out[i, 8] > 1.0):
-            ending = _ending(x, y, alpha, delta, True, known, room)
+            ending = _ending(x, y, alpha, delta, 0.0, known, room)
             _store(ending, out[i])
             phase[i] = NONE if math.isnan(ending.arclength) else TIP
 

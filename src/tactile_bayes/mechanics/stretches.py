@@ -123,7 +123,7 @@ def cut(
     return count
 
 
-@compiled
+@inlined
 def _cut_piece(
     outline: Outline,
     first: float,
@@ -157,7 +157,7 @@ def _cut_piece(
     return count
 
 
-@compiled
+@inlined
 def _cut_smooth(
     outline: Outline,
     begin: float,
