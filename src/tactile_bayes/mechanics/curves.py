@@ -22,6 +22,7 @@ from tactile_bayes.mechanics.tables import Room, Tables
 
 __all__ = [
     "ANGLE",
+    "MISS",
     "Course",
     "Curves",
     "Rig",
@@ -42,6 +43,9 @@ Floats = NDArray[np.float64]
 
 ANGLE = 3
 """Row of the drive angle, or of the way, after those of the three loads."""
+
+MISS = 1e-8
+"""By how much derivatives of exact states may miss where they only say where to look next."""
 
 _LAST = 1e-13
 """Newton step, as a share of a stretch, below which there is only rounding of its interpolants."""
@@ -116,7 +120,7 @@ def curves_of(order: int) -> Curves:
 def exact_at(scene: Scene, stretch: Stretch, way: float) -> tuple[State, float]:
     """The exact state at a way along a stretch, and the drive angle's derivative by the way, of a stiff suspension."""
     at = place(scene.outline, along(stretch, way))
-    state = exact_state(at, scene.rig.friction_angle, stretch.tip, scene.known, scene.states)
+    state = exact_state(at, scene.rig.friction_angle, stretch.tip, 0.0, scene.known, scene.states)
     return state, angle_rate(at, state) * along_rate(stretch, way)
 
 
@@ -127,7 +131,7 @@ def sample(scene: Scene, stretch: Stretch, exact: bool, curves: Curves) -> None:
     for k in range(on.nodes.size):
         at = place(scene.outline, along(stretch, on.nodes[k]))
         if exact:
-            state = exact_state(at, rig.friction_angle, stretch.tip, scene.known, scene.states)
+            state = exact_state(at, rig.friction_angle, stretch.tip, MISS, scene.known, scene.states)
             values[0, k], values[1, k] = state.holding_moment, state.force_x
             values[2, k], values[ANGLE, k] = state.force_y, state.drive_angle
         else:

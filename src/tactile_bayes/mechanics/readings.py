@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled, inlined
-from tactile_bayes.mechanics.curves import ANGLE, Course, Curves, Rig, Scene, angle_rate, lay_over_angle, left_of
+from tactile_bayes.mechanics.curves import ANGLE, MISS, Course, Curves, Rig, Scene, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
@@ -172,7 +172,7 @@ def write_states(
         for _ in range(100):
             p = along(stretch, way)
             at = place(scene.outline, p)
-            state = exact_state(at, rig.friction_angle, stretch.tip, scene.known, scene.states)
+            state = exact_state(at, rig.friction_angle, stretch.tip, MISS, scene.known, scene.states)
             driven = state.drive_angle + rig.compliance * state.holding_moment
             # But for rounding, which may undo the very first contact.
             turned = 1.0 - left_of(driven, course) if math.isfinite(driven) else 0.0

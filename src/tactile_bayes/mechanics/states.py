@@ -57,9 +57,6 @@ Floats = NDArray[np.float64]
 _BEYOND = 1e-12
 """By how much rounding may turn a chord beyond where the line of force passes through the pivot [rad]."""
 
-_MISS = 1e-8
-"""By how much derivatives of exact states on a path miss, which only say where to look next."""
-
 _NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
 
 
@@ -151,11 +148,11 @@ def _ending(x: float, y: float, alpha: float, delta: float, miss: float, known: 
 
 
 @compiled
-def exact_state(at: Place, delta: float, tip: bool, known: Tables, room: Room) -> State:
-    """A contact of known phase to rounding, its derivatives to 1e-8, in a room prepared for the friction angle."""
+def exact_state(at: Place, delta: float, tip: bool, miss: float, known: Tables, room: Room) -> State:
+    """A contact of known phase to rounding, in a room prepared for the friction angle; derivatives as in `_ending`."""
     alpha = math.atan2(at.sin, at.cos)
     if tip:
-        return _ending(at.x, at.y, alpha, delta, _MISS, known, room)
+        return _ending(at.x, at.y, alpha, delta, miss, known, room)
     length, arc, by_chi = _touch(at.x, at.y, alpha, delta, room)
     return _lying(at.x, at.y, alpha, delta, length, arc, by_chi)
 
