@@ -23,6 +23,8 @@ from tactile_bayes.mechanics.tables import Room, Tables
 __all__ = [
     "ANGLE",
     "MISS",
+    "REST",
+    "WAY",
     "Course",
     "Curves",
     "Rig",
@@ -41,17 +43,18 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-ANGLE = 3
-"""Row of the drive angle, or of the way, after those of the three loads."""
+REST, ANGLE = 3, 4
+"""Rows after those of the three loads: what else tells a state (the arc length of the contact, or where the tip touches
+its slope angle), and the drive angle."""
+
+WAY = 3
+"""Row of the way where loads are laid over the drive angle."""
 
 MISS = 1e-8
 """By how much derivatives of exact states may miss where they only say where to look next."""
 
 _LAST = 1e-13
 """Newton step, as a share of a stretch, below which there is only rounding of its interpolants."""
-
-_STRAINED = 65
-"""Ways along a stretch at which its largest curvature is sought."""
 
 
 class Rig(NamedTuple):
@@ -83,12 +86,13 @@ class Curves(NamedTuple):
 
     on: Nodes
     series: Floats
-    """Of the three loads, the drive angle, and its derivative, over the way, shape (5, order)."""
+    """Over the way: of loads, what else tells a state, the drive angle, and its derivative, shape (6, order)."""
     bend: Floats
     """The second derivative of the drive angle, or the first of the way by it."""
     over_angle: Floats
     """Of the three loads and the way over the stretched drive angle, shape (4, order)."""
     values: Floats
+    """Of the drive angle and what comes before it, at the nodes, shape (5, order)."""
     on_grid: Floats
 
 
@@ -108,11 +112,11 @@ def curves_of(order: int) -> Curves:
     """Room for so many nodes."""
     return Curves(
         on=nodes_of(order),
-        series=np.empty((5, order)),
+        series=np.zeros((6, order)),
         bend=np.empty(order),
         over_angle=np.empty((4, order)),
-        values=np.empty((4, order)),
-        on_grid=np.empty(2 * order + 1),
+        values=np.zeros((5, order)),
+        on_grid=np.empty((5, 2 * order + 1)),
     )
 
 
@@ -134,13 +138,15 @@ def sample(scene: Scene, stretch: Stretch, exact: bool, curves: Curves) -> None:
             state = exact_state(at, rig.friction_angle, stretch.tip, MISS, scene.known, scene.states)
             values[0, k], values[1, k] = state.holding_moment, state.force_x
             values[2, k], values[ANGLE, k] = state.force_y, state.drive_angle
+            values[REST, k] = state.tip_angle if stretch.tip else state.arclength
         else:
             quick = tabled_state(at, rig.friction_angle, stretch.tip, scene.known, scene.states)
             values[0, k], values[1, k] = quick.holding_moment, quick.force_x
             values[2, k], values[ANGLE, k] = quick.force_y, quick.drive_angle
         values[ANGLE, k] += rig.compliance * values[0, k]
-    for c in range(4):
-        weighted(on.fit, values[c], curves.series[c])
+    for c in range(5):
+        if exact or c != REST:
+            weighted(on.fit, values[c], curves.series[c])
 
 
 @compiled
@@ -159,9 +165,10 @@ def first_fall(accuracy: Accuracy, is_first: bool, curves: Curves) -> float:
     """Way to where the drive angle stops growing: above 1 if it grows to the end, 0 if it does not grow at all."""
     on, slope = curves.on, curves.series[ANGLE + 1]
     weighted(on.slopes, curves.series[ANGLE], slope)
-    weighted(on.on_grid, slope, curves.on_grid)
+    on_grid = curves.on_grid[0]
+    weighted(on.on_grid, slope, on_grid)
     for cell in range(1 if is_first else 0, on.grid.size):  # it always grows from first contact
-        if curves.on_grid[cell] <= 0.0:
+        if on_grid[cell] <= 0.0:
             if cell == 0:
                 return 0.0
             weighted(on.slopes, slope, curves.bend)
@@ -206,7 +213,7 @@ def lay_over_angle(accuracy: Accuracy, course: Course, curves: Curves) -> None:
         wanted = course.end - (course.end - course.begin) * ahead * (steadiness + (1.0 - steadiness) * ahead)
         way = crossing(series[ANGLE], series[ANGLE + 1], wanted, course.stop, 0.0, course.stop * on.nodes[k], last_step)
         values[0, k], values[1, k] = value_and_slope(series[0], series[1], way)
-        values[2, k], values[ANGLE, k] = value(series[2], way), way
+        values[2, k], values[WAY, k] = value(series[2], way), way
     for c in range(4):
         weighted(on.fit, values[c], curves.over_angle[c])
 
@@ -220,14 +227,20 @@ def left_of(angle: float, course: Course) -> float:
 
 
 @compiled
-def largest_curvature(stop: float, rig: Rig, series: Floats) -> float:
+def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
     """Largest curvature of the rod up to a way along a stretch: see `tactile_bayes.mechanics.elastica`."""
-    largest = 0.0
-    for k in range(_STRAINED):
-        z = stop * k / (_STRAINED - 1.0)
-        angle, moment = value_and_slope(series[ANGLE], series[0], z)
-        force_x, force_y = value_and_slope(series[1], series[2], z)
-        largest = max(largest, _curvature(angle - rig.compliance * moment, moment, force_x, force_y))
+    at, on, largest = curves.on_grid, curves.on, 0.0
+    for c in range(5):
+        if c != REST:
+            weighted(on.on_grid, curves.series[c], at[c])
+    last = on.grid.size - 1
+    if stop < 1.0:
+        last = int(stop * last) + 1
+        for c in range(5):
+            at[c, last] = value(curves.series[c], stop)
+    for k in range(last + 1):
+        angle = at[ANGLE, k] - rig.compliance * at[0, k]
+        largest = max(largest, _curvature(angle, at[0, k], at[1, k], at[2, k]))
     return largest
 
 

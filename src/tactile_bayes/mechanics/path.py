@@ -35,7 +35,7 @@ from tactile_bayes.mechanics.curves import (
 from tactile_bayes.mechanics.fates import Reach, SnapOff
 from tactile_bayes.mechanics.outline import bearing
 from tactile_bayes.mechanics.reach import limits
-from tactile_bayes.mechanics.readings import Asked, Found, Samples, asked, find_samples, write_loads, write_states
+from tactile_bayes.mechanics.readings import Asked, Found, Samples, asked, find_samples, polish_states, write_loads, write_states
 from tactile_bayes.mechanics.series import value
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 from tactile_bayes.mechanics.tables import MOST_FRICTION
@@ -158,8 +158,11 @@ def _follow_stretch(
     first, count = find_samples(samples, scene.rig.offset, course, room)
     curvature = 0.0
     if found.changes.shape[0] > 0:
-        write_states(samples, first, count, scene, stretch, accuracy, course, curves, room, found)
-        curvature = largest_curvature(stop, scene.rig, curves.series)
+        if accuracy.polished:
+            polish_states(samples, first, count, scene, stretch, accuracy, course, curves, room, found)
+        else:
+            write_states(samples, first, count, scene, stretch, accuracy, course, curves, room, found)
+        curvature = largest_curvature(stop, scene.rig, curves)
     else:
         write_loads(samples, first, count, scene.rig, accuracy, course, curves, room, found.loads)
     fate = _NEVER

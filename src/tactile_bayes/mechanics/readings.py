@@ -9,19 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled, inlined
-from tactile_bayes.mechanics.curves import ANGLE, MISS, Course, Curves, Rig, Scene, angle_rate, lay_over_angle, left_of
+from tactile_bayes.mechanics.curves import ANGLE, MISS, REST, WAY, Course, Curves, Rig, Scene, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
 from tactile_bayes.mechanics.states import exact_state
 from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
 
-__all__ = ["STATE_COLUMNS", "Asked", "Found", "Samples", "asked", "find_samples", "write_loads", "write_states"]
+__all__ = ["STATE_COLUMNS", "Asked", "Found", "Samples", "asked", "find_samples", "polish_states", "write_loads", "write_states"]
 
 Floats = NDArray[np.float64]
 
 STATE_COLUMNS = 13
 """Numbers that are kept of a state: phase, parameter, point, slope angle, and those of `State`."""
+
+_SETTLED = 1e-14
+"""Share of a stretch by which an exact state may miss its drive angle, for the interpolant to make up for it."""
 
 _NEAR = 1e-3
 """Newton step, as a share of the stretch, after which nothing is left to do."""
@@ -58,13 +61,13 @@ class Asked(NamedTuple):
     now: Floats
     before: Floats
     found: Floats
-    """Values of up to three series, shape (3, samples)."""
+    """Values of up to four series, shape (4, samples)."""
 
 
 def asked(samples: int) -> Asked:
     """Room for so many at most."""
     wanted, twice, now, before = np.empty((4, samples))
-    return Asked(wanted, twice, now, before, np.empty((3, samples)))
+    return Asked(wanted, twice, now, before, np.empty((4, samples)))
 
 
 @compiled
@@ -140,7 +143,7 @@ def write_loads(
     """Loads of the samples on a stretch, from the series."""
     _look_for(accuracy, course, count, curves, room)
     sideward = rig.sign * rig.rigidity
-    at_all(curves.series[:ANGLE], room.twice, count, room.now, room.before, room.found)
+    at_all(curves.series[:REST], room.twice, count, room.now, room.before, room.found)
     for j in range(count):
         row = samples.rows[first + j]
         out[row, 0], out[row, 1] = sideward * room.found[0, j], sideward * room.found[1, j]
@@ -160,13 +163,48 @@ def write_states(
     room: Asked,
     out: Found,
 ) -> None:
+    """States of the samples on a stretch from the series, without derivatives."""
+    # Just before the end of contact it matters where the drive angle ends.
+    off = value(curves.series[ANGLE], course.stop) - course.end
+    for j in range(count):
+        room.wanted[j] += off
+    _look_for(accuracy, course, count, curves, room)
+    at_all(curves.series[:ANGLE], room.twice, count, room.now, room.before, room.found)
+    for j in range(count):
+        row = samples.rows[first + j]
+        p = along(stretch, 0.25 * (room.twice[j] + 2.0))
+        at, states = place(scene.outline, p), out.states[row]
+        alpha, rest = math.atan2(at.sin, at.cos), room.found[REST, j]
+        states[0] = TIP if stretch.tip else TANGENTIAL
+        states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
+        states[5] = room.wanted[j] - off - scene.rig.compliance * room.found[0, j]
+        for c in range(3):
+            states[6 + c] = room.found[c, j]
+            out.loads[row, c] = scene.rig.rigidity * (1.0 if c == 2 else scene.rig.sign) * states[6 + c]
+        states[9], states[10] = (1.0, rest) if stretch.tip else (rest, alpha)
+        states[11], states[12] = math.nan, math.nan
+
+
+@compiled
+def polish_states(
+    samples: Samples,
+    first: int,
+    count: int,
+    scene: Scene,
+    stretch: Stretch,
+    accuracy: Accuracy,
+    course: Course,
+    curves: Curves,
+    room: Asked,
+    out: Found,
+) -> None:
     """Exact states at the drive angles of the samples on a stretch, by Newton in the stretched drive angle."""
     stop, steadiness, over_angle, rig = course.stop, course.steadiness, curves.over_angle, scene.rig
     lay_over_angle(accuracy, course, curves)
-    weighted(curves.on.slopes, over_angle[ANGLE], curves.bend)
+    weighted(curves.on.slopes, over_angle[WAY], curves.bend)
     for j in range(count):
         row, target = samples.rows[first + j], 0.25 * (room.twice[j] + 2.0)
-        way, pace = value_and_slope(over_angle[ANGLE], curves.bend, target)
+        way, pace = value_and_slope(over_angle[WAY], curves.bend, target)
         way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle is less again
         low, high, before = 0.0, stop, stop
         for _ in range(100):
@@ -177,7 +215,7 @@ def write_states(
             # But for rounding, which may undo the very first contact.
             turned = 1.0 - left_of(driven, course) if math.isfinite(driven) else 0.0
             missing = target - turned
-            if abs(missing) <= accuracy.settled or not high > low:
+            if abs(missing) <= _SETTLED or not high > low:
                 break
             if missing > 0.0:
                 low = way

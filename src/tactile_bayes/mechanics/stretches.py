@@ -43,8 +43,8 @@ class Accuracy(NamedTuple):
     """Newton step, as a share of the bracket, after which first contact is taken for found."""
     last_step: float
     """The same of what is found on a stretch."""
-    settled: float
-    """Share of a stretch by which an exact state may miss its drive angle, for the interpolant to make up for it."""
+    polished: bool
+    """Whether states at drive angles are solved for, or taken from the series."""
 
 
 class Stretch(NamedTuple):

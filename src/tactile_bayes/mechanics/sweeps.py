@@ -26,10 +26,13 @@ Index = NDArray[np.intp]
 
 _TOUCHES = int(Reach.TOUCHES)
 
-_EXACT = Accuracy(exact=True, resolved=1e-8, sharp=np.inf, halvings=8, first_step=4e-16, last_step=4e-16, settled=1e-14)
+_EXACT = Accuracy(exact=True, resolved=1e-8, sharp=np.inf, halvings=8, first_step=4e-16, last_step=4e-16, polished=True)
 """States and events to rounding."""
 
-_FAST = Accuracy(exact=False, resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, settled=1e-7)
+_SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
+"""Events to rounding, and states from series."""
+
+_FAST = Accuracy(exact=False, resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, polished=True)
 """As well as noise asks."""
 
 _EXACT_ORDER, _FAST_ORDER = 32, 16
@@ -196,7 +199,7 @@ def answered(
     *,
     tolerance: Floats | None = None,
     states: bool = False,
-    settled: float = _EXACT.settled,
+    polished: bool = True,
     asks_clearance: bool = True,
 ) -> Answers:
     """Follow paths, and tell what samples feel.
@@ -213,12 +216,14 @@ def answered(
         to some 1e-8 of the largest.
     states : bool
         Whether states are wanted.
-    settled : float
-        Share of a stretch by which their contacts may be off; loads are as good as they can be.
+    polished : bool
+        Whether they are exact; or else as good as series, 1e-10 of the largest, and without derivatives.
     asks_clearance : bool
         Whether it is asked from which angle on the straight rod is clear.
     """
-    accuracy, order = (_EXACT._replace(settled=settled), _EXACT_ORDER) if tolerance is None else (_FAST, _FAST_ORDER)
+    accuracy, order = _FAST, _FAST_ORDER
+    if tolerance is None:
+        accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     count, rows = shape
     sweeps = lanes.contour.size
     distance, first_angle, first_parameter, snap_angle, snap_parameter, curvature, clear = np.empty((7, sweeps))
