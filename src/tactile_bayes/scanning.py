@@ -17,6 +17,7 @@ from tactile_bayes.contours.base import Contour
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.paths import Paths, States
+from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.record import COLUMNS, make_record
 from tactile_bayes.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.sweep_events import SweepEvents, events_of
@@ -132,7 +133,8 @@ def equilibria(
     wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle_of(friction))
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
     columns = in_world(seen, lane, states, units)
-    reached = columns["contact_phase"] != "none"
+    reached = wrench.phase != NONE
+    columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
     data = {}
     for name, values in columns.items():
         if name == "slope_angle":
@@ -295,7 +297,8 @@ def _sweep(
     lane = np.zeros(angles.size, dtype=np.intp)
     states = paths.states(lane, np.pi - angles if paths.seen.mirrored[0] else angles)
     columns = in_world(paths.seen, lane, states, rod)
-    loaded = columns["contact_phase"] != "none"
+    loaded = states.wrench.phase != NONE
+    columns["contact_phase"] = np.array(PHASE_NAMES)[states.wrench.phase]
     sweep: dict[str, NDArray[np.generic]] = {
         "sweep": np.full(angles.size, number),
         "direction": np.full(angles.size, direction),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.paths import Paths
+from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.world import in_world
 
 __all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
@@ -56,16 +57,11 @@ def sweep_samples(paths: Paths, units: ManyUnits) -> dict[str, NDArray[Any]]:
     dict of str to ndarray, shape (lanes, k)
         `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
     """
-    seen = paths.seen
-    lane, sample, states = paths.loaded_states()
-    found = in_world(seen, lane, states, units.of(lane))
-    out: dict[str, NDArray[Any]] = {}
-    for name in SAMPLE_COLUMNS:
-        out[name] = np.full(paths.sampled.shape[:2], 0.0 if name in LOADS else np.nan)
-        out[name][lane, sample] = found[name]
-    out["contact_phase"] = np.zeros(paths.sampled.shape[:2], dtype=np.int8)
-    out["contact_phase"][lane, sample] = states.wrench.phase
-    return out
+    states, lane = paths.sampled_states(), np.arange(paths.seen.lanes)[:, None]
+    found = in_world(paths.seen, lane, states, units.of(lane))
+    for name in LOADS:
+        found[name][states.wrench.phase == NONE] = 0.0
+    return {name: found[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
 
 
 def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.mechanics.paths import States
-from tactile_bayes.mechanics.phases import PHASE_NAMES
 
 __all__ = ["RodUnits", "in_world"]
 
@@ -34,16 +33,16 @@ def in_world(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> d
     Parameters
     ----------
     seen : SeenContour
-    lane : ndarray, shape (n,)
+    lane : ndarray, broadcastable to shape (...)
     states : States
-        Of shape (n,).
+        Of shape (...).
     rod : RodUnits
         The units of the rod, or of each state's rod.
 
     Returns
     -------
-    dict of str to ndarray, shape (n,)
-        By the names of a record's columns.
+    dict of str to ndarray, shape (...)
+        By the names of a record's columns; phases as numbers.
     """
     mirrored = seen.mirrored[lane]
     sign = np.where(mirrored, -1.0, 1.0)
@@ -61,7 +60,7 @@ def in_world(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> d
         "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
         "force_y": wrench.force_y * rod.force_unit,
         "contact_arclength": wrench.contact_arclength * rod.length_unit,
-        "contact_phase": np.array(PHASE_NAMES)[wrench.phase],
+        "contact_phase": wrench.phase,
         "contact_x": seen.base_x[lane] + sign * x * rod.length_unit,
         "contact_y": seen.base_y[lane] + y * rod.length_unit,
         "tip_angle": turned(wrench.tip_angle),

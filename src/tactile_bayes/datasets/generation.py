@@ -235,13 +235,28 @@ def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
     seen = SeenContour(
         contours.take(lane_of), base_x, base_y, np.tile(lengths, sweeps), np.tile(standoffs, sweeps), backward
     )
-    paths = trace(seen, friction_angle=float(np.arctan(spec.friction)))
+    drive, way = spec.drive, np.linspace(0.0, 1.0, spec.drive.samples)
+    is_relative = drive.begin is None or drive.end is None
+    if drive.begin is None or drive.end is None:
+        as_seen = np.tile((1.0 + 2.0 * drive.margin) * way - drive.margin, (seen.lanes, 1))
+    else:
+        forward = drive.begin + (drive.end - drive.begin) * way
+        as_seen = np.where(backward[:, None], np.pi - forward[::-1], forward)
+    paths = trace(
+        seen,
+        friction_angle=float(np.arctan(spec.friction)),
+        drive_angles=as_seen,
+        relative=is_relative,
+        quickly=True,
+    )
+    if is_relative:
+        as_seen = paths.first_angle[:, None] + as_seen * (paths.snap_angle - paths.first_angle)[:, None]
     fate = paths.reach.reshape(sweeps, -1).max(axis=0)
     with np.errstate(invalid="ignore"):
         clear = paths.is_clear().reshape(sweeps, -1).all(axis=0)
     reasons = np.array([_REASONS[Reach(reach)] for reach in range(len(_REASONS))], dtype=object)[fate]
     why[built] = np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
-    return why, _recorded(spec, paths, why[built] == _GOOD, _units(spec, values, lane_of, built))
+    return why, _recorded(spec, paths, as_seen, why[built] == _GOOD, _units(spec, values, lane_of, built))
 
 
 def _built(family: str, parameters: Mapping[str, Floats], count: int) -> tuple[NDArray[Any], Contour | None]:
@@ -271,18 +286,12 @@ def _units(spec: Specification, values: Mapping[str, Floats], lane_of: Index, bu
     return ManyUnits(length, rigidity / length, rigidity / length**2)
 
 
-def _recorded(spec: Specification, paths: Paths, good: NDArray[np.bool_], units: ManyUnits) -> dict[str, NDArray[Any]]:
-    """What the sweeps of the good contours record, shape (good, sweeps) or (good, sweeps, samples)."""
-    drive, lanes = spec.drive, paths.seen.lanes
-    way = np.linspace(0.0, 1.0, drive.samples)
-    if drive.begin is None or drive.end is None:
-        span = paths.snap_angle - paths.first_angle
-        begin = paths.first_angle - drive.margin * span
-        as_seen = begin[:, None] + ((1.0 + 2.0 * drive.margin) * span)[:, None] * way
-        angles = np.where(paths.seen.mirrored[:, None], np.pi - as_seen, as_seen)
-    else:
-        forward = drive.begin + (drive.end - drive.begin) * way
-        angles = np.where(paths.seen.mirrored[:, None], forward[::-1], forward)
+def _recorded(
+    spec: Specification, paths: Paths, as_seen: Floats, good: NDArray[np.bool_], units: ManyUnits
+) -> dict[str, NDArray[Any]]:
+    """What the sweeps of the good contours record at drive angles as seen in forward sweeps, shape (good, sweeps) or
+    (good, sweeps, samples)."""
+    lanes = paths.seen.lanes
 
     def by_record(values: NDArray[Any]) -> NDArray[Any]:
         return np.moveaxis(values.reshape(len(spec.sweeps), lanes // len(spec.sweeps), *values.shape[1:]), 0, 1)[good]
@@ -297,10 +306,7 @@ def _recorded(spec: Specification, paths: Paths, good: NDArray[np.bool_], units:
     found["snap_off_kind"] = paths.snap_off
     if spec.has_thickness:
         found["largest_strain"] = np.nan_to_num(paths.largest_curvature * paths.seen.standoff / paths.seen.length)
-    as_seen = np.where(paths.seen.mirrored[:, None], np.pi - angles, angles)
-    samples = sweep_samples(
-        trace(paths.seen, friction_angle=paths.friction_angle, drive_angles=as_seen, quickly=True), units
-    )
-    found["drive_angle"] = angles
+    samples = sweep_samples(paths, units)
+    found["drive_angle"] = np.where(paths.seen.mirrored[:, None], np.pi - as_seen, as_seen)
     found |= {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
     return {name: by_record(values) for name, values in found.items()}

@@ -116,7 +116,7 @@ def curves_of(order: int) -> Curves:
         bend=np.empty(order),
         over_angle=np.empty((4, order)),
         values=np.zeros((5, order)),
-        on_grid=np.empty((5, 2 * order + 1)),
+        on_grid=np.empty(2 * order + 1),
     )
 
 
@@ -165,10 +165,9 @@ def first_fall(accuracy: Accuracy, is_first: bool, curves: Curves) -> float:
     """Way to where the drive angle stops growing: above 1 if it grows to the end, 0 if it does not grow at all."""
     on, slope = curves.on, curves.series[ANGLE + 1]
     weighted(on.slopes, curves.series[ANGLE], slope)
-    on_grid = curves.on_grid[0]
-    weighted(on.on_grid, slope, on_grid)
+    weighted(on.on_grid, slope, curves.on_grid)
     for cell in range(1 if is_first else 0, on.grid.size):  # it always grows from first contact
-        if on_grid[cell] <= 0.0:
+        if curves.on_grid[cell] <= 0.0:
             if cell == 0:
                 return 0.0
             weighted(on.slopes, slope, curves.bend)
@@ -228,20 +227,25 @@ def left_of(angle: float, course: Course) -> float:
 
 @compiled
 def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
-    """Largest curvature of the rod up to a way along a stretch: see `tactile_bayes.mechanics.elastica`."""
-    at, on, largest = curves.on_grid, curves.on, 0.0
-    for c in range(5):
-        if c != REST:
-            weighted(on.on_grid, curves.series[c], at[c])
-    last = on.grid.size - 1
-    if stop < 1.0:
-        last = int(stop * last) + 1
-        for c in range(5):
-            at[c, last] = value(curves.series[c], stop)
-    for k in range(last + 1):
-        angle = at[ANGLE, k] - rig.compliance * at[0, k]
-        largest = max(largest, _curvature(angle, at[0, k], at[1, k], at[2, k]))
-    return largest
+    """Largest curvature of the rod up to a way along a stretch, from the values at its nodes: see
+    `tactile_bayes.mechanics.elastica`."""
+    nodes, values, curvature, series = curves.on.nodes, curves.values, curves.bend, curves.series
+    (angle, moment), force_x = value_and_slope(series[ANGLE], series[0], stop), value(series[1], stop)
+    at_stop = _curvature(angle - rig.compliance * moment, moment, force_x, value(series[2], stop))
+    best, count = 0, 0
+    while count < nodes.size and nodes[count] < stop:
+        driven, moment = values[ANGLE, count], values[0, count]
+        curvature[count] = _curvature(driven - rig.compliance * moment, moment, values[1, count], values[2, count])
+        best = count if curvature[count] > curvature[best] else best
+        count += 1
+    if best == 0 or best >= count - 1:
+        return max(at_stop, curvature[best] if count else 0.0)
+    # Between the nodes, as a parabola has it.
+    before, after = nodes[best - 1] - nodes[best], nodes[best + 1] - nodes[best]
+    falls, falls_on = curvature[best - 1] - curvature[best], curvature[best + 1] - curvature[best]
+    bend = (falls_on / after - falls / before) / (after - before)
+    slope = falls / before - bend * before
+    return max(at_stop, curvature[best] - (0.25 * slope * slope / bend if bend < 0.0 else 0.0))
 
 
 @inlined

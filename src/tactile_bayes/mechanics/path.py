@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import inlined
+from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     Course,
@@ -35,7 +35,16 @@ from tactile_bayes.mechanics.curves import (
 from tactile_bayes.mechanics.fates import Reach, SnapOff
 from tactile_bayes.mechanics.outline import bearing
 from tactile_bayes.mechanics.reach import limits
-from tactile_bayes.mechanics.readings import Asked, Found, Samples, asked, find_samples, polish_states, write_loads, write_states
+from tactile_bayes.mechanics.readings import (
+    Asked,
+    Found,
+    Samples,
+    asked,
+    find_samples,
+    polish_states,
+    write_loads,
+    write_states,
+)
 from tactile_bayes.mechanics.series import value
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 from tactile_bayes.mechanics.tables import MOST_FRICTION
@@ -92,15 +101,19 @@ class Work(NamedTuple):
     """Stretches as they are cut."""
     waiting: Floats
     """Stretches still to be followed, the next one last: as in `Stretch`."""
+    followed: Floats
+    """Stretches that are, each as in `Stretch` and `Course`."""
+    curves: Floats
+    """Their series, and the values at nodes, shape (stretches, 11, order)."""
 
 
 class _End(NamedTuple):
-    """What is at the end of a stretch."""
+    """What is at the end of a stretch, and how the drive angle came there."""
 
     fate: int
     """A `SnapOff`, never if the path goes on, or that the series are too rough."""
     parameter: float
-    angle: float
+    course: Course
     curvature: float
 
 
@@ -113,6 +126,8 @@ def work(samples: int, order: int, knots: int) -> Work:
         asked=asked(samples),
         pieces=np.empty((most, 3)),
         waiting=np.empty((most + _MOST_MORE, 6)),
+        followed=np.empty((most + _MOST_MORE, 10)),
+        curves=np.empty((most + _MOST_MORE, 11, order)),
     )
 
 
@@ -126,21 +141,20 @@ def _follow_stretch(
     may_fall: bool,
     is_first: bool,
     at_begin: float,
-    samples: Samples,
+    asks_curvature: bool,
     curves: Curves,
-    room: Asked,
-    found: Found,
 ) -> _End:
-    """Follow one stretch, from the drive angle at its beginning on, with the loads or states of its samples."""
+    """Follow one stretch, from the drive angle at its beginning on."""
+    nowhere = Course(math.nan, at_begin, at_begin, 0.0)
     exact = accuracy.exact or scene.rig.friction_angle > MOST_FRICTION
     sample(scene, stretch, exact, curves)
     if may_be_rough and misses(accuracy, tolerance, curves):
-        return _End(_ROUGH, math.nan, math.nan, math.nan)
+        return _End(_ROUGH, math.nan, nowhere, 0.0)
     stop = first_fall(accuracy, is_first, curves)
     if not may_fall:
         stop = 2.0
     if stop == 0.0:
-        return _End(_CORNER, stretch.begin, at_begin, 0.0)
+        return _End(_CORNER, stretch.begin, nowhere, 0.0)
     folds, stop = stop <= 1.0, min(stop, 1.0)
     if folds and accuracy.exact and scene.rig.compliance == 0.0:
         stop = polished_fold(scene, stretch, stop, curves)
@@ -154,22 +168,12 @@ def _follow_stretch(
     steadiness = 0.0
     if not folds:
         steadiness = min(max(value(curves.series[ANGLE + 1], stop) * stop / (at_end - at_begin), 0.0), 1.0)
-    course = Course(stop, at_begin, at_end, steadiness)
-    first, count = find_samples(samples, scene.rig.offset, course, room)
-    curvature = 0.0
-    if found.changes.shape[0] > 0:
-        if accuracy.polished:
-            polish_states(samples, first, count, scene, stretch, accuracy, course, curves, room, found)
-        else:
-            write_states(samples, first, count, scene, stretch, accuracy, course, curves, room, found)
-        curvature = largest_curvature(stop, scene.rig, curves)
-    else:
-        write_loads(samples, first, count, scene.rig, accuracy, course, curves, room, found.loads)
+    curvature = largest_curvature(stop, scene.rig, curves) if asks_curvature else 0.0
     fate = _NEVER
     if folds:
         # At a flat vertex the maximum and the end of all moment are one, and rounding must not choose between them.
         fate = _THRUST if abs(moment) <= _NO_MOMENT else _FOLD
-    return _End(fate, parameter, at_end, curvature)
+    return _End(fate, parameter, Course(stop, at_begin, at_end, steadiness), curvature)
 
 
 @inlined
@@ -209,7 +213,8 @@ def follow(
         row[4], row[5] = 0.0, row[2]
     first = bearing(outline, limit.begin)
     at_begin, snap_parameter, fate = first, limit.begin, _NEVER
-    changes, largest, stretches, is_first = 0, math.nan, count, True
+    changes, largest, stretches, is_first, done = 0, math.nan, count, True, 0
+    wants_states = found.changes.shape[0] > 0
     while count and fate == _NEVER:
         row = waiting[count - 1]
         stretch = Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
@@ -226,10 +231,8 @@ def follow(
             limit.begin - stretch.end >= BRIEF * whole or count == 1,
             is_first,
             at_begin,
-            samples,
+            wants_states,
             curves,
-            room.asked,
-            found,
         )
         if end.fate == _ROUGH and stretch.brief:
             row[5] = 0.0
@@ -247,17 +250,50 @@ def follow(
         fate = end.fate
         if fate == _CORNER:
             break
-        if found.changes.shape[0] > 0:
+        if wants_states:
             largest = max(end.curvature, 0.0 if math.isnan(largest) else largest)
         if found.changes.shape[0] > changes and (not changes or (found.changes[changes - 1, 1] > 0.0) != stretch.tip):
             found.changes[changes, 0], found.changes[changes, 1] = stretch.begin, stretch.tip
             changes += 1
-        at_begin, snap_parameter, is_first = end.angle, end.parameter, False
+        at_begin, snap_parameter, is_first = end.course.end, end.parameter, False
+        for c in range(6):
+            room.followed[done, c] = row[c]
+        for c in range(4):
+            room.followed[done, 6 + c] = end.course[c]
+        _copy(curves.series, room.curves[done])
+        _copy(curves.values, room.curves[done, 6:])
+        done += 1
     if fate == _NEVER:
         if limit.runs_out:
             return _nothing(_RUNS_OUT, limit.distance)
         fate = _THRUST
+    if samples.relative:
+        for j in range(samples.angles.size):
+            room.asked.angles[j] = first + samples.angles[j] * (at_begin - first) + scene.rig.offset
+        samples = Samples(room.asked.angles[: samples.angles.size], samples.rows, False)
+    for k in range(done):
+        row = room.followed[k]
+        stretch = Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
+        curves = room.brief if stretch.brief else room.full
+        _copy(room.curves[k], curves.series)
+        _copy(room.curves[k, 6:], curves.values)
+        course = Course(row[6], row[7], row[8], row[9])
+        there, many = find_samples(samples, scene.rig.offset, course, room.asked)
+        if not wants_states:
+            write_loads(samples, there, many, scene.rig, accuracy, course, curves, room.asked, found.loads)
+        elif accuracy.polished:
+            polish_states(samples, there, many, scene, stretch, accuracy, course, curves, room.asked, found)
+        else:
+            write_states(samples, there, many, scene, stretch, accuracy, course, curves, room.asked, found)
     return Ends(_TOUCHES, limit.distance, first, limit.begin, at_begin, snap_parameter, fate, changes, largest)
+
+
+@compiled
+def _copy(rows: Floats, out: Floats) -> None:
+    """What both have room for."""
+    for c in range(min(rows.shape[0], out.shape[0])):
+        for k in range(min(rows.shape[1], out.shape[1])):
+            out[c, k] = rows[c, k]
 
 
 @inlined

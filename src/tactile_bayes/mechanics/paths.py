@@ -117,6 +117,10 @@ class Paths:
         lane, sample = np.nonzero(self.sampled[..., 0] != NONE)
         return lane, sample, _as_states(self.sampled[lane, sample])
 
+    def sampled_states(self) -> States:
+        """States at all of these drive angles, shape (lanes, k); NaN and `NONE` out of contact."""
+        return _as_states(self.sampled)
+
     def states_at(self, lane: Index, parameter: Floats) -> States:
         """Exact states at the contour's parameters, whether on the path or beyond its end."""
         locus = self.seen.locate(lane, parameter)
@@ -131,6 +135,7 @@ def trace(
     suspension_compliance: ArrayLike = 0.0,
     tolerance: Floats | None = None,
     drive_angles: Floats | None = None,
+    relative: bool = False,
     quickly: bool = False,
 ) -> Paths:
     """Follow the equilibria of every lane from first contact to snap-off.
@@ -147,6 +152,8 @@ def trace(
         default events are computed to rounding.
     drive_angles : ndarray, shape (k,) or (lanes, k), optional
         At which states are wanted.
+    relative : bool
+        Whether they are shares of the way from first contact to snap-off.
     quickly : bool
         Whether it is enough that states at drive angles are right to 1e-10 of the largest and come without derivatives,
         which takes a third of the time.
@@ -171,7 +178,7 @@ def trace(
         rigidity=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
-    answers = _swept(shapes, lanes, tolerance, angles, states=True, polished=not quickly)
+    answers = _swept(shapes, lanes, tolerance, angles, relative, states=True, polished=not quickly)
     there = np.arange(answers.changes.shape[1]) < answers.phases[:, None]
     most = int(answers.phases.max(initial=0))
     return Paths(
@@ -199,7 +206,14 @@ def _each(values: Any, count: int) -> Floats:
     return np.array(np.broadcast_to(values, (count,)), dtype=float)
 
 
-def _swept(shapes: Shapes, lanes: Lanes, tolerance: Floats | None, drive_angles: Floats, **options: Any) -> Answers:
+def _swept(
+    shapes: Shapes,
+    lanes: Lanes,
+    tolerance: Floats | None,
+    drive_angles: Floats,
+    relative: bool = False,
+    **options: Any,
+) -> Answers:
     """What is found at drive angles, shape (k,) or (lanes, k), as seen in forward sweeps, a stroke for each lane."""
     from tactile_bayes.mechanics.sweeps import Strokes, answered
 
@@ -207,17 +221,17 @@ def _swept(shapes: Shapes, lanes: Lanes, tolerance: Floats | None, drive_angles:
     angles = np.broadcast_to(np.asarray(drive_angles, dtype=float), (count, each))
     order = np.argsort(angles, axis=1, kind="stable")
     increasing = np.take_along_axis(angles, order, axis=1)
-    strokes = Strokes(each * np.arange(count + 1), order.ravel(), increasing.ravel())
+    strokes = Strokes(each * np.arange(count + 1), order.ravel(), increasing.ravel(), relative)
     return answered(shapes, lanes, strokes, (count, each), tolerance=tolerance, **options)
 
 
 def _as_states(columns: Floats) -> States:
     """States from what is kept of them, shape (..., columns); NaN where nothing is."""
-    phase = columns[..., 0].astype(np.int8)
-    there = np.where((phase != NONE)[..., None], columns, np.nan)
-    parameter, x, y, alpha, drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance = (
-        there[..., k] for k in range(1, 13)
-    )
+    side_by_side = np.moveaxis(columns, -1, 0).copy()
+    phase = side_by_side[0].astype(np.int8)
+    side_by_side[:, phase == NONE] = np.nan
+    _, parameter, x, y, alpha, drive_angle, moment, force_x, force_y, *rest = side_by_side
+    arclength, tip_angle, by_slope, by_distance = rest
     lying = np.where(phase == TANGENTIAL, arclength, np.nan)
     wrench = Wrench(drive_angle, moment, force_x, force_y, arclength, tip_angle, phase, by_slope, by_distance, lying)
     return States(parameter, x, y, alpha, wrench)

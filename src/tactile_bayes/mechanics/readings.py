@@ -9,14 +9,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled, inlined
-from tactile_bayes.mechanics.curves import ANGLE, MISS, REST, WAY, Course, Curves, Rig, Scene, angle_rate, lay_over_angle, left_of
+from tactile_bayes.mechanics.curves import (
+    ANGLE,
+    MISS,
+    REST,
+    WAY,
+    Course,
+    Curves,
+    Rig,
+    Scene,
+    angle_rate,
+    lay_over_angle,
+    left_of,
+)
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
 from tactile_bayes.mechanics.states import exact_state
 from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
 
-__all__ = ["STATE_COLUMNS", "Asked", "Found", "Samples", "asked", "find_samples", "polish_states", "write_loads", "write_states"]
+__all__ = [
+    "STATE_COLUMNS",
+    "Asked",
+    "Found",
+    "Samples",
+    "asked",
+    "find_samples",
+    "polish_states",
+    "write_loads",
+    "write_states",
+]
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +59,8 @@ class Samples(NamedTuple):
     """Drive angles, as read and as seen in forward sweeps, increasing."""
     rows: NDArray[np.intp]
     """Where their loads and states go."""
+    relative: bool
+    """Whether angles are shares of the way from first contact to snap-off."""
 
 
 class Found(NamedTuple):
@@ -52,8 +76,10 @@ class Found(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """Room for samples on one stretch."""
+    """Room for samples of a path, and on one stretch."""
 
+    angles: Floats
+    """Drive angles of all, if shares were asked for."""
     wanted: Floats
     """Their drive angles."""
     twice: Floats
@@ -66,8 +92,8 @@ class Asked(NamedTuple):
 
 def asked(samples: int) -> Asked:
     """Room for so many at most."""
-    wanted, twice, now, before = np.empty((4, samples))
-    return Asked(wanted, twice, now, before, np.empty((4, samples)))
+    angles, wanted, twice, now, before = np.empty((5, samples))
+    return Asked(angles, wanted, twice, now, before, np.empty((4, samples)))
 
 
 @compiled

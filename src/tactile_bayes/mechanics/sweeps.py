@@ -83,6 +83,8 @@ class Strokes(NamedTuple):
     """Where what is found of a sample goes."""
     angles: Floats
     """Drive angles, as read and as seen in forward sweeps, increasing in each stroke."""
+    relative: bool = False
+    """Whether they are shares of the way from first contact to snap-off."""
 
 
 class Answers(NamedTuple):
@@ -175,7 +177,7 @@ def _sweep(
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if lanes.backward[i] else shapes.knots[c, count - 1 - k]
         first, last = strokes.first[lanes.stroke[i]], strokes.first[lanes.stroke[i] + 1]
-        samples = Samples(strokes.angles[first:last], strokes.rows[first:last])
+        samples = Samples(strokes.angles[first:last], strokes.rows[first:last], strokes.relative)
         if lanes.friction_angle[i] != prepared:
             prepared = lanes.friction_angle[i]
             prepare(known, prepared, states)

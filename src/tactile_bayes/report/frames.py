@@ -15,7 +15,7 @@ from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.phases import PHASE_NAMES
+from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.record import rod_of
 from tactile_bayes.shape import rod_shape
 from tactile_bayes.sweeps import ManyUnits
@@ -118,7 +118,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
     world = in_world(paths.seen, lane, states, units)
-    loaded = world["contact_phase"] != PHASE_NAMES[0]
+    loaded = states.wrench.phase != NONE
     slope = np.where(loaded, states.wrench.drive_angle, seen_angle)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0)
@@ -132,7 +132,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
         rod_y=paths.seen.base_y[lane][:, None] + y * rod.length_unit,
         contact_x=np.where(loaded, world["contact_x"], np.nan),
         contact_y=np.where(loaded, world["contact_y"], np.nan),
-        phase=world["contact_phase"],
+        phase=np.array(PHASE_NAMES)[states.wrench.phase],
         drive_angle=np.where(mirrored, np.pi - slope, slope),
         cell_angle=angle,
         loads=np.where(loaded[:, None], loads, 0.0),
