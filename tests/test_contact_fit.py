@@ -12,7 +12,7 @@ from scipy.special import ellipkinc
 from tactile_bayes.contact_fit import ContactFit, Reading, fit_contacts, fit_sheet
 from tactile_bayes.mechanics.elastica import contact_from_wrench, tangential_arclength, wrench_from_contact
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.touching import ARCLENGTH, FORCE, PSI1, touching
+from tactile_bayes.mechanics.touching import ARCLENGTH, FORCE, PSI1, touching
 
 NOISES = (0.005, 0.02, 0.06, 0.3)
 """Standard deviations of the forces; of the moment 0.4 times as much."""

@@ -11,7 +11,7 @@ from scipy.special import ellipkinc
 from helpers import integrated_step2
 from tactile_bayes.mechanics.elastica import contact_from_wrench, wrench_from_contact
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.touching import (
+from tactile_bayes.mechanics.touching import (
     ARCLENGTH,
     DRIVE_ANGLE,
     FORCE,

@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, Touching, touching, touching_and_slopes
+from tactile_bayes.mechanics.touching import (
+    ARCLENGTH,
+    DRIVE_ANGLE,
+    FORCE,
+    PSI1,
+    Touching,
+    touching,
+    touching_and_slopes,
+)
 
 __all__ = ["ContactFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet"]
 

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ellipj
 
-from tactile_bayes.arc import arc_to
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 
@@ -62,6 +61,8 @@ def rod_shape(
     >>> x.round(3), y.round(3)
     (array([ 0.   , -0.203, -0.221, -0.042,  0.2  ]), array([0.   , 0.135, 0.375, 0.541, 0.6  ]))
     """
+    from tactile_bayes.mechanics.touches import chords  # numba takes a second to load
+
     if points < 2:
         raise ParameterError(f"points is {points!r}: a rod is drawn with at least 2 points, pivot and tip")
     moment = np.asarray(holding_moment, dtype=float)
@@ -89,8 +90,9 @@ def rod_shape(
     s1, tip_angle = contact.contact_arclength[bent][:, None], contact.tip_angle[bent][:, None]
     left = np.maximum(s1 - s, 0.0)
     chi = ellipj(root * left, m)[3]
-    arc, _ = arc_to(chi.ravel(), np.broadcast_to(m, chi.shape).ravel())
-    shortfall, offset = arc.shortfall.reshape(chi.shape) / root, arc.offset.reshape(chi.shape) / root
+    chord = np.empty((2, chi.size))
+    chords(chi.ravel(), np.broadcast_to(m, chi.shape).ravel(), chord)
+    shortfall, offset = chord.reshape(2, *chi.shape) / root
     # The pivot is the first point, of arc length 0.
     along, across = s - (shortfall[:, :1] - shortfall), offset[:, :1] - offset
     cos, sin = np.cos(tip_angle), np.sin(tip_angle)

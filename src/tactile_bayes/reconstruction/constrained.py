@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.contact_fit import ContactFit, fit_contacts
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.touching import touching, touching_and_slopes
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,
     EITHER_PHASE,
@@ -20,7 +21,6 @@ from tactile_bayes.reconstruction.estimate import (
     unanswered,
 )
 from tactile_bayes.reconstruction.samples import Samples
-from tactile_bayes.touching import touching, touching_and_slopes
 
 __all__ = ["are_weighed", "constrained_estimate", "refuse_without_noise"]
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tactile_bayes.contact_fit import Reading
 from tactile_bayes.mechanics.elastica import Contact, contact_from_wrench
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.touching import place_by_wrench, touching_and_slopes
 from tactile_bayes.reconstruction.estimate import (
     BEYOND_TIP,
     NONLINEAR,
@@ -18,7 +19,6 @@ from tactile_bayes.reconstruction.estimate import (
     unanswered,
 )
 from tactile_bayes.reconstruction.samples import Samples
-from tactile_bayes.touching import place_by_wrench, touching_and_slopes
 
 __all__ = ["raw_contact", "raw_estimate"]
 

@@ -20,8 +20,8 @@ from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.phases import TANGENTIAL
+from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
-from tactile_bayes.touching import PLACE
 from tactile_bayes.world import in_world
 
 __all__ = ["contacts_of", "implied_contacts"]

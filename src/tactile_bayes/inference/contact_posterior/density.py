@@ -12,9 +12,9 @@ from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, touching
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
-from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, touching
 
 __all__ = ["ContactDensity", "ContactPrior", "Evaluated"]
 

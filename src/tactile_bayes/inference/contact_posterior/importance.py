@@ -13,7 +13,7 @@ from tactile_bayes.contact_fit import fit_sheet
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
+from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 
 __all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
 

@@ -1,0 +1,123 @@
+"""The touching rod in coordinates of its own: contact force, direction at the contact, arc length, drive angle.
+
+A forward contact of a uniform rod has, with friction given, four coordinates: the contact force f, ψ1 = φ(s1) − β at
+the contact, the arc length s1 and the drive angle φ0; what the base feels and where the contact is are closed forms in
+them. Not all four are free. In tip contact s1 = 1 and ψ1 > −δ, in tangential contact ψ1 = −δ and s1 < 1: a contact has
+three degrees of freedom, and the two phases are two sheets that meet in the edge s1 = 1, ψ1 = −δ.
+
+Dimensionless, relative to the pivot, forward contacts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ellipj, ellipk
+
+__all__ = [
+    "ARCLENGTH",
+    "DRIVE_ANGLE",
+    "FORCE",
+    "PLACE",
+    "PSI1",
+    "Touching",
+    "TouchingSlopes",
+    "place_by_wrench",
+    "touching",
+    "touching_and_slopes",
+]
+
+Floats = NDArray[np.float64]
+
+FORCE, PSI1, ARCLENGTH, DRIVE_ANGLE = range(4)
+"""The coordinates, in the order in which derivatives by them stand."""
+
+PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
+"""What `Touching.place` holds, by the names of a record's columns."""
+
+
+class Touching(NamedTuple):
+    """Touching rods; NaN where none has these coordinates."""
+
+    loads: Floats
+    """Holding moment and support reaction, shape (3, n)."""
+    place: Floats
+    """Contact point, slope angle of the contour there, and arc length, shape (4, n)."""
+    volume_tip: Floats
+    """|∂(contact_x, contact_y, slope_angle)/∂(force, psi1, drive_angle)|, for s1 = 1, shape (n,)."""
+    volume_tangential: Floats
+    """|∂(contact_x, contact_y, slope_angle)/∂(force, arclength, drive_angle)|, for ψ1 fixed, shape (n,)."""
+
+
+class TouchingSlopes(NamedTuple):
+    """Derivatives by the four coordinates."""
+
+    loads: Floats
+    """Shape (n, 3, 4)."""
+    place: Floats
+    """Shape (n, 4, 4)."""
+
+
+def touching(coordinates: Floats, friction_angle: Floats | float = 0.0) -> Touching:
+    """What the base of touching rods feels, and where they touch.
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (n, 4)
+        Contact force f > 0, ψ1 ∈ (−π/2, π/2), arc length s1 > 0, and slope φ0 at the pivot.
+    friction_angle : ndarray, shape (n,), or float
+        δ = arctan μ [rad].
+
+    Examples
+    --------
+    >>> rod = touching(np.array([[2.0, 0.3, 1.0, 2.0]]))
+    >>> rod.place.round(4).ravel()
+    array([0.1457, 0.9536, 0.8156, 1.    ])
+    """
+    return _touches(coordinates, friction_angle, 0)[0]
+
+
+def touching_and_slopes(coordinates: Floats, friction_angle: Floats | float = 0.0) -> tuple[Touching, TouchingSlopes]:
+    """The same with derivatives by force, ψ1, arc length and drive angle."""
+    return _touches(coordinates, friction_angle, len(coordinates))
+
+
+def _touches(coordinates: Floats, friction_angle: Floats | float, slopes: int) -> tuple[Touching, TouchingSlopes]:
+    from tactile_bayes.mechanics.touches import touches  # numba takes a second to load
+
+    count = len(coordinates)
+    coordinates = np.ascontiguousarray(coordinates, dtype=float)
+    delta = np.array(np.broadcast_to(friction_angle, (count,)), dtype=float)
+    loads, place, volumes = np.empty((3, count)), np.empty((4, count)), np.empty((2, count))
+    by = TouchingSlopes(np.empty((slopes, 3, 4)), np.empty((slopes, 4, 4)))
+    touches(coordinates, _amplitudes(coordinates), delta, loads, place, volumes, *by)
+    return Touching(loads, place, *volumes), by
+
+
+def _amplitudes(coordinates: Floats) -> Floats:
+    """χ at the pivot, shape (n,); NaN where no rod touches so."""
+    force, psi1, arclength, _ = coordinates.T
+    m = np.sin(0.25 * np.pi - 0.5 * psi1) ** 2
+    with np.errstate(invalid="ignore", over="ignore"):
+        load = np.sqrt(force) * arclength
+        possible = (np.abs(psi1) < 0.5 * np.pi) & (load > 0.0) & (arclength > 0.0) & (force < np.inf)
+        # With twice K the line of force passes through the pivot.
+        possible &= load <= 2.0 * ellipk(np.where(possible, m, 0.5))
+    return np.where(possible, ellipj(np.where(possible, load, 1.0), np.where(possible, m, 0.5))[3], np.nan)
+
+
+def place_by_wrench(slopes: TouchingSlopes) -> Floats:
+    """Derivatives of `PLACE` by drive angle and loads, shape (n, 4, 4): the slopes of Step 2, in closed form.
+
+    Examples
+    --------
+    >>> _, slopes = touching_and_slopes(np.array([[2.0, 0.3, 0.9, 2.0]]))
+    >>> place_by_wrench(slopes)[0, 3].round(3)  # of the arc length
+    array([ 0.419,  0.361,  0.416, -0.031])
+    """
+    free = [FORCE, PSI1, ARCLENGTH]
+    by_loads = slopes.place[:, :, free] @ np.linalg.inv(slopes.loads[:, :, free])
+    by_angle = slopes.place[:, :, [DRIVE_ANGLE]] - by_loads @ slopes.loads[:, :, [DRIVE_ANGLE]]
+    return np.concatenate([by_angle, by_loads], axis=-1)
