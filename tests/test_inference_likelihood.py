@@ -315,8 +315,13 @@ def exact_sensed(model, point):
     ("noise", "family", "count"),
     [
         (1.0, "parabola", 30),
-        pytest.param(1.0, "parabola", 1000, marks=pytest.mark.slow),
-        *(pytest.param(0.1, name, 100, marks=pytest.mark.slow) for name in ("parabola", "power-law", "ellipse")),
+        (0.01, "parabola", 30),
+        *(pytest.param(noise, "parabola", 1000, marks=pytest.mark.slow) for noise in (1.0, 0.1, 0.01)),
+        *(
+            pytest.param(noise, name, 100, marks=pytest.mark.slow)
+            for noise in (0.1, 0.01)
+            for name in ("power-law", "ellipse")
+        ),
     ],
 )
 def test_interpolation_is_not_felt_at_the_truth(noise, family, count):

@@ -34,7 +34,7 @@ _UNFELT = 2e-3
 """Error of loads over their noise that 360 samples together do not show: it moves their log-likelihood by less than
 0.05 in 999 of 1000 records."""
 
-_LEAST = 1e-8
+_LEAST = 1e-10
 """Error of loads that is not asked for to be less, over the largest load: tables are no better."""
 
 

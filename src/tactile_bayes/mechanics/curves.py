@@ -151,12 +151,15 @@ def sample(scene: Scene, stretch: Stretch, exact: bool, curves: Curves) -> None:
 
 @compiled
 def misses(accuracy: Accuracy, tolerance: Floats, curves: Curves) -> bool:
-    """Whether the series miss the drive angle, or loads by more than a tolerance."""
+    """Whether the series miss the drive angle, loads by more than a tolerance, or states that are taken from them."""
     angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
     rough = angle > accuracy.resolved * change or angle > accuracy.sharp
     for c in range(3):
         loads = curves.series[c]
         rough |= tail(loads) + angle * change_of(loads) / change > tolerance[c]
+    if not accuracy.polished:
+        for c in range(ANGLE):
+            rough |= tail(curves.series[c]) > accuracy.resolved * max(change_of(curves.series[c]), 1.0)
     return rough
 
 

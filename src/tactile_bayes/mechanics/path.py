@@ -66,6 +66,9 @@ curvature is interpolated, is not smooth in smaller pieces either."""
 _FEWER = 0.65
 """Share of the nodes that usually do where the tip touches."""
 
+_FELT = 15.0
+"""Arc length [L] by which tangential contact may be taken for tip contact, over the tolerated error of loads."""
+
 _NO_MOMENT = 1e-12
 """Holding moment [EI/L] that is none."""
 
@@ -204,7 +207,8 @@ def follow(
     pieces, waiting = room.pieces, room.waiting
     whole, rough = limit.begin - limit.end, room.full
     exact = accuracy.exact or delta > MOST_FRICTION
-    count = cut(outline, limit, knots, delta, accuracy, exact, rough.on, scene.states, rough.values, pieces)
+    miss = _FELT * min(tolerance[0], tolerance[1], tolerance[2])
+    count = cut(outline, limit, knots, delta, accuracy, exact, miss, rough.on, scene.states, rough.values, pieces)
     most = count + _MOST_MORE
     for k in range(count):  # the first one is to be the last, where a stack ends
         row = waiting[count - 1 - k]

@@ -48,8 +48,11 @@ STATE_COLUMNS = 13
 _SETTLED = 1e-14
 """Share of a stretch by which an exact state may miss its drive angle, for the interpolant to make up for it."""
 
-_NEAR = 1e-3
-"""Newton step, as a share of the stretch, after which nothing is left to do."""
+_NEAR, _MOST_STEPS = 1e-5, 6
+"""Newton step, as a share of the stretch, after which nothing is left to do, and how many there are at most."""
+
+_PAST = 1e-6
+"""Share of a stretch by which a step may go past the end."""
 
 
 class Samples(NamedTuple):
@@ -123,8 +126,8 @@ def _before(angles: Floats, angle: float) -> int:
 
 @inlined
 def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, room: Asked) -> None:
-    """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by two steps of Newton's method,
-    from between the nodes of the series, or each by itself where that is not near."""
+    """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by Newton's method from between
+    the nodes of the series, all side by side, or each by itself where that does not come near."""
     wanted, twice, found, stop = room.wanted, room.twice, room.found, course.stop
     nodes, angles = curves.on.nodes, curves.values[ANGLE]
     k, before, after, way_before, way_after = 0, -2.0, -2.0, 0.0, 0.0
@@ -137,14 +140,18 @@ def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, ro
             k += 1
         share = (twice[j] - before) / (after - before) if after > before else 1.0
         twice[j] = 4.0 * (way_before + share * (way_after - way_before)) - 2.0
-    for _ in range(2):
+    for _ in range(_MOST_STEPS):
         at_all(curves.series[ANGLE:], twice, count, room.now, room.before, found)
+        largest = 0.0
         for j in range(count):
             way = 0.25 * (twice[j] + 2.0)
-            most = 0.5 * (stop - way) + _NEAR * _NEAR * stop
+            most = 0.5 * (stop - way) + _PAST * stop
             step = (found[0, j] - wanted[j]) / found[1, j] if found[1, j] > 0.0 else 0.0
             found[2, j] = min(max(step, -most), most)
             twice[j] = 4.0 * min(max(way - found[2, j], 0.0), stop) - 2.0
+            largest = max(largest, abs(found[2, j]))
+        if largest <= _NEAR * stop:
+            return
     for j in range(count):
         if abs(found[2, j]) > _NEAR * stop:
             way = 0.25 * (twice[j] + 2.0)

@@ -89,6 +89,7 @@ def cut(
     delta: float,
     accuracy: Accuracy,
     exact: bool,
+    miss: float,
     on: Nodes,
     room: Room,
     series: Floats,
@@ -102,6 +103,8 @@ def cut(
         Where the contour may not be smooth, decreasing.
     exact : bool
         Whether tables will not do.
+    miss : float
+        By how much, in rod lengths, the arc length of tangential contact may be off at most.
     series : ndarray, shape (3, order)
         Room.
     out : ndarray, shape (most, 3)
@@ -118,7 +121,7 @@ def cut(
         end = limit.end if k == knots.size else min(max(knots[k], limit.end), limit.begin)
         if not begin - end > _NOTHING * whole:
             continue
-        count += _cut_piece(outline, begin, end, whole, delta, accuracy, exact, on, room, series, out[count:])
+        count += _cut_piece(outline, begin, end, whole, delta, accuracy, exact, miss, on, room, series, out[count:])
         begin = end
     return count
 
@@ -132,6 +135,7 @@ def _cut_piece(
     delta: float,
     accuracy: Accuracy,
     exact: bool,
+    miss: float,
     on: Nodes,
     room: Room,
     series: Floats,
@@ -146,7 +150,8 @@ def _cut_piece(
             values[k] = _excess(place(outline, begin + (end - begin) * on.nodes[k]), delta, exact, room)
         weighted(on.fit, values, excess)
         span = begin - end
-        if tail(excess) > accuracy.resolved * change_of(excess) and span > least and span > BRIEF * whole:
+        rough = tail(excess) > min(accuracy.resolved * change_of(excess), miss)
+        if rough and span > least and span > BRIEF * whole:
             end = begin - 0.5 * span
             continue
         weighted(on.slopes, excess, slope)
@@ -177,8 +182,12 @@ def _cut_smooth(
     beyond = value(excess, 0.0) > 0.0
     for k in range(order + 1):
         new = 1.0 if k == order else on.nodes[k]
-        at_new = value(excess, 1.0) if k == order else values[k]
-        if (at_new > 0.0) != beyond:
+        changes = ((value(excess, 1.0) if k == order else values[k]) > 0.0) != beyond
+        if not changes and 0 < k < order - 1:
+            between = _nearest_zero(on.nodes, values, k)
+            if (value(excess, between) > 0.0) != beyond:  # a phase so brief that it lies between two nodes
+                new, changes = between, True
+        if changes:
             left, right = (old, new) if beyond else (new, old)
             change = crossing(excess, slope, 0.0, left, right, 0.5 * (old + new), accuracy.last_step)
             most = min(change - started, 1.0 - change)
@@ -190,6 +199,17 @@ def _cut_smooth(
         old = new
     out[count, 0], out[count, 1], out[count, 2] = begin + span * started, end, beyond
     return count + 1
+
+
+@inlined
+def _nearest_zero(nodes: Floats, values: Floats, k: int) -> float:
+    """Where a parabola through a node and its neighbours is nearest to zero, or the node itself."""
+    before, after = nodes[k - 1] - nodes[k], nodes[k + 1] - nodes[k]
+    rise, rise_on = values[k - 1] - values[k], values[k + 1] - values[k]
+    if not (rise * values[k] > 0.0 and rise_on * values[k] > 0.0):
+        return nodes[k]
+    bend = (rise_on / after - rise / before) / (after - before)
+    return nodes[k] - 0.5 * (rise / before - bend * before) / bend
 
 
 @compiled
