@@ -1,8 +1,8 @@
 """What the base feels along a stretch of a path, as Chebyshev series: of the way, and of the drive angle.
 
-A stretch is smooth, so that a few states tell all of it. A drive angle is looked for in the series of the way; where
-loads are smooth functions of the drive angle as well, that need not be done for every sample: the angle is stretched
-toward the end, where the drive may turn back, so that fewer terms serve.
+A stretch is smooth, so that a few states tell all of it. A drive angle is looked for in the series of the way. Exact
+states at drive angles begin, and end, with series over the drive angle: it is stretched toward the end, where the drive
+may turn back, so that fewer terms serve.
 """
 
 from __future__ import annotations

@@ -205,10 +205,10 @@ def follow(
     if limit.reach != _TOUCHES:
         return _nothing(limit.reach, limit.distance)
     pieces, waiting = room.pieces, room.waiting
-    whole, rough = limit.begin - limit.end, room.full
+    whole, full = limit.begin - limit.end, room.full
     exact = accuracy.exact or delta > MOST_FRICTION
     miss = _FELT * min(tolerance[0], tolerance[1], tolerance[2])
-    count = cut(outline, limit, knots, delta, accuracy, exact, miss, rough.on, scene.states, rough.values, pieces)
+    count = cut(outline, limit, knots, delta, accuracy, exact, miss, full.on, scene.states, full.values, pieces)
     most = count + _MOST_MORE
     for k in range(count):  # the first one is to be the last, where a stack ends
         row = waiting[count - 1 - k]

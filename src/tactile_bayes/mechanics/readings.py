@@ -22,7 +22,7 @@ from tactile_bayes.mechanics.curves import (
     lay_over_angle,
     left_of,
 )
-from tactile_bayes.mechanics.outline import place
+from tactile_bayes.mechanics.outline import Place, place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
 from tactile_bayes.mechanics.states import exact_state
@@ -183,6 +183,16 @@ def write_loads(
         out[row, 2] = rig.rigidity * room.found[2, j]
 
 
+@inlined
+def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> None:
+    """Note phase and place of a state, and the loads that are those of its row."""
+    states = out.states[row]
+    states[0] = TIP if tip else TANGENTIAL
+    states[1], states[2], states[3], states[4] = p, at.x, at.y, math.atan2(at.sin, at.cos)
+    for c in range(3):
+        out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]
+
+
 @compiled
 def write_states(
     samples: Samples,
@@ -207,14 +217,12 @@ def write_states(
         row = samples.rows[first + j]
         p = along(stretch, 0.25 * (room.twice[j] + 2.0))
         at, states = place(scene.outline, p), out.states[row]
-        alpha, rest = math.atan2(at.sin, at.cos), room.found[REST, j]
-        states[0] = TIP if stretch.tip else TANGENTIAL
-        states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
         states[5] = room.wanted[j] - off - scene.rig.compliance * room.found[0, j]
         for c in range(3):
             states[6 + c] = room.found[c, j]
-            out.loads[row, c] = scene.rig.rigidity * (1.0 if c == 2 else scene.rig.sign) * states[6 + c]
-        states[9], states[10] = (1.0, rest) if stretch.tip else (rest, alpha)
+        _note(row, p, at, stretch.tip, scene.rig, out)
+        rest = room.found[REST, j]
+        states[9], states[10] = (1.0, rest) if stretch.tip else (rest, states[4])
         states[11], states[12] = math.nan, math.nan
 
 
@@ -270,10 +278,8 @@ def polish_states(
         # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
         reached = 1.0 - left_of(driven, course)
         states = out.states[row]
-        states[0] = TIP if stretch.tip else TANGENTIAL
-        states[1], states[2], states[3], states[4] = p, at.x, at.y, math.atan2(at.sin, at.cos)
         for c in range(8):
             states[5 + c] = state[c]
         for c in range(3):
             states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
-            out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]
+        _note(row, p, at, stretch.tip, rig, out)

@@ -93,7 +93,7 @@ class Answers(NamedTuple):
     loads: Floats
     """In the world's signs, in EI/L and EI/L² for a rigidity of one, zero out of contact, shape (contours, rows, 3)."""
     states: Floats
-    """Exact states, see `Found`, shape (contours, rows or 0, columns)."""
+    """See `Found`, shape (contours, rows or 0, columns)."""
     changes: Floats
     """See `Found`, shape (lanes, phases or 0, 2)."""
     phases: Index
