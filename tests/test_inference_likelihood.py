@@ -318,8 +318,8 @@ def exact_sensed(model, point):
         (0.01, "parabola", 30),
         *(pytest.param(noise, "parabola", 1000, marks=pytest.mark.slow) for noise in (1.0, 0.1, 0.01)),
         *(
-            pytest.param(noise, name, 100, marks=pytest.mark.slow)
-            for noise in (0.1, 0.01)
+            pytest.param(noise, name, 300, marks=pytest.mark.slow)
+            for noise in (1.0, 0.1, 0.01)
             for name in ("power-law", "ellipse")
         ),
     ],

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from helpers.legendre import equilibrium, tangential_arclength
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.mechanics.curves import DIP
 from tactile_bayes.mechanics.fates import CLEARANCE, Reach, SnapOff
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
@@ -144,6 +145,32 @@ def test_snap_off_is_the_first_maximum(family, options):
     flat = (miss < 0) & np.all(around < paths.snap_angle[lanes] + (0 if options is SCAN else 1e-4), axis=0)
     bad = ~(np.abs(miss) < room) & ~flat
     assert not bad.any(), [(int(i), float(m)) for i, m in zip(lanes[bad], miss[bad], strict=True)]
+
+
+def test_a_shallow_dip_is_passed_over():
+    """Where the radius of curvature vanishes the drive angle falls by some 1e-5 rad, and then rises by up to 1e-2."""
+    rng = np.random.default_rng(0)
+    n = np.linspace(1.75, 1.99, 400)
+    contour = PowerLaw(rng.uniform(0.1, 1.5, 400), n, rng.uniform(0.4, 0.7, 400), rng.normal(0.0, 0.15, 400))
+    seen = seen_from(contour)
+    paths = trace(seen, **SCAN)
+    lanes = np.flatnonzero(paths.reach == Reach.TOUCHES)
+    begin, end = paths.first_parameter[lanes, None], _nearest_parameter(seen, lanes)[:, None]
+    away = np.geomspace(1e-6, 1.0, 300)
+    parameter = np.concatenate([begin * away[::-1], np.zeros_like(begin), end * away], axis=1)
+    angle = paths.states_at(lanes[:, None], parameter).wrench.drive_angle
+    angle = np.where(np.isnan(angle), -9.0, angle)
+    most = np.maximum.accumulate(angle, axis=1)
+    lost = most - angle > DIP
+    last = np.where(lost.any(axis=1), lost.argmax(axis=1), angle.shape[1] - 1)
+    dense = most[np.arange(lanes.size), last]
+    dips = np.array([np.any(np.diff(row[: np.argmax(row[:k])]) < -1e-8) for row, k in zip(angle, last, strict=True)])
+    assert 3 <= dips.sum() < lanes.size
+    # The dense scan misses a corner by up to a step's rise.
+    np.testing.assert_array_less(dense - paths.snap_angle[lanes], 1e-10)
+    np.testing.assert_array_less(paths.snap_angle[lanes] - dense, 5e-3)
+    likely = trace(seen, **LIKELIHOOD)
+    np.testing.assert_allclose(likely.snap_angle[lanes], paths.snap_angle[lanes], rtol=0, atol=5e-5)
 
 
 def _nearest_parameter(seen, lanes):

@@ -22,6 +22,8 @@ from tactile_bayes.mechanics.tables import Room, Tables
 
 __all__ = [
     "ANGLE",
+    "DIP",
+    "LOST",
     "MISS",
     "REST",
     "WAY",
@@ -38,6 +40,7 @@ __all__ = [
     "left_of",
     "misses",
     "polished_fold",
+    "regained",
     "sample",
 ]
 
@@ -52,6 +55,13 @@ WAY = 3
 
 MISS = 1e-8
 """By how much derivatives of exact states may miss where they only say where to look next."""
+
+DIP = 1e-4
+"""By how much the drive angle must fall beyond a maximum for it to be the snap-off [rad]. Over less a rod hardly jumps:
+it is held by the same object at once."""
+
+LOST = -1.0
+"""Way to where contact goes on after a maximum of the drive angle, if it does not."""
 
 _LAST = 1e-13
 """Newton step, as a share of a stretch, below which there is only rounding of its interpolants."""
@@ -176,6 +186,26 @@ def first_fall(accuracy: Accuracy, is_first: bool, curves: Curves) -> float:
             weighted(on.slopes, slope, curves.bend)
             left, right = on.grid[cell - 1], on.grid[cell]
             return crossing(slope, curves.bend, 0.0, left, right, 0.5 * (left + right), accuracy.last_step)
+    return 2.0
+
+
+@compiled
+def regained(stop: float, most: float, curves: Curves) -> float:
+    """Way to where the drive angle exceeds a maximum again, of what comes after a way: above 1 if the stretch ends
+    before, `LOST` if the drive angle falls too far below it."""
+    on, angle = curves.on, curves.series[ANGLE]
+    weighted(on.on_grid, angle, curves.on_grid)
+    below = max(stop, 0.0)
+    for cell in range(on.grid.size):
+        if on.grid[cell] <= stop:
+            continue
+        if curves.on_grid[cell] < most - DIP:
+            return LOST
+        if curves.on_grid[cell] > most:
+            weighted(on.slopes, angle, curves.series[ANGLE + 1])
+            above = on.grid[cell]
+            return crossing(angle, curves.series[ANGLE + 1], most, above, below, 0.5 * (above + below), _LAST)
+        below = on.grid[cell]
     return 2.0
 
 

@@ -4,7 +4,9 @@ A path runs along the contour from first contact (the tip, or a tangent line fro
 the sense of the contour's parameter, until the drive angle has its first maximum: the snap-off. It is cut where the
 phase changes and where the contour's curvature jumps; on each stretch all observables are smooth, and interpolated.
 Stretches are halved until the interpolants are as good as asked for. The first maximum of the drive angle is a fold
-(its derivative vanishes), a corner, or where the line of force comes to pass through the pivot.
+(its derivative vanishes), a corner, or where the line of force comes to pass through the pivot. A maximum after which
+the drive angle falls by less than `curves.DIP` before it rises above it is none: the path goes on where it does, as
+happens where a radius of curvature vanishes.
 
 `follow` is the one program for all: likelihoods take loads from the interpolants, as well as noise asks; where a path
 is wanted exactly, the interpolants say where to look for the state at a drive angle.
@@ -21,6 +23,8 @@ from numpy.typing import NDArray
 from tactile_bayes.mechanics.compiler import compiled, inlined
 from tactile_bayes.mechanics.curves import (
     ANGLE,
+    DIP,
+    LOST,
     Course,
     Curves,
     Scene,
@@ -30,6 +34,7 @@ from tactile_bayes.mechanics.curves import (
     largest_curvature,
     misses,
     polished_fold,
+    regained,
     sample,
 )
 from tactile_bayes.mechanics.fates import Reach, SnapOff
@@ -45,7 +50,7 @@ from tactile_bayes.mechanics.readings import (
     write_loads,
     write_states,
 )
-from tactile_bayes.mechanics.series import value
+from tactile_bayes.mechanics.series import tail, value
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 from tactile_bayes.mechanics.tables import MOST_FRICTION
 
@@ -69,12 +74,14 @@ _FEWER = 0.65
 _FELT = 15.0
 """Arc length [L] by which tangential contact may be taken for tip contact, over the tolerated error of loads."""
 
+_IN_A_DIP = 1e-5
+"""Error of the drive angle beyond a maximum, over the depth from which on it is the snap-off."""
+
 _NO_MOMENT = 1e-12
 """Holding moment [EI/L] that is none."""
 
 _TOUCHES, _RUNS_OUT = int(Reach.TOUCHES), int(Reach.RUNS_OUT)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
-_ROUGH = -1
 
 
 class Ends(NamedTuple):
@@ -114,7 +121,7 @@ class _End(NamedTuple):
     """What is at the end of a stretch, and how the drive angle came there."""
 
     fate: int
-    """A `SnapOff`, never if the path goes on, or that the series are too rough."""
+    """A `SnapOff`, or never if the drive angle grows to the end."""
     parameter: float
     course: Course
     curvature: float
@@ -139,25 +146,18 @@ def _follow_stretch(
     scene: Scene,
     stretch: Stretch,
     accuracy: Accuracy,
-    tolerance: Floats,
-    may_be_rough: bool,
     may_fall: bool,
     is_first: bool,
     at_begin: float,
     asks_curvature: bool,
     curves: Curves,
 ) -> _End:
-    """Follow one stretch, from the drive angle at its beginning on."""
-    nowhere = Course(math.nan, at_begin, at_begin, 0.0)
-    exact = accuracy.exact or scene.rig.friction_angle > MOST_FRICTION
-    sample(scene, stretch, exact, curves)
-    if may_be_rough and misses(accuracy, tolerance, curves):
-        return _End(_ROUGH, math.nan, nowhere, 0.0)
+    """Follow one stretch by its series, from the drive angle at its beginning on."""
     stop = first_fall(accuracy, is_first, curves)
     if not may_fall:
         stop = 2.0
     if stop == 0.0:
-        return _End(_CORNER, stretch.begin, nowhere, 0.0)
+        return _End(_CORNER, stretch.begin, Course(0.0, at_begin, at_begin, 0.0), 0.0)
     folds, stop = stop <= 1.0, min(stop, 1.0)
     if folds and accuracy.exact and scene.rig.compliance == 0.0:
         stop = polished_fold(scene, stretch, stop, curves)
@@ -219,29 +219,22 @@ def follow(
     at_begin, snap_parameter, fate = first, limit.begin, _NEVER
     changes, largest, stretches, is_first, done = 0, math.nan, count, True, 0
     wants_states = found.changes.shape[0] > 0
-    while count and fate == _NEVER:
+    while count:
         row = waiting[count - 1]
         stretch = Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
+        curves = room.brief if stretch.brief else room.full
+        sample(scene, stretch, exact, curves)
         # What is shorter may be lost in rounding.
         halved = stretch.halvings < accuracy.halvings and stretches < most
         halved &= stretch.begin - stretch.end > BRIEF * whole
-        curves = room.brief if stretch.brief else room.full
-        end = _follow_stretch(
-            scene,
-            stretch,
-            accuracy,
-            tolerance,
-            stretch.brief or halved,
-            limit.begin - stretch.end >= BRIEF * whole or count == 1,
-            is_first,
-            at_begin,
-            wants_states,
-            curves,
-        )
-        if end.fate == _ROUGH and stretch.brief:
-            row[5] = 0.0
-            continue
-        if end.fate == _ROUGH:
+        if fate == _NEVER:
+            rough = misses(accuracy, tolerance, curves)
+        else:
+            rough = tail(curves.series[ANGLE]) > _IN_A_DIP * DIP
+        if (stretch.brief or halved) and rough:
+            if stretch.brief:
+                row[5] = 0.0
+                continue
             # Where loads begin like a square root the way does so with its square.
             middle = along(stretch, 0.5)
             above = waiting[count]
@@ -250,23 +243,35 @@ def follow(
             row[0], row[3], row[4] = middle, 0.0, row[4] + 1.0
             count, stretches = count + 1, stretches + 1
             continue
+        onward = LOST
+        if fate == _NEVER:
+            may_fall = limit.begin - stretch.end >= BRIEF * whole or count == 1
+            end = _follow_stretch(scene, stretch, accuracy, may_fall, is_first, at_begin, wants_states, curves)
+            fate, onward = end.fate, end.course.stop
+            if fate != _CORNER:
+                if wants_states:
+                    largest = max(end.curvature, 0.0 if math.isnan(largest) else largest)
+                if found.changes.shape[0] > changes and (
+                    not changes or (found.changes[changes - 1, 1] > 0.0) != stretch.tip
+                ):
+                    found.changes[changes, 0], found.changes[changes, 1] = stretch.begin, stretch.tip
+                    changes += 1
+                at_begin, snap_parameter, is_first = end.course.end, end.parameter, False
+                for c in range(6):
+                    room.followed[done, c] = row[c]
+                for c in range(4):
+                    room.followed[done, 6 + c] = end.course[c]
+                _copy(curves.series, room.curves[done])
+                _copy(curves.values, room.curves[done, 6:])
+                done += 1
         count -= 1
-        fate = end.fate
-        if fate == _CORNER:
-            break
-        if wants_states:
-            largest = max(end.curvature, 0.0 if math.isnan(largest) else largest)
-        if found.changes.shape[0] > changes and (not changes or (found.changes[changes - 1, 1] > 0.0) != stretch.tip):
-            found.changes[changes, 0], found.changes[changes, 1] = stretch.begin, stretch.tip
-            changes += 1
-        at_begin, snap_parameter, is_first = end.course.end, end.parameter, False
-        for c in range(6):
-            room.followed[done, c] = row[c]
-        for c in range(4):
-            room.followed[done, 6 + c] = end.course[c]
-        _copy(curves.series, room.curves[done])
-        _copy(curves.values, room.curves[done, 6:])
-        done += 1
+        if fate != _NEVER:  # a maximum is behind: whether the drive angle exceeds it again
+            onward = regained(onward, at_begin, curves)
+            if onward == LOST or stretches >= most:
+                break
+            if onward <= 1.0:
+                row[0], row[3] = along(stretch, onward), 0.0
+                fate, count, stretches = _NEVER, count + 1, stretches + 1
     if fate == _NEVER:
         if limit.runs_out:
             return _nothing(_RUNS_OUT, limit.distance)
