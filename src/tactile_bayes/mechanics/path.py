@@ -227,10 +227,8 @@ def follow(
         # What is shorter may be lost in rounding.
         halved = stretch.halvings < accuracy.halvings and stretches < most
         halved &= stretch.begin - stretch.end > BRIEF * whole
-        if fate == _NEVER:
-            rough = misses(accuracy, tolerance, curves)
-        else:
-            rough = tail(curves.series[ANGLE]) > _IN_A_DIP * DIP
+        dips = fate != _NEVER
+        rough = tail(curves.series[ANGLE]) > _IN_A_DIP * DIP if dips else misses(accuracy, tolerance, curves)
         if (stretch.brief or halved) and rough:
             if stretch.brief:
                 row[5] = 0.0
