@@ -33,6 +33,10 @@ def lost_walkers(values: Floats) -> int:
     return int(np.count_nonzero(values.max(axis=1) < np.median(values) - _LOST))
 
 
+_WINDOW = 5.0
+"""Autocorrelation times up to which correlations are summed."""
+
+
 class Diagnosis:
     """What the second half of a run says about itself."""
 
@@ -82,10 +86,17 @@ def walker_major(samples: Floats) -> Floats:
 
 
 def autocorrelation_time(samples: Floats) -> Floats:
-    """emcee's τ [steps] of (chain, step, walker, parameter), averaged over chains."""
-    if samples.shape[1] < 2:
-        return np.full(samples.shape[-1], np.nan)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        times = np.array([emcee.autocorr.integrated_time(chain, tol=0) for chain in samples])
+    """emcee's τ [steps] of (chain, step, walker, parameter), averaged over chains.
+
+    Of all walkers at once: `emcee.autocorr.integrated_time` takes them one by one, which is as slow as a short run.
+    """
+    chains, steps, _, parameters = samples.shape
+    if steps < 2:
+        return np.full(parameters, np.nan)
     still = np.all(samples == samples[:, :1], axis=1).any(axis=1)  # (chain, parameter)
-    return np.where(still, np.inf, times).mean(axis=0)
+    times = np.full((chains, parameters), np.inf)
+    for chain, j in zip(*np.nonzero(~still), strict=True):
+        decay = array_stats.autocorr(samples[chain, :, :, j].T).mean(axis=0)
+        sums = 2.0 * np.cumsum(decay) - 1.0
+        times[chain, j] = sums[emcee.autocorr.auto_window(sums, _WINDOW)]
+    return np.asarray(times.mean(axis=0))
