@@ -17,7 +17,7 @@ from tactile_bayes.planning.plan import Plan
 
 CONTOUR = tb.contours.Parabola(a=0.5, q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
-FURTHER = ("friction", "drift", "suspension_compliance")
+FURTHER = ("drift", "suspension_compliance")
 PROBABILITY = 0.9
 PARAMETERS = ("a", "q", "x_c")
 

@@ -236,7 +236,12 @@ def cases(tmp_path):
         "settings": (None, SETTINGS_OR_NONE),
         "progress": (None, PROGRESS),
     }
-    of_contour = {**of_rig, "priors": (None, NO_PRIORS), "nuisances": ([], NONE_NAMED)}
+    of_contour = {
+        **of_rig,
+        "friction": (None, either(nothing, FRICTION)),
+        "priors": (None, NO_PRIORS),
+        "nuisances": ([], NONE_NAMED),
+    }
     place = {"q": (0.5, numbers), "x_c": (0.0, numbers)}
     contours = {
         "Parabola": {"a": (0.5, numbers), **place},

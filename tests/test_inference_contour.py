@@ -360,7 +360,7 @@ def test_ranks_of_the_truth_are_uniform():
         "x_c": stats.uniform(-0.15, 0.3),
         "noise_scale": stats.lognorm(s=0.5),
     }
-    settings = SamplerSettings(ensembles=2, walkers=24, min_ess=200, max_r_hat=1.05)
+    settings = SamplerSettings(ensembles=2, walkers=26, min_ess=200, max_r_hat=1.05)
     ranks = np.empty((100, 4))
     for k, row in enumerate(ranks):
         rng = np.random.default_rng([77, k])

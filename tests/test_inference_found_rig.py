@@ -169,7 +169,7 @@ def test_a_stiffer_rod_that_was_inferred_raises_no_alarm():
     """Its single samples agree with one another once its stiffness is known."""
     read, _ = read_with({"rigidity_scale": 1.05})
     measured = CELL.measure(read, seed=1)
-    settings = tb.SamplerSettings(ensembles=2, walkers=24, max_r_hat=1.1, min_ess=100.0, max_steps=400)
+    settings = tb.SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.1, min_ess=100.0, max_steps=400)
     posterior = tb.infer_contour(measured, load_cell=CELL, seed=1, settings=settings)
     assert tb.reconstruct(measured, method="constrained", load_cell=CELL).attrs["misfit_probability"] < 1e-6
     contacts = contact_points(measured, CELL, posterior)

@@ -101,7 +101,7 @@ def test_what_nuisances_cost_is_what_was_found_independently(nuisances, channels
             assert found == pytest.approx(quoted, rel=0.25)
 
 
-FEW = SamplerSettings(ensembles=2, walkers=24, block_steps=10, max_steps=10)
+FEW = SamplerSettings(ensembles=2, walkers=26, block_steps=10, max_steps=10)
 """Enough for names and units."""
 
 
@@ -414,6 +414,7 @@ def test_what_is_standard_is_inferred_and_has_units():
         "lever_x": "m",
         "lever_y": "m",
         "backlash": "rad",
+        "friction": "1",
         "noise_scale": "1",
     }
     assert result["prior"]["lever_y"].std() == pytest.approx(0.005 * SI.length, rel=0.1)
@@ -435,7 +436,7 @@ def test_a_lever_and_a_backlash_are_found_beside_all_that_is_standard():
     """Within 4.5 standard deviations; half a millimetre and a fifth of a degree, on a rod of 200 mm."""
     flaws = {"lever_x": 0.0025, "lever_y": 0.0025, "backlash": float(np.radians(0.2))}
     cell = replace(CELL, lever=(0.0025, 0.0025), drive_angle_backlash=flaws["backlash"])
-    settings = SamplerSettings(ensembles=2, walkers=24, min_ess=160.0, max_r_hat=1.06)
+    settings = SamplerSettings(ensembles=2, walkers=26, min_ess=160.0, max_r_hat=1.06)
     result = infer_contour(cell.measure(scanned(2.0), seed=1), load_cell=CELL, seed=1, settings=settings)
     assert result.attrs["converged"], result.attrs["message"]
     draws = result["posterior"].to_dataset()
@@ -501,5 +502,11 @@ def test_a_backlash_takes_two_directions(direction):
 
 
 def test_friction_is_either_known_or_inferred():
+    measured = coarse()
+    assert "friction" in default_priors(measured, load_cell=CELL)
+    for known in (0.0, 0.2):
+        result = infer_contour(CELL.measure(measured, seed=1), friction=known, seed=1, settings=FEW)
+        assert "friction" not in result["posterior"].data_vars
+        assert result.attrs["friction"] == known
     with pytest.raises(ParameterError, match=r"friction is 0.2 and to be inferred as well"):
         infer_contour(CELL.measure(coarse(), seed=1), nuisances=["friction"], friction=0.2, seed=1)

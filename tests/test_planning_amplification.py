@@ -72,7 +72,7 @@ def loaded(plan):
 
 
 def reconstructed(record, plan, method):
-    found = tb.reconstruct(record, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.friction)
+    found = tb.reconstruct(record, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction)
     return found.contact_x.values, found.contact_y.values
 
 

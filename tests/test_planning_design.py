@@ -24,7 +24,7 @@ from tactile_bayes.scanning import scan
 
 PRIORS = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
-QUICK = SamplerSettings(ensembles=2, walkers=24, max_r_hat=1.05, min_ess=200.0, max_steps=400)
+QUICK = SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.05, min_ess=200.0, max_steps=400)
 STEP = float(np.radians(4.0))
 
 

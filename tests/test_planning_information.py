@@ -285,7 +285,7 @@ def test_a_rod_in_si_tells_the_same():
     plan = Plan(Parabola(2.5, 0.1), cell, rod, drive_angles=BETWEEN)
     si, plain = information(plan), told(Plan(PROFILE, CELL, drive_angles=BETWEEN))
     zeros, levers = [rod.moment_unit, rod.force_unit, rod.force_unit], [0.2, 0.2]
-    units = np.array([5.0, 0.2, 0.2, 1.0, 1.0, *zeros, *levers, 1.0, 1.0])
+    units = np.array([5.0, 0.2, 0.2, 1.0, 1.0, *zeros, *levers, 1.0, 1.0, 1.0])
     assert list(si.parameter.values) == list(plain.parameter.values)
     for name in ("value", "bound", "bound_with_priors", "bound_if_rest_known"):
         np.testing.assert_allclose(si[name].values, units * plain[name].values, rtol=1e-5, err_msg=name)

@@ -38,7 +38,7 @@ def test_of_a_good_result_all_is_well():
 
 def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     measured = CELL.measure(scan(paper_profile("IV", q=0.5), drive_step=0.1).record, seed=1)
-    short = SamplerSettings(ensembles=2, walkers=24, max_steps=40)
+    short = SamplerSettings(ensembles=2, walkers=26, max_steps=40)
     found = verdicts(infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=short))
     assert re.match(
         "The family parabola and the rig as assumed do not describe the record: none of [0-9]+ records that the "

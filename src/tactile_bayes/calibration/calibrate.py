@@ -53,7 +53,7 @@ def calibrate(
     drive_angles: ArrayLike | None = None,
     priors: Mapping[str, Prior] | None = None,
     nuisances: Sequence[str] = STANDARD,
-    friction: float = 0.0,
+    friction: float | None = None,
     events: bool = True,
     settings: SamplerSettings | None = None,
     probability: float = 0.9,
@@ -240,7 +240,7 @@ def experiment_of(
     drive_angles: ArrayLike | None = None,
     priors: Mapping[str, Prior] | None = None,
     nuisances: Sequence[str] = STANDARD,
-    friction: float = 0.0,
+    friction: float | None = None,
     events: bool = True,
     settings: SamplerSettings | None = None,
     probability: float = 0.9,
@@ -266,7 +266,7 @@ def experiment_of(
         raise ParameterError(f"base is {base!r}: give (x, y), or a list of such pairs")
     if isinstance(nuisances, str):
         raise ParameterError(f"nuisances is {nuisances!r}: give a list of names, like [{nuisances!r}]")
-    for name, value in {"probability": probability, "friction": friction}.items():
+    for name, value in {"probability": probability, "friction": 0.0 if friction is None else friction}.items():
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
             raise ParameterError(f"{name} is {value!r}: give a number")
     check_seed(seed)
@@ -279,7 +279,7 @@ def experiment_of(
         directions=directions[direction],
         priors=dict(priors or {}),
         nuisances=tuple(nuisances),
-        friction=float(friction),
+        friction=None if friction is None else float(friction),
         events=bool(events),
         settings=settings or _SETTINGS,
         probability=float(probability),

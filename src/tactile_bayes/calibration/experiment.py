@@ -46,7 +46,7 @@ class Experiment:
     directions: tuple[str, ...] = ("forward", "backward")
     priors: Mapping[str, Prior] = field(default_factory=dict)
     nuisances: tuple[str, ...] = STANDARD
-    friction: float = 0.0
+    friction: float | None = None
     events: bool = True
     settings: SamplerSettings = field(default_factory=SamplerSettings)
     again: SamplerSettings | None = None

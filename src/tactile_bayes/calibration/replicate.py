@@ -297,7 +297,10 @@ def _checks(tree: xr.DataTree, simulation: Simulation, experiment: Experiment) -
         return numbers
     try:
         contacts = reconstruct(
-            simulation.measured, method="constrained", load_cell=experiment.load_cell, friction=experiment.friction
+            simulation.measured,
+            method="constrained",
+            load_cell=experiment.load_cell,
+            friction=experiment.friction or 0.0,
         )
     except TactileBayesError:  # a channel without noise
         return numbers

@@ -11,7 +11,7 @@ from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
     AsStated,
-    Friction,
+    KnownFriction,
     Nuisances,
     Out,
     Quiet,
@@ -48,7 +48,7 @@ def calibrate(
     diameter: Diameter = 0.0,
     base: Bases = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 2.0,
-    friction: Friction = 0.0,
+    friction: KnownFriction = None,
     nuisance: Nuisances = None,
     as_stated: AsStated = False,
     world: Annotated[

@@ -13,7 +13,7 @@ from tactile_bayes.cli.record_options import (
     Diameter,
     FlexuralRigidity,
     ForceNoise,
-    Friction,
+    KnownFriction,
     Length,
     LoadCellFrame,
     Missing,
@@ -59,7 +59,7 @@ def compare(
     moment_noise: MomentNoise = None,
     missing: Missing = None,
     load_cell_frame: LoadCellFrame = None,
-    friction: Friction = 0.0,
+    friction: KnownFriction = None,
     nuisance: Nuisances = None,
     as_stated: AsStated = False,
     leave_one_out: Annotated[

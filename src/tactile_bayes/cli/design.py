@@ -12,7 +12,7 @@ from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
     AsStated,
-    Friction,
+    KnownFriction,
     Nuisances,
     Out,
     Quiet,
@@ -73,7 +73,7 @@ def design(
     length: Annotated[float | None, typer.Option(help="Likewise the rod's length [m].")] = None,
     flexural_rigidity: FlexuralRigidity = None,
     diameter: Diameter = 0.0,
-    friction: Friction = 0.0,
+    friction: KnownFriction = None,
     nuisance: Nuisances = None,
     as_stated: AsStated = False,
     workers: Workers = None,

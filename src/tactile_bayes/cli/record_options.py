@@ -22,6 +22,7 @@ __all__ = [
     "FlexuralRigidity",
     "ForceNoise",
     "Friction",
+    "KnownFriction",
     "Length",
     "LoadCellFrame",
     "Measurement",
@@ -70,11 +71,15 @@ LoadCellFrame = Annotated[
     typer.Option(help="Axes of the forces, if the file does not say: the world's, or turning with the drive."),
 ]
 Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)]
+KnownFriction = Annotated[
+    float | None,
+    typer.Option(help="Coulomb's coefficient, where it is known; else it is inferred.", min=0.0, max=0.84),
+]
 Nuisances = Annotated[
     list[str] | None,
     typer.Option(
         help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset, bias, "
-        "lever and backlash: one of these, or drift, gain, friction, suspension_compliance, base (where further pivots "
+        "lever, backlash and friction: one of these, or drift, gain, suspension_compliance, base (where further pivots "
         "stand); give it again for another."
     ),
 ]

@@ -12,7 +12,7 @@ from tactile_bayes.cli.interrupts import going_on
 from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
 from tactile_bayes.cli.record_options import (
     AsStated,
-    Friction,
+    KnownFriction,
     Nuisances,
     Out,
     Quiet,
@@ -55,7 +55,7 @@ def sensitivity(
     diameter: Diameter = 0.0,
     base: Bases = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 1.0,
-    friction: Friction = 0.0,
+    friction: KnownFriction = None,
     nuisance: Nuisances = None,
     as_stated: AsStated = False,
     band_width: Annotated[

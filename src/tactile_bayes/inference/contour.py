@@ -52,7 +52,7 @@ def infer_contour(
     priors: Mapping[str, Prior] | None = None,
     seed: Seed,
     rod: Rod | None = None,
-    friction: float = 0.0,
+    friction: float | None = None,
     nuisances: Sequence[str] = STANDARD,
     events: bool = True,
     settings: SamplerSettings | None = None,
@@ -85,20 +85,21 @@ def infer_contour(
         The same seed, the same draws.
     rod : Rod, optional
         In place of the rod that an SI record states.
-    friction : float
-        Coulomb's coefficient μ, taken as known unless it is among the nuisances.
+    friction : float, optional
+        Coulomb's coefficient μ where it is known; by default it is among the nuisances, and there is none if they are
+        others.
     nuisances : sequence of str
         What is not known of the rig, and inferred beside the contour: "rigidity_scale" (flexural rigidity over that
         stated), "drive_angle_offset" (what the encoder reads too much [rad]), "bias" (of all channels, or
         "moment_bias", "force_x_bias", "force_y_bias"), "lever" (where the cell takes its moment, from the pivot along
         its axes, or "lever_x", "lever_y"), "backlash" (what the encoder reads more in forward than in backward motion
         [rad]), "drift" (of all, or "moment_drift" and so on: by how much a zero moves evenly from the first sample to
-        the last; a bias is that in the middle), "gain" (likewise), "friction" (Coulomb's coefficient; a fifth
-        slower), "suspension_compliance" (turn of the pivot per holding moment). By default the first five, but no lever
-        of a record without the moment, and no backlash of one in a single direction, which cannot tell them; an empty
-        list takes all as stated. "base": how much the second and further pivots of a record are off, as "base_2_x",
-        "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred, since a shift of pivots and object
-        together changes nothing that is measured: results are relative to it.
+        the last; a bias is that in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
+        "suspension_compliance" (turn of the pivot per holding moment). By default the first five and friction, but no
+        lever of a record without the moment, no backlash of one in a single direction, which cannot tell them, and no
+        friction that is given; an empty list takes all as stated. "base": how much the second and further pivots of a
+        record are off, as "base_2_x", "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred,
+        since a shift of pivots and object together changes nothing that is measured: results are relative to it.
     events : bool
         Whether the samples without load count, which tell where contact begins and ends. Without them only those count
         whose load noise does not explain: what a method knows that looks at contacts alone.

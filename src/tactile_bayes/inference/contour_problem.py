@@ -81,7 +81,7 @@ def contour_problem(
     load_cell: LoadCell | None,
     priors: Mapping[str, Prior] | None,
     rod: Rod | None,
-    friction: float,
+    friction: float | None,
     nuisances: Sequence[str],
     events: bool,
 ) -> ContourProblem:
@@ -123,7 +123,7 @@ def _contour_problem(
     load_cell: LoadCell | None,
     priors: Mapping[str, Prior] | None,
     rod: Rod | None,
-    friction: float,
+    friction: float | None,
     nuisances: Sequence[str],
     events: bool,
 ) -> ContourProblem:
@@ -157,7 +157,7 @@ def _contour_problem(
     about = {
         "data_sha256": data_sha256,
         "family": family,
-        "friction": friction,
+        "friction": rig.friction,
         "nuisances": json.dumps(rig.names),
         "events": int(events),
         "priors": json.dumps({name: prior_in_words(prior) for name, prior in chosen_priors.items()}),
@@ -188,7 +188,7 @@ def default_priors(
     """
     measured = validate(measured)
     noise = noise_of(measured, load_cell)
-    rig = nuisances_of(measured, nuisances, {}, noise.cell, friction=0.0)
+    rig = nuisances_of(measured, nuisances, {}, noise.cell, friction=None)
     return {**contour_priors(measured, family_named(family)), **rig.priors, **noise.priors}
 
 

@@ -25,7 +25,7 @@ __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_o
 
 Floats = NDArray[np.float64]
 
-STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash")
+STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
 """What is inferred unless something else is asked for, as far as the record can tell it."""
 
 MAY_VANISH = ("friction", "suspension_compliance")
@@ -174,12 +174,12 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
 
 
 def nuisances_of(
-    measured: xr.Dataset, chosen: Sequence[str], priors: Mapping[str, Prior], cell: LoadCell, friction: float
+    measured: xr.Dataset, chosen: Sequence[str], priors: Mapping[str, Prior], cell: LoadCell, friction: float | None
 ) -> Nuisances:
     """Nuisance parameters that are asked for by name, or by having a prior; with default priors for the others.
 
     A bias that the load cell states an uncertainty of is not among them: the likelihood integrates it out already. Of
-    those that are `STANDARD` the ones that the record cannot tell are left out.
+    those that are `STANDARD` the ones that the record cannot tell are left out, and friction where it is known.
 
     Raises
     ------
@@ -189,7 +189,8 @@ def nuisances_of(
     chosen = check_names("nuisances", chosen)
     untold = _untold(measured)
     if tuple(chosen) == STANDARD:
-        chosen = [name for name in chosen if name not in untold]
+        known = set() if friction is None else {"friction"}
+        chosen = [name for name in chosen if name not in untold.keys() | known]
     present = [_SHORT[name] for name in present_channels(measured)]
     uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
     names: list[str] = []
@@ -216,6 +217,7 @@ def nuisances_of(
             names.append(member)
     names = list(dict.fromkeys(names))
     most = _KINDS["friction"].high
+    friction = 0.0 if friction is None else friction
     check_number("friction", friction, f"give a coefficient from 0 to {most:.2f}", least=0.0, most=most)
     if "friction" in names and friction:
         raise ParameterError(f"friction is {friction!r} and to be inferred as well: leave one of the two")

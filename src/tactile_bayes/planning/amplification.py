@@ -92,7 +92,7 @@ def amplification(plan: Plan) -> xr.Dataset:
     record, rod = refined.scan.record, plan.taken_rod
     loaded = np.flatnonzero(record.truth_contact_phase.values != "none")
     chosen = record.isel(sample=loaded)
-    contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.friction))
+    contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.taken_friction))
     of_angle = plan.cell.drive_angle_deviation
     gains = (_raw(contacts, delta), _constrained(contacts, delta, of_angle))
     both = [_along_and_across(contacts, gain, 0.5 * rod.diameter / rod.length) for gain in gains]
@@ -137,7 +137,7 @@ def amplification(plan: Plan) -> xr.Dataset:
 
 def _holds(plan: Plan, method: Method) -> NDArray[np.bool_]:
     """Which samples `reconstruct` finds no fault with."""
-    answer = reconstruct(plan.record, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.friction)
+    answer = reconstruct(plan.record, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction)
     return np.asarray(answer.status.values == "ok")
 
 
@@ -171,7 +171,7 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: NDArray[np.intp]) -> _Forwa
     slope = side * record.truth_slope_angle.values
     tip_angle = np.where(side < 0.0, np.pi - record.truth_tip_angle.values, record.truth_tip_angle.values)
     tip = record.truth_contact_phase.values == "tip"
-    delta = float(np.arctan(plan.friction))
+    delta = float(np.arctan(plan.taken_friction))
     coordinates = np.stack(
         [
             np.hypot(loads[:, 1], loads[:, 2]),

@@ -51,7 +51,7 @@ def design(
     probability: float = 0.95,
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
-    friction: float = 0.0,
+    friction: float | None = None,
     nuisances: Sequence[str] = STANDARD,
     priors: Mapping[str, Prior] | None = None,
     out: str | os.PathLike[str] | None = None,

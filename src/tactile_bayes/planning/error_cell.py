@@ -132,7 +132,7 @@ def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
         unanswered, every = 0, 0
         sizes: list[Floats] = []
         for one in measured:
-            found = reconstruct(one, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.friction)
+            found = reconstruct(one, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction)
             x = found.contact_x.values[loaded] - record.truth_contact_x.values[loaded]
             y = found.contact_y.values[loaded] - record.truth_contact_y.values[loaded]
             ok = found.status.values[loaded] == "ok"

@@ -55,7 +55,7 @@ def error_map(
     rod: Rod | None = None,
     base_x: float = 0.0,
     drive_step: float = float(np.radians(2.0)),
-    friction: float = 0.0,
+    friction: float | None = None,
     nuisances: Sequence[str] = STANDARD,
     priors: Mapping[str, Prior] | None = None,
     replicates: int = 20,
@@ -82,8 +82,10 @@ def error_map(
         On the noise of the load cell.
     load_cell : LoadCell, optional
         By default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
-    rod, drive_step, friction
+    rod, drive_step
         As in `scan`; every cell is a forward and a backward sweep.
+    friction : float, optional
+        Where it is known; without there is none, to be found out.
     base_x : float
         Where the pivot is sideways [length].
     nuisances, priors

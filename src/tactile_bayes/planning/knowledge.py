@@ -57,7 +57,7 @@ class Knowledge:
     bases: tuple[Base, ...]
     rod: Rod | None
     load_cell: LoadCell
-    friction: float
+    friction: float | None
     nuisances: tuple[str, ...]
     priors: Mapping[str, Prior]
 
@@ -86,7 +86,7 @@ def known_from_prior(
     rng: np.random.Generator,
     load_cell: LoadCell | None,
     rod: Rod | None,
-    friction: float,
+    friction: float | None,
     nuisances: Sequence[str],
     priors: Mapping[str, Prior] | None,
     base: Base,

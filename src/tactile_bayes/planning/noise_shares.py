@@ -172,7 +172,9 @@ def _errors(quiet: xr.Dataset, plan: Plan, method: Method, noise: dict[str, Floa
     values: dict[str, Any] = {}
     for name, drawn in noise.items():
         values[name] = ("sample", many[name].values + np.tile(drawn, samples), many[name].attrs)
-    found = reconstruct(many.assign(values), method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.friction)
+    found = reconstruct(
+        many.assign(values), method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction
+    )
     slope = many.truth_slope_angle.values
     x, y = (found[name].values - many[f"truth_{name}"].values for name in ("contact_x", "contact_y"))
     cos, sin = np.cos(slope), np.sin(slope)

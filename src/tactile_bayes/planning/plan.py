@@ -42,10 +42,11 @@ class Plan:
         In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
     rod : Rod, optional
         By default the dimensionless rod.
-    base, direction, drive_step, drive_angles, friction
+    base, direction, drive_step, drive_angles
         As in `scan`.
-    nuisances, priors
-        As in `infer_contour`; priors of the contour's parameters may be given, too.
+    friction, nuisances, priors
+        As in `infer_contour`: a friction that is given is known, and without there is none, to be found out. Priors of
+        the contour's parameters may be given, too.
 
     Raises
     ------
@@ -60,7 +61,7 @@ class Plan:
     direction: Literal["both", "forward", "backward"] = "both"
     drive_step: float = float(np.radians(1.0))
     drive_angles: ArrayLike | None = None
-    friction: float = 0.0
+    friction: float | None = None
     nuisances: Sequence[str] = STANDARD
     priors: Mapping[str, Prior] = field(default_factory=dict)
 
@@ -83,6 +84,10 @@ class Plan:
     def taken_rod(self) -> Rod:
         return self.rod or Rod()
 
+    @property
+    def taken_friction(self) -> float:
+        return self.friction or 0.0
+
     @cached_property
     def cell(self) -> LoadCell:
         return self.load_cell or usual_load_cell(self.taken_rod)
@@ -97,7 +102,7 @@ class Plan:
             drive_step=self.drive_step,
             drive_angles=self.drive_angles,
             rod=self.rod,
-            friction=self.friction,
+            friction=self.taken_friction,
         )
 
     @cached_property

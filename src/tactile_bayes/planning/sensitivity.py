@@ -43,7 +43,7 @@ def sensitivity(
     direction: Literal["both", "forward", "backward"] = "both",
     drive_step: float = float(np.radians(1.0)),
     drive_angles: ArrayLike | None = None,
-    friction: float = 0.0,
+    friction: float | None = None,
     nuisances: Sequence[str] = STANDARD,
     priors: Mapping[str, Prior] | None = None,
     band_widths: Sequence[float] | None = None,
@@ -63,10 +63,10 @@ def sensitivity(
         Of the noise by which Sobol' indices are estimated.
     load_cell : LoadCell, optional
         In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
-    rod, base, direction, drive_step, drive_angles, friction
+    rod, base, direction, drive_step, drive_angles
         As in `scan`.
-    nuisances, priors
-        As in `infer_contour`.
+    friction, nuisances, priors
+        As in `infer_contour`: a friction that is given is known, and without there is none, to be found out.
     band_widths : sequence of float, optional
         Mean widths of bands for which the noise is sought [length]; by default 0.0005 to 0.01 rod lengths.
     probability : float

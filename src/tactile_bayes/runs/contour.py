@@ -103,7 +103,7 @@ def analyse(
     family: str = "parabola",
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
-    friction: float = 0.0,
+    friction: float | None = None,
     nuisances: Sequence[str] = STANDARD,
     probability: float = 0.95,
     seed: int = 1,
@@ -210,7 +210,7 @@ def analyse(
 
     write_summary()
     before = len(left_out)
-    files |= _draw(measured, result, contacts, band, edges, folder, left_out, truth=truth, friction=friction)
+    files |= _draw(measured, result, contacts, band, edges, folder, left_out, truth=truth)
     if len(left_out) > before:
         write_summary()
     return Run(result, contacts, band, numbers, (*found, *left_out.words), files, left_out)
@@ -343,7 +343,6 @@ def _draw(
     left_out: _LeftOut,
     *,
     truth: Contour | None,
-    friction: float,
 ) -> dict[str, Path]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -370,7 +369,7 @@ def _draw(
             direction="both" if len(directions) == 2 else directions[0],
             base=base,
             rod=rod_of(measured),
-            friction=friction,
+            friction=float(draws.isel(best).get("friction", result.attrs["friction"])),
         )
 
     def observables() -> Any:

@@ -155,7 +155,7 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
         if score < -AXIAL_ALARM:
             against.append(
                 f"In tangential contact the force along the rod is too small by {-score:.0f} standard errors, as "
-                "friction makes it: give --friction, or have infer find it (--nuisance friction)."
+                "friction makes it: give --friction, or have infer find it."
             )
         elif score > AXIAL_ALARM:
             against.append(

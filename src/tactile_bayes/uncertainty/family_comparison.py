@@ -71,7 +71,7 @@ def compare_families(
     priors: Mapping[str, Mapping[str, Prior]] | None = None,
     seed: Seed,
     rod: Rod | None = None,
-    friction: float = 0.0,
+    friction: float | None = None,
     nuisances: Sequence[str] = STANDARD,
     leave_one_out: bool = True,
     false_alarm: float = 1e-3,
