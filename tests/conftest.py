@@ -68,7 +68,7 @@ def quick(monkeypatch):
     infer = run.infer_contour
 
     def infer_quickly(*arguments, settings=None, **options):
-        return infer(*arguments, settings=replace(QUICK, walkers=26), **options)  # enough for all that is standard
+        return infer(*arguments, settings=replace(QUICK, walkers=28), **options)  # enough for all that is standard
 
     monkeypatch.setattr(run, "infer_contour", infer_quickly)
     monkeypatch.setattr(run, "_draw", lambda *arguments, **options: {})
