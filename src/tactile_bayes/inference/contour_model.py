@@ -13,8 +13,8 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import DriftWarning, ReachError
 from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import Logarithms
-from tactile_bayes.inference.families import Family, Prior
+from tactile_bayes.inference.ensembles import Ends, Logarithms
+from tactile_bayes.inference.families import Family, Prior, support_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
 from tactile_bayes.inference.nuisances import MAY_VANISH, Nuisances
@@ -80,7 +80,18 @@ class ContourModel:
     @property
     def coordinates(self) -> Logarithms:
         """In which posteriors are sought and walked: the logarithms of parameters that are positive and never zero."""
-        return Logarithms((self.low == 0.0) & ~np.isin(self.names, MAY_VANISH))
+        return Logarithms((self.low == 0.0) & ~self.may_vanish)
+
+    @property
+    def ends(self) -> Ends:
+        """Of the parameters, by what they are and by their priors."""
+        support = np.array([support_of(self.priors[name]) for name in self.names]).T
+        return Ends(np.maximum(support[0], self.low), np.minimum(support[1], self.high))
+
+    @property
+    def may_vanish(self) -> NDArray[np.bool_]:
+        """Which parameters may be zero, and not less."""
+        return np.isin(self.names, MAY_VANISH)
 
     @property
     def loads_of_a_point(self) -> int:

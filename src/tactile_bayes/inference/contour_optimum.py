@@ -14,7 +14,6 @@ from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Logarithms
-from tactile_bayes.inference.families import support_of
 from tactile_bayes.inference.nuisances import BIASES
 from tactile_bayes.inference.start import optima
 from tactile_bayes.load_cell import LoadCell
@@ -135,15 +134,17 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
     stated = np.array([float(model.priors[name].std()) for name in model.located])
     spread = np.where(np.isfinite(stated) & ~located.positive, stated, rough)
 
+    least = np.where(model.may_vanish, -model.high, model.low)[:size]
+
     def residuals(places: Floats) -> Floats:
         # A prior that ends somewhere is no wall: the way to where it does not may lead through there.
         points = located.parameters(places)[0]
-        allowed = ((points > model.low[:size]) & (points < model.high[:size])).all(axis=1)
+        allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
         allowed &= (np.abs(places - middle) < _FARTHEST * spread)[:, located.positive].all(axis=1)
         out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
         late = np.full((len(points), brackets.low.size), _FAR_OFF)
         if allowed.any():
-            loads, events = model.loads_and_events(points[allowed])
+            loads, events = _continued(model, points[allowed])
             expected = model.likelihood.load_cell.expected(loads)
             out[allowed] = measured - expected[..., present] / deviation[present]
             late[allowed] = brackets.missed(events)
@@ -164,8 +165,7 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
             else:
                 yield place
 
-    ends = np.array([support_of(model.priors[name]) for name in model.located])
-    low, high = np.maximum(ends[:, 0], model.low[:size]), np.minimum(ends[:, 1], model.high[:size])
+    low, high = model.ends.low[:size], model.ends.high[:size]
     with np.errstate(divide="ignore"):  # a size may be as small as it likes
         about = middle, spread, located.of(low), located.of(high), deadline
     possible = candidates[:, size:]
@@ -186,6 +186,23 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
                 f"{model.located[i]} = {wanted[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
             )
         yield ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, beyond)
+
+
+def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
+    """Loads and events, continued evenly to less than zero of what may vanish: where the record would have less than
+    none, a search that ran into a wall would not get on along it.
+    """
+    vanishing = np.flatnonzero(model.may_vanish)
+    below = (points[:, vanishing] < 0.0).any(axis=1)
+    if not below.any():
+        return model.loads_and_events(points)
+    none, mirrored = points.copy(), points[below]
+    none[:, vanishing] = np.maximum(none[:, vanishing], 0.0)
+    mirrored[:, vanishing] = np.abs(mirrored[:, vanishing])
+    found = model.loads_and_events(none)
+    for values, there in zip(found, model.loads_and_events(mirrored), strict=True):
+        values[below] = 2.0 * values[below] - there
+    return found
 
 
 def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.differences import central_slopes
+from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends
 
 __all__ = ["Cloud", "Optimum", "gather", "optima"]
 
@@ -161,6 +162,7 @@ class Cloud:
     root: Floats
     """Times its transpose it is the covariance."""
     floor: float
+    ends: Ends = ANYTHING
 
     @property
     def narrow_covariance(self) -> Floats:
@@ -172,7 +174,9 @@ class Cloud:
         return -np.inf if deadline.has_passed else self.floor
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return self.centre + rng.normal(size=(count, self.centre.size)) @ self.root.T
+        return self.ends.drawn(
+            lambda count: self.centre + rng.normal(size=(count, self.centre.size)) @ self.root.T, count
+        )
 
 
 def gather(
@@ -181,6 +185,7 @@ def gather(
     covariance: Floats,
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
+    ends: Ends = ANYTHING,
 ) -> Cloud:
     """A cloud that is wider than the posterior, but of which most is not hopeless.
 
@@ -199,12 +204,14 @@ def gather(
     rng : np.random.Generator
     deadline : Deadline
         Past it, a cloud will do of which `_SOME` is possible.
+    ends : Ends
+        Of what is possible, as far as it is known.
     """
     size = centre.size
     top = float(log_probability(centre[None])[0])
     for _ in range(_ROUNDS):
         root = _square_root(covariance)
-        cloud = Cloud(centre, _WIDER * root, -np.inf)
+        cloud = Cloud(centre, _WIDER * root, -np.inf, ends)
         points = cloud.draw(rng, 60 * size)
         values = log_probability(points)
         if values.max() > top:

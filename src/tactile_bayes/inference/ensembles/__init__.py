@@ -29,7 +29,7 @@ from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.pilot import learned
 from tactile_bayes.inference.ensembles.places import Place
-from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal, approximate
+from tactile_bayes.inference.ensembles.proposal import Ends, Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
 from tactile_bayes.inference.ensembles.straightened import Straightened
@@ -38,6 +38,7 @@ from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, see
 __all__ = [
     "Coordinates",
     "Draws",
+    "Ends",
     "Logarithms",
     "Mixture",
     "Place",

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import logsumexp
+from scipy.special import logsumexp, ndtr
 
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["GOOD", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
+__all__ = ["ANYTHING", "GOOD", "Ends", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
 
 Floats = NDArray[np.float64]
 
@@ -28,8 +29,18 @@ _ROUNDS = 8
 _DRAWS = 60
 """For each parameter, in each round."""
 
-GOOD = 0.5
+GOOD = 0.6
 """Efficiency that is not worth another round."""
+
+_TRIES = 40
+"""How often what lies beyond the ends is drawn again."""
+
+_CUTS = np.linspace(-4.0, 1.0, 101)
+"""Where a normal distribution may be cut off, in standard deviations from its mean: farther below it is not felt, and
+farther above most draws would be lost."""
+
+_COUNTED = 4000
+"""Draws by which it is told how much of a proposal lies between the ends."""
 
 _HELD = 5
 """Effective draws for each parameter that a covariance is fitted to, at least; weights are made more equal until they
@@ -49,8 +60,33 @@ class Random(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Ends:
+    """Between what each coordinate of a target can be, shape (parameters,) each, or () for all."""
+
+    low: Floats
+    high: Floats
+
+    def hold(self, points: Floats) -> NDArray[np.bool_]:
+        """Which of points, shape (n, parameters), lie between."""
+        return np.asarray(((points > self.low) & (points < self.high)).all(axis=1))
+
+    def drawn(self, draw: Callable[[int], Floats], count: int) -> Floats:
+        """Draws between the ends: others are drawn again, but for the few that would take too often."""
+        points = draw(count)
+        for _ in range(_TRIES):
+            out = np.flatnonzero(~self.hold(points))
+            if not out.size:
+                break
+            points[out] = draw(out.size)
+        return points
+
+
+ANYTHING = Ends(np.array(-np.inf), np.array(np.inf))
+
+
+@dataclass(frozen=True, eq=False)
 class Proposal:
-    """Student's t distribution in several dimensions.
+    """Student's t distribution in several dimensions, cut off where the target ends.
 
     Parameters
     ----------
@@ -61,16 +97,19 @@ class Proposal:
         Effective share of independent draws, weighted by the target: 1 if it is the target's own distribution.
     log_mass : float
         Logarithm of the target's integral over what it covers, up to a constant of the number of parameters.
+    ends : Ends
     """
 
     mean: Floats
     root: Floats
     efficiency: float = 0.0
     log_mass: float = -np.inf
+    ends: Ends = ANYTHING
 
     @classmethod
-    def fitted(cls, points: Floats, weights: Floats | None = None) -> Proposal:
-        """To points, shape (n, parameters), with weights of sum one, whatever the units of the parameters.
+    def fitted(cls, points: Floats, weights: Floats | None = None, ends: Ends = ANYTHING) -> Proposal:
+        """To points, shape (n, parameters), with weights of sum one, whatever the units of the parameters; as if they
+        were of a normal distribution that is cut off at the ends.
 
         Raises
         ------
@@ -85,7 +124,13 @@ class Proposal:
             raise np.linalg.LinAlgError("a parameter is the same in all points")
         standard = apart / deviation
         correlation = (weights[:, None] * standard).T @ standard / (1.0 - np.sum(weights**2))
-        return cls(mean, _WIDENING * deviation[:, None] * np.linalg.cholesky(correlation))
+        above = (mean - ends.low) / deviation
+        for j in np.flatnonzero(above < -_CUTS[0]):
+            whole, wider = _whole(above[j], correlation[j, j])
+            along = correlation[:, j] / correlation[j, j]
+            mean = mean + deviation * along * whole
+            correlation = correlation + wider * np.outer(along, along)
+        return cls(mean, _WIDENING * deviation[:, None] * np.linalg.cholesky(correlation), ends=ends)
 
     @property
     def digest(self) -> str:
@@ -94,12 +139,17 @@ class Proposal:
 
     def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
         """Points, shape (count, parameters), and the logarithm of their density, up to the constant of `log_density`"""
+        points = self.ends.drawn(lambda count: self.anywhere(random, count), count)
+        return points, self.log_density(points)
+
+    def anywhere(self, random: Random, count: int) -> Floats:
+        """Points of the whole distribution, shape (count, parameters)."""
         normal = random.standard_normal((count, self.mean.size))
         steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, count) / _DEGREES_OF_FREEDOM)[:, None]
-        return self.mean + steps @ self.root.T, _log_density(steps) - self._log_volume
+        return np.asarray(self.mean + steps @ self.root.T)
 
     def log_density(self, points: Floats) -> Floats:
-        """Of points, shape (n, parameters), up to a constant of the number of parameters."""
+        """Of the whole distribution at points, shape (n, parameters), up to a constant of the number of parameters."""
         return _log_density(self.steps(points)) - self._log_volume
 
     def steps(self, points: Floats) -> Floats:
@@ -149,10 +199,14 @@ class Mixture:
 
     def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
         """As `Proposal.draw`."""
-        counts = random.multinomial(count, self.shares)
-        parts = [part.draw(random, int(each))[0] for part, each in zip(self.parts, counts, strict=True)]
-        points = np.concatenate(parts)[random.permutation(count)]
+        points = self.parts[0].ends.drawn(lambda count: self.anywhere(random, count), count)
         return points, self.log_density(points)
+
+    def anywhere(self, random: Random, count: int) -> Floats:
+        """As `Proposal.anywhere`."""
+        counts = random.multinomial(count, self.shares)
+        parts = [part.anywhere(random, int(each)) for part, each in zip(self.parts, counts, strict=True)]
+        return np.concatenate(parts)[random.permutation(count)]
 
     def log_density(self, points: Floats) -> Floats:
         """As `Proposal.log_density`."""
@@ -166,6 +220,7 @@ def approximate(
     covariance: Floats,
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
+    ends: Ends = ANYTHING,
 ) -> Proposal:
     """The proposal nearest to a target that some rounds of importance sampling find, by a guess at mean and covariance.
 
@@ -173,7 +228,7 @@ def approximate(
     the most efficient (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
     10.1198/106186004X12803). Past the deadline there is no further round.
     """
-    proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)))
+    proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
     best = proposal
     for _ in range(_ROUNDS):
         if deadline.has_passed:
@@ -185,11 +240,13 @@ def approximate(
         efficiency = effective(normalised(surplus)) / len(points)
         if efficiency > best.efficiency:
             log_mass = float(logsumexp(surplus) - np.log(len(points)))
-            best = Proposal(proposal.mean, proposal.root, efficiency, log_mass)
+            if ends is not ANYTHING:
+                log_mass += float(np.log(max(ends.hold(proposal.anywhere(rng, _COUNTED)).mean(), 1.0 / _COUNTED)))
+            best = replace(proposal, efficiency=efficiency, log_mass=log_mass)
         if best.efficiency >= GOOD:
             break
         try:
-            proposal = Proposal.fitted(points, flattened(surplus, _HELD * centre.size))
+            proposal = Proposal.fitted(points, flattened(surplus, _HELD * centre.size), ends)
         except np.linalg.LinAlgError:
             break
     return best
@@ -207,6 +264,17 @@ def normalised(surplus: Floats) -> Floats:
     with np.errstate(invalid="ignore"):  # −inf less the largest is −inf still
         weights = np.exp(surplus - surplus.max())
     return np.asarray(weights / weights.sum())
+
+
+def _whole(above: float, variance: float) -> tuple[float, float]:
+    """By how much the mean and the variance change, in standard deviations, where a normal distribution is not cut off
+    any more at an end that lies so far below its mean.
+    """
+    tilt = np.exp(-0.5 * _CUTS**2) / (np.sqrt(2.0 * np.pi) * ndtr(-_CUTS))
+    narrow = np.sqrt(1.0 - tilt * (tilt - _CUTS))
+    cut = np.interp(-above, -(tilt - _CUTS) / narrow, _CUTS)
+    scale = 1.0 / np.interp(cut, _CUTS, narrow)
+    return float(-above - cut * scale), float(variance * (scale**2 - 1.0))
 
 
 def effective(weights: Floats) -> float:
