@@ -19,17 +19,21 @@ _NOTICE = "tactile-bayes: compiling the forward model; this takes a while the fi
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+"""Arrays belong to whoever calls from Python: nothing is allocated, and references to arrays are not counted, which
+takes longer than what small functions do."""
+
+
 def compiled(function: Function) -> Function:
     """Machine code, as a part of what calls it."""
-    options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # no other calls it
-    made: Function = numba.njit(function, error_model="numpy", nogil=True, **options)
+    wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # no other calls it
+    made: Function = numba.njit(function, **_OPTIONS, **wrappers)
     return made
 
 
 def inlined(function: Function) -> Function:
-    """Compiled into every place that calls it: a call that hands arrays over counts references to each of them, which
-    takes longer than what small functions do."""
-    made: Function = numba.njit(function, error_model="numpy", nogil=True, inline="always")
+    """Compiled into every place that calls it."""
+    made: Function = numba.njit(function, **_OPTIONS, inline="always")
     return made
 
 
@@ -41,9 +45,9 @@ def kept(function: Function) -> Function:
     """
     function.__qualname__ += f"_{_version()}"
     try:
-        made: Function = numba.njit(function, error_model="numpy", nogil=True, cache=True)
+        made: Function = numba.njit(function, **_OPTIONS, cache=True)
     except RuntimeError:  # neither beside the file nor in the user's cache may anything be written
-        made = numba.njit(function, error_model="numpy", nogil=True)
+        made = numba.njit(function, **_OPTIONS)
     return made
 
 

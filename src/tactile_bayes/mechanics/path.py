@@ -100,6 +100,8 @@ class Work(NamedTuple):
     """With fewer nodes, which do where the tip touches unless it touches for long."""
     full: Curves
     asked: Asked
+    knots: Floats
+    """Where the contour may not be smooth."""
     pieces: Floats
     """Stretches as they are cut."""
     waiting: Floats
@@ -127,6 +129,7 @@ def work(samples: int, order: int, knots: int) -> Work:
         brief=curves_of(int(_FEWER * order)),
         full=curves_of(order),
         asked=asked(samples),
+        knots=np.empty(knots),
         pieces=np.empty((most, 3)),
         waiting=np.empty((most + _MOST_MORE, 6)),
         followed=np.empty((most + _MOST_MORE, 10)),

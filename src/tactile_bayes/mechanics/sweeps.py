@@ -169,8 +169,7 @@ def _sweep(
     table : ndarray, shape (rows, columns)
         Room for the table of one contour.
     """
-    count = shapes.knots.shape[1]
-    knots, prepared = np.empty(count), math.nan
+    count, knots, prepared = shapes.knots.shape[1], room.knots, math.nan
     for i in range(lanes.contour.size):
         outline = _outline(shapes, lanes, i, table)
         c, sign = lanes.contour[i], -1.0 if lanes.backward[i] else 1.0
