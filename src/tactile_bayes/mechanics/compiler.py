@@ -11,8 +11,12 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import event
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.typed_passes import NativeLowering
 
-__all__ = ["compiled", "inlined", "kept"]
+__all__ = ["compiled", "kept"]
 
 _NOTICE = "tactile-bayes: compiling the forward model; this takes a while the first time, and is kept for later"
 
@@ -24,16 +28,51 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False
 takes longer than what small functions do."""
 
 
+class _PartLibrary(JITCodeLibrary):
+    """LLVM's code of a function, which is optimised, and turned into machine code, only in what calls it."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _PartEntry(LoweringPass):
+    """Makes a function known by a key in place of an entry point, which it does not have."""
+
+    _name = "part_entry"
+
+    def __init__(self) -> None:
+        LoweringPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        key: Callable[..., object] = {}.__getitem__  # one of its own, as entry points are
+        state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
+        state.reload_init.extend(state.library._reload_init)
+        state["cr"] = state.cr._replace(cfunc=key)
+        return True
+
+
+class _PartCompiler(CompilerBase):
+    """numba's compiler without machine code: that of a function would hold all that it calls once more."""
+
+    def define_pipelines(self) -> list[Any]:
+        state = self.state
+        state.flags.no_compile = True
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        passes = DefaultPassBuilder.define_nopython_pipeline(state)
+        passes.add_pass_after(_PartEntry, NativeLowering)
+        passes.finalize()
+        return [passes]
+
+
 def compiled(function: Function) -> Function:
-    """Machine code, as a part of what calls it."""
-    wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # no other calls it
-    made: Function = numba.njit(function, **_OPTIONS, **wrappers)
-    return made
-
-
-def inlined(function: Function) -> Function:
-    """Compiled into every place that calls it."""
-    made: Function = numba.njit(function, **_OPTIONS, inline="always")
+    """Machine code, as a part of what calls it; Python cannot call it."""
+    wrappers: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    made: Function = numba.njit(function, **_OPTIONS, **wrappers, pipeline_class=_PartCompiler)
     return made
 
 
@@ -45,7 +84,7 @@ def kept(function: Function) -> Function:
     """
     function.__qualname__ += f"_{_version()}"
     try:
-        made: Function = numba.njit(function, **_OPTIONS, cache=True)
+        made: Function = numba.njit(function, cache=True, **_OPTIONS)
     except RuntimeError:  # neither beside the file nor in the user's cache may anything be written
         made = numba.njit(function, **_OPTIONS)
     return made

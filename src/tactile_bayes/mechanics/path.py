@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     Course,
@@ -137,7 +137,7 @@ def work(samples: int, order: int, knots: int) -> Work:
     )
 
 
-@inlined
+@compiled
 def _follow_stretch(
     scene: Scene,
     stretch: Stretch,
@@ -182,7 +182,7 @@ def _follow_stretch(
     return _End(fate, parameter, Course(stop, at_begin, at_end, steadiness), curvature)
 
 
-@inlined
+@compiled
 def follow(
     scene: Scene,
     knots: Floats,
@@ -303,6 +303,6 @@ def _copy(rows: Floats, out: Floats) -> None:
             out[c, k] = rows[c, k]
 
 
-@inlined
+@compiled
 def _nothing(reach: int, distance: float) -> Ends:
     return Ends(reach, distance, math.nan, math.nan, math.nan, math.nan, _NEVER, 0, math.nan)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     MISS,
@@ -124,7 +124,7 @@ def _before(angles: Floats, angle: float) -> int:
     return low
 
 
-@inlined
+@compiled
 def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, room: Asked) -> None:
     """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by Newton's method from between
     the nodes of the series, all side by side, or each by itself where that does not come near."""
@@ -183,7 +183,7 @@ def write_loads(
         out[row, 2] = rig.rigidity * room.found[2, j]
 
 
-@inlined
+@compiled
 def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> None:
     """Note phase and place of a state, and the loads that are those of its row."""
     states = out.states[row]

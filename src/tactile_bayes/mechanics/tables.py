@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tactile_bayes import chebyshev
 from tactile_bayes.mechanics.arc import arc_to, chord_angle, slack
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
-from tactile_bayes.mechanics.compiler import compiled, inlined, kept
+from tactile_bayes.mechanics.compiler import compiled, kept
 
 __all__ = [
     "AMPLITUDE",
@@ -170,7 +170,7 @@ def prepare(known: Tables, friction_angle: float, room: Room) -> None:
                     room.lying[k, c, i] += weight * known.lying[k, j, c, i]
 
 
-@inlined
+@compiled
 def _cell(ends: Floats, z: float) -> tuple[int, float]:
     """In which cell one is, and where in it."""
     cell = 0
@@ -179,7 +179,7 @@ def _cell(ends: Floats, z: float) -> tuple[int, float]:
     return cell, (z - ends[cell]) / (ends[cell + 1] - ends[cell])
 
 
-@inlined
+@compiled
 def series(room: Room, k: int, level: float) -> float:
     """What is tabulated of tangential contact at a share of the largest angle, by Clenshaw's recurrence."""
     cell, z = _cell(_LEVELS, level)
@@ -190,7 +190,7 @@ def series(room: Room, k: int, level: float) -> float:
     return (room.lying[k, cell, 0] - before) + 0.5 * twice * now
 
 
-@inlined
+@compiled
 def _polynomials(z: float, size: int, out: Floats) -> None:
     twice = 4.0 * z - 2.0
     out[0] = 1.0
@@ -199,7 +199,7 @@ def _polynomials(z: float, size: int, out: Floats) -> None:
         out[k] = twice * out[k - 1] - out[k - 2]
 
 
-@inlined
+@compiled
 def in_polar(known: Tables, lack: float, tilt: float, first: int, room: Room) -> tuple[float, float, float, float]:
     """Angle, share of the largest radius, and two of what is tabulated there, from the first on."""
     terms = _TERMS
