@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import sys
 from collections.abc import Callable
@@ -90,6 +91,32 @@ def kept(function: Function) -> Function:
     return made
 
 
+def _is_ours(event: Any) -> bool:
+    return bool(event.data["dispatcher"].py_func.__module__.startswith(__package__))
+
+
+class _Rest(event.Listener):
+    """Rests the garbage collector while functions are compiled, of which it takes a tenth and frees a fifth of the
+    memory."""
+
+    def __init__(self) -> None:
+        self.depth = 0
+        self.was_awake = False
+
+    def on_start(self, event: Any) -> None:
+        if _is_ours(event):
+            if not self.depth:
+                self.was_awake = gc.isenabled()
+                gc.disable()
+            self.depth += 1
+
+    def on_end(self, event: Any) -> None:
+        if _is_ours(event):
+            self.depth -= 1
+            if not self.depth and self.was_awake:
+                gc.enable()
+
+
 class _Notice(event.Listener):
     """Says once that something is compiled, to whoever waits at a terminal."""
 
@@ -97,8 +124,7 @@ class _Notice(event.Listener):
         self.said = False
 
     def on_start(self, event: Any) -> None:
-        ours = event.data["dispatcher"].py_func.__module__.startswith(__package__)
-        if ours and not self.said and sys.stderr.isatty():
+        if _is_ours(event) and not self.said and sys.stderr.isatty():
             print(_NOTICE, file=sys.stderr, flush=True)
             self.said = True
 
@@ -107,6 +133,7 @@ class _Notice(event.Listener):
 
 
 event.register("numba:compile", _Notice())
+event.register("numba:compile", _Rest())
 
 
 @functools.cache
