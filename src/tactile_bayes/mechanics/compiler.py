@@ -24,7 +24,7 @@ _NOTICE = "tactile-bayes: compiling the forward model; this takes a while the fi
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False, "no_cfunc_wrapper": True}
 """Arrays belong to whoever calls from Python: nothing is allocated, and references to arrays are not counted, which
 takes longer than what small functions do."""
 
@@ -72,8 +72,8 @@ class _PartCompiler(CompilerBase):
 
 def compiled(function: Function) -> Function:
     """Machine code, as a part of what calls it; Python cannot call it."""
-    wrappers: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    made: Function = numba.njit(function, **_OPTIONS, **wrappers, pipeline_class=_PartCompiler)
+    options = {**_OPTIONS, "no_cpython_wrapper": True}
+    made: Function = numba.njit(function, pipeline_class=_PartCompiler, **options)
     return made
 
 
