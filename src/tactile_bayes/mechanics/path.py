@@ -107,7 +107,7 @@ class Work(NamedTuple):
     waiting: Floats
     """Stretches still to be followed, the next one last: as in `Stretch`."""
     followed: Floats
-    """Stretches that are, each as in `Stretch` and `Course`."""
+    """Stretches that are, each as in `Stretch` and `Course`, if there are samples."""
     curves: Floats
     """Their series, and the values at nodes, shape (stretches, 11, order)."""
 
@@ -263,13 +263,14 @@ def follow(
             found.changes[changes, 0], found.changes[changes, 1] = stretch.begin, stretch.tip
             changes += 1
         at_begin, snap_parameter, is_first = end.course.end, end.parameter, False
-        for c in range(6):
-            room.followed[done, c] = row[c]
-        for c in range(4):
-            room.followed[done, 6 + c] = end.course[c]
-        _copy(curves.series, room.curves[done])
-        _copy(curves.values, room.curves[done, 6:])
-        done += 1
+        if samples.angles.size:
+            for c in range(6):
+                room.followed[done, c] = row[c]
+            for c in range(4):
+                room.followed[done, 6 + c] = end.course[c]
+            _copy(curves.series, room.curves[done])
+            _copy(curves.values, room.curves[done, 6:])
+            done += 1
     if fate == _NEVER:
         if limit.runs_out:
             return _nothing(_RUNS_OUT, limit.distance)
@@ -285,13 +286,13 @@ def follow(
         _copy(room.curves[k], curves.series)
         _copy(room.curves[k, 6:], curves.values)
         course = Course(row[6], row[7], row[8], row[9])
-        there, many = find_samples(samples, scene.rig.offset, course, room.asked)
+        there = find_samples(samples, scene.rig.offset, course, room.asked)
         if not wants_states:
-            write_loads(samples, there, many, scene.rig, accuracy, course, curves, room.asked, found.loads)
+            write_loads(there, scene.rig, accuracy, course, curves, room.asked, found.loads)
         elif accuracy.polished:
-            polish_states(samples, there, many, scene, stretch, accuracy, course, curves, room.asked, found)
+            polish_states(there, scene, stretch, accuracy, course, curves, room.asked, found)
         else:
-            write_states(samples, there, many, scene, stretch, accuracy, course, curves, room.asked, found)
+            write_states(there, scene, stretch, accuracy, course, curves, room.asked, found)
     return Ends(_TOUCHES, limit.distance, first, limit.begin, at_begin, snap_parameter, fate, changes, largest)
 
 
