@@ -52,7 +52,6 @@ class _PartEntry(LoweringPass):
     def run_pass(self, state: Any) -> bool:
         key: Callable[..., object] = {}.__getitem__  # one of its own, as entry points are
         state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
-        state.reload_init.extend(state.library._reload_init)
         state["cr"] = state.cr._replace(cfunc=key)
         return True
 
