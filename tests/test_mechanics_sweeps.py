@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -9,13 +10,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, Smooth
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics import compiler
+from tactile_bayes.mechanics import compiler, sweeps
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import in_frame
@@ -209,6 +211,46 @@ def test_where_nothing_can_be_kept_it_is_compiled_each_time(monkeypatch):
         return 2.0 * x
 
     assert compiler.kept(twice)(2.0) == 4.0
+
+
+def test_states_of_scans_and_loads_of_likelihoods_are_compiled_once():
+    """Other types than the first ones would take as long again, for instance arrays that are read-only."""
+    seen = SeenContour(FORMULAS["parabola"].broadcast_to((COUNT,)), Q * 0.0, Q * 0.0, 1.0, 0.0, Q > 0.5)
+    trace(seen, drive_angles=np.linspace(0.3, 3.6, 40), relative=True, polished=False)
+    for contours in (drawn("circle", THIN, 10), without_a_formula(drawn("circle", THIN, 10))):
+        likelihood_of(THIN, is_always_clear=False).log_likelihood(contours.broadcast_to(contours.shape))
+    assert len(sweeps._sweep.signatures) == 1
+
+
+@pytest.mark.parametrize("awake", [True, False])
+def test_the_garbage_collector_rests_while_functions_are_compiled(awake):
+    """And is as it was afterwards, also if compiling fails."""
+
+    def ill_typed(x):
+        return x + "one"
+
+    ill_typed.__module__ = SWEEPS
+    rest, ours, other = (
+        compiler._Rest(),
+        *(
+            SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=SimpleNamespace(__module__=module))})
+            for module in (SWEEPS, "other")
+        ),
+    )
+    try:
+        if not awake:
+            gc.disable()
+        known = []
+        for step, event in ((rest.on_start, ours), (rest.on_start, ours), (rest.on_end, ours), (rest.on_end, other)):
+            step(event)
+            known.append(gc.isenabled())
+        rest.on_end(ours)
+        assert (known, gc.isenabled()) == ([False] * 4, awake)
+        with pytest.raises(TypingError):
+            compiler.kept(ill_typed)(1.0)
+        assert gc.isenabled() == awake
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize(("module", "terminal", "told"), [(SWEEPS, True, 1), (SWEEPS, False, 0), ("other", True, 0)])

@@ -113,7 +113,7 @@ def scan_many(
     backward = np.full(count, direction == "backward")
     seen = SeenContour(contours.broadcast_to((count,)), x, y, rod.length, 0.5 * rod.diameter, backward)
     seen_angles = np.pi - angles if direction == "backward" else angles
-    paths = trace(seen, friction_angle=friction_angle_of(friction), drive_angles=seen_angles, quickly=True)
+    paths = trace(seen, friction_angle=friction_angle_of(friction), drive_angles=seen_angles, polished=False)
     units = ManyUnits(rod.length_unit, rod.moment_unit, rod.force_unit)
     system = "dimensionless" if rod.is_dimensionless else "SI"
 

@@ -247,7 +247,7 @@ def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
         friction_angle=float(np.arctan(spec.friction)),
         drive_angles=as_seen,
         relative=is_relative,
-        quickly=True,
+        polished=False,
     )
     if is_relative:
         as_seen = paths.first_angle[:, None] + as_seen * (paths.snap_angle - paths.first_angle)[:, None]

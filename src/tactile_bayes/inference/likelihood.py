@@ -303,7 +303,7 @@ class RecordLikelihood:
             backward=np.repeat(self._signs < 0.0, count),
             friction_angle=np.tile(np.arctan(rig.friction), strokes),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, strokes),
-            offset=np.broadcast_to(self._misread(rig), (count, strokes)).T.ravel(),
+            offset=np.broadcast_to(self._misread(rig), (count, strokes)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, strokes),
         )
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.outline import Outline, Place, frame, place
 from tactile_bayes.mechanics.series import Nodes, change_of, crossing, nodes_of, tail, value, value_and_slope, weighted
 from tactile_bayes.mechanics.states import State, exact_state, tabled_state
@@ -209,7 +209,7 @@ def regained(stop: float, most: float, curves: Curves) -> float:
     return 2.0
 
 
-@inlined
+@compiled
 def angle_rate(at: Place, state: State) -> float:
     """Derivative of the drive angle by the contour's parameter."""
     lever, facing = frame(at)
@@ -250,7 +250,7 @@ def lay_over_angle(accuracy: Accuracy, course: Course, curves: Curves) -> None:
         weighted(on.fit, values[c], curves.over_angle[c])
 
 
-@inlined
+@compiled
 def left_of(angle: float, course: Course) -> float:
     """What is left of a stretch at a drive angle, from 1 to 0, so stretched that states are smooth functions of it."""
     left = min(max((course.end - angle) / (course.end - course.begin), 0.0), 1.0)
@@ -281,7 +281,7 @@ def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
     return max(at_stop, curvature[best] - (0.25 * slope * slope / bend if bend < 0.0 else 0.0))
 
 
-@inlined
+@compiled
 def _curvature(drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
     """Largest curvature of the rod between pivot and contact, of a forward contact [1/L]."""
     cos, sin = math.cos(drive_angle), math.sin(drive_angle)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = ["Outline", "Place", "bearing", "ends", "frame", "mirrored", "place"]
 
@@ -139,7 +139,7 @@ def _by_slope(table: Floats, alpha: float) -> tuple[float, float, float]:
     return x, y, (x_rate * math.cos(alpha) + y_rate * math.sin(alpha)) * (cells / (2.0 * _UPRIGHT))
 
 
-@inlined
+@compiled
 def _between(table: Floats, cell: int, axis: int, t: float) -> tuple[float, float]:
     """A coordinate and its rate, as `tactile_bayes.contours.smooth` has them."""
     start, rate, bend = table[cell, axis], table[cell, axis + 2], table[cell, axis + 4]
@@ -186,7 +186,7 @@ def _by_cell(table: Floats, p: float) -> tuple[float, float, float, float, float
     return x, y, alpha, max(speed, 0.0), max(alpha_rate * scale, 0.0)
 
 
-@inlined
+@compiled
 def frame(at: Place) -> tuple[float, float]:
     """The vector from the pivot to the contour along the contour and into the object."""
     return at.x * at.cos + at.y * at.sin, at.y * at.cos - at.x * at.sin

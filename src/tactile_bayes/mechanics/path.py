@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     DIP,
@@ -107,12 +107,14 @@ class Work(NamedTuple):
     """With fewer nodes, which do where the tip touches unless it touches for long."""
     full: Curves
     asked: Asked
+    knots: Floats
+    """Where the contour may not be smooth."""
     pieces: Floats
     """Stretches as they are cut."""
     waiting: Floats
     """Stretches still to be followed, the next one last: as in `Stretch`."""
     followed: Floats
-    """Stretches that are, each as in `Stretch` and `Course`."""
+    """Stretches that are, each as in `Stretch` and `Course`, if there are samples."""
     curves: Floats
     """Their series, and the values at nodes, shape (stretches, 11, order)."""
 
@@ -134,6 +136,7 @@ def work(samples: int, order: int, knots: int) -> Work:
         brief=curves_of(int(_FEWER * order)),
         full=curves_of(order),
         asked=asked(samples),
+        knots=np.empty(knots),
         pieces=np.empty((most, 3)),
         waiting=np.empty((most + _MOST_MORE, 6)),
         followed=np.empty((most + _MOST_MORE, 10)),
@@ -141,7 +144,7 @@ def work(samples: int, order: int, knots: int) -> Work:
     )
 
 
-@inlined
+@compiled
 def _follow_stretch(
     scene: Scene,
     stretch: Stretch,
@@ -179,7 +182,7 @@ def _follow_stretch(
     return _End(fate, parameter, Course(stop, at_begin, at_end, steadiness), curvature)
 
 
-@inlined
+@compiled
 def follow(
     scene: Scene,
     knots: Floats,
@@ -255,13 +258,14 @@ def follow(
                     found.changes[changes, 0], found.changes[changes, 1] = stretch.begin, stretch.tip
                     changes += 1
                 at_begin, snap_parameter, is_first = end.course.end, end.parameter, False
-                for c in range(6):
-                    room.followed[done, c] = row[c]
-                for c in range(4):
-                    room.followed[done, 6 + c] = end.course[c]
-                _copy(curves.series, room.curves[done])
-                _copy(curves.values, room.curves[done, 6:])
-                done += 1
+                if samples.angles.size:
+                    for c in range(6):
+                        room.followed[done, c] = row[c]
+                    for c in range(4):
+                        room.followed[done, 6 + c] = end.course[c]
+                    _copy(curves.series, room.curves[done])
+                    _copy(curves.values, room.curves[done, 6:])
+                    done += 1
         count -= 1
         if fate != _NEVER:  # a maximum is behind: whether the drive angle exceeds it again
             onward = regained(onward, at_begin, curves)
@@ -285,13 +289,13 @@ def follow(
         _copy(room.curves[k], curves.series)
         _copy(room.curves[k, 6:], curves.values)
         course = Course(row[6], row[7], row[8], row[9])
-        there, many = find_samples(samples, scene.rig.offset, course, room.asked)
+        there = find_samples(samples, scene.rig.offset, course, room.asked)
         if not wants_states:
-            write_loads(samples, there, many, scene.rig, accuracy, course, curves, room.asked, found.loads)
+            write_loads(there, scene.rig, accuracy, course, curves, room.asked, found.loads)
         elif accuracy.polished:
-            polish_states(samples, there, many, scene, stretch, accuracy, course, curves, room.asked, found)
+            polish_states(there, scene, stretch, accuracy, course, curves, room.asked, found)
         else:
-            write_states(samples, there, many, scene, stretch, accuracy, course, curves, room.asked, found)
+            write_states(there, scene, stretch, accuracy, course, curves, room.asked, found)
     return Ends(_TOUCHES, limit.distance, first, limit.begin, at_begin, snap_parameter, fate, changes, largest)
 
 
@@ -303,6 +307,6 @@ def _copy(rows: Floats, out: Floats) -> None:
             out[c, k] = rows[c, k]
 
 
-@inlined
+@compiled
 def _nothing(reach: int, distance: float) -> Ends:
     return Ends(reach, distance, math.nan, math.nan, math.nan, math.nan, _NEVER, 0, math.nan)

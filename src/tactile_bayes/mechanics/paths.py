@@ -136,7 +136,7 @@ def trace(
     tolerance: Floats | None = None,
     drive_angles: Floats | None = None,
     relative: bool = False,
-    quickly: bool = False,
+    polished: bool = True,
 ) -> Paths:
     """Follow the equilibria of every lane from first contact to snap-off.
 
@@ -154,9 +154,9 @@ def trace(
         At which states are wanted.
     relative : bool
         Whether they are shares of the way from first contact to snap-off.
-    quickly : bool
-        Whether it is enough that states at drive angles are right to 1e-10 of the largest and come without derivatives,
-        which takes a third of the time.
+    polished : bool
+        Whether states at drive angles are exact; or else as good as series, 1e-10 of the largest, and without
+        derivatives, which takes a third of the time.
     """
     from tactile_bayes.mechanics.sweeps import Lanes  # numba takes a second to load
 
@@ -178,7 +178,7 @@ def trace(
         rigidity=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
-    answers = _swept(shapes, lanes, tolerance, angles, relative, states=True, polished=not quickly)
+    answers = _swept(shapes, lanes, tolerance, angles, relative, states=True, polished=polished)
     there = np.arange(answers.changes.shape[1]) < answers.phases[:, None]
     most = int(answers.phases.max(initial=0))
     return Paths(

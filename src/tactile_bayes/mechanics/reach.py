@@ -6,7 +6,7 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.fates import CLEARANCE, Reach
 from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
 
@@ -101,7 +101,7 @@ def _nearest(outline: Outline, low: float, high: float, last_step: float) -> tup
     return _root(outline, _Sought.LEVER, 0.0, high, low, last_step), beyond_high, beyond_low
 
 
-@inlined
+@compiled
 def _is_out(outline: Outline, p: float) -> bool:
     at = place(outline, p)
     return math.hypot(at.x, at.y) > 1.0

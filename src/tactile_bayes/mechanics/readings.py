@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     MISS,
@@ -100,15 +100,15 @@ def asked(samples: int) -> Asked:
 
 
 @compiled
-def find_samples(samples: Samples, offset: float, course: Course, room: Asked) -> tuple[int, int]:
-    """The first sample on a stretch, and how many there are; their drive angles go into the room."""
+def find_samples(samples: Samples, offset: float, course: Course, room: Asked) -> Samples:
+    """Those on a stretch; their drive angles go into the room."""
     first, last = _before(samples.angles, course.begin + offset), _before(samples.angles, course.end + offset)
     while last < samples.angles.size and samples.angles[last] - offset <= course.end:
         last += 1
     for j in range(last - first):
         room.wanted[j] = samples.angles[first + j] - offset
         room.twice[j] = 2.0 - 4.0 * left_of(room.wanted[j], course)
-    return first, last - first
+    return Samples(samples.angles[first:last], samples.rows[first:last], samples.relative)
 
 
 @compiled
@@ -124,7 +124,7 @@ def _before(angles: Floats, angle: float) -> int:
     return low
 
 
-@inlined
+@compiled
 def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, room: Asked) -> None:
     """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by Newton's method from between
     the nodes of the series, all side by side, or each by itself where that does not come near."""
@@ -164,8 +164,6 @@ def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, ro
 @compiled
 def write_loads(
     samples: Samples,
-    first: int,
-    count: int,
     rig: Rig,
     accuracy: Accuracy,
     course: Course,
@@ -174,16 +172,17 @@ def write_loads(
     out: Floats,
 ) -> None:
     """Loads of the samples on a stretch, from the series."""
+    count = samples.rows.size
     _look_for(accuracy, course, count, curves, room)
     sideward = rig.sign * rig.rigidity
     at_all(curves.series[:REST], room.twice, count, room.now, room.before, room.found)
     for j in range(count):
-        row = samples.rows[first + j]
+        row = samples.rows[j]
         out[row, 0], out[row, 1] = sideward * room.found[0, j], sideward * room.found[1, j]
         out[row, 2] = rig.rigidity * room.found[2, j]
 
 
-@inlined
+@compiled
 def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> None:
     """Note phase and place of a state, and the loads that are those of its row."""
     states = out.states[row]
@@ -196,8 +195,6 @@ def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> Non
 @compiled
 def write_states(
     samples: Samples,
-    first: int,
-    count: int,
     scene: Scene,
     stretch: Stretch,
     accuracy: Accuracy,
@@ -207,6 +204,7 @@ def write_states(
     out: Found,
 ) -> None:
     """States of the samples on a stretch from the series, without derivatives."""
+    count = samples.rows.size
     # Just before the end of contact it matters where the drive angle ends.
     off = value(curves.series[ANGLE], course.stop) - course.end
     for j in range(count):
@@ -214,7 +212,7 @@ def write_states(
     _look_for(accuracy, course, count, curves, room)
     at_all(curves.series[:ANGLE], room.twice, count, room.now, room.before, room.found)
     for j in range(count):
-        row = samples.rows[first + j]
+        row = samples.rows[j]
         p = along(stretch, 0.25 * (room.twice[j] + 2.0))
         at, states = place(scene.outline, p), out.states[row]
         states[5] = room.wanted[j] - off - scene.rig.compliance * room.found[0, j]
@@ -229,8 +227,6 @@ def write_states(
 @compiled
 def polish_states(
     samples: Samples,
-    first: int,
-    count: int,
     scene: Scene,
     stretch: Stretch,
     accuracy: Accuracy,
@@ -243,8 +239,8 @@ def polish_states(
     stop, steadiness, over_angle, rig = course.stop, course.steadiness, curves.over_angle, scene.rig
     lay_over_angle(accuracy, course, curves)
     weighted(curves.on.slopes, over_angle[WAY], curves.bend)
-    for j in range(count):
-        row, target = samples.rows[first + j], 0.25 * (room.twice[j] + 2.0)
+    for j in range(samples.rows.size):
+        row, target = samples.rows[j], 0.25 * (room.twice[j] + 2.0)
         way, pace = value_and_slope(over_angle[WAY], curves.bend, target)
         way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle is less again
         low, high, before = 0.0, stop, stop

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes import chebyshev
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = [
     "Nodes",
@@ -72,7 +72,7 @@ def value(coefficients: Floats, z: float) -> float:
     return (coefficients[0] - before) + 0.5 * twice * now
 
 
-@inlined
+@compiled
 def value_and_slope(one: Floats, other: Floats, z: float) -> tuple[float, float]:
     """Two series at once, which takes no longer than one."""
     twice = 4.0 * z - 2.0
@@ -103,13 +103,13 @@ def at_all(rows: Floats, twice: Floats, count: int, now: Floats, before: Floats,
                 out[c, j] += coefficient * now[j]
 
 
-@inlined
+@compiled
 def tail(coefficients: Floats) -> float:
     """About how far a series is from what it interpolates."""
     return max(abs(coefficients[-1]), abs(coefficients[-2]))
 
 
-@inlined
+@compiled
 def change_of(coefficients: Floats) -> float:
     """The largest coefficient but the first."""
     largest = 0.0

@@ -24,7 +24,7 @@ from tactile_bayes.mechanics.arc import (
     slack_rate,
 )
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
-from tactile_bayes.mechanics.compiler import compiled, inlined, kept
+from tactile_bayes.mechanics.compiler import compiled, kept
 from tactile_bayes.mechanics.outline import Place, frame
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.tables import (
@@ -107,7 +107,7 @@ def _touch(x: float, y: float, alpha: float, delta: float, room: Room) -> tuple[
     return length, arc, by_chi
 
 
-@inlined
+@compiled
 def _lying(x: float, y: float, alpha: float, delta: float, length: float, arc: Arc, by_chi: Arc) -> State:
     """Phase B."""
     force = (arc.length / length) ** 2
@@ -194,7 +194,7 @@ def wrenches(columns: Floats, known: Tables, room: Room, phase: NDArray[np.int8]
             phase[i] = NONE if math.isnan(ending.arclength) else TIP
 
 
-@inlined
+@compiled
 def _store(state: State, out: Floats) -> None:
     for k in range(8):
         out[k] = state[k]

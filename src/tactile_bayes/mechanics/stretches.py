@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.compiler import compiled, inlined
+from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.outline import Outline, Place, place
 from tactile_bayes.mechanics.reach import Limits
 from tactile_bayes.mechanics.series import Nodes, change_of, crossing, tail, value, weighted
@@ -62,19 +62,19 @@ class Stretch(NamedTuple):
     """Whether half of the nodes may do."""
 
 
-@inlined
+@compiled
 def along(stretch: Stretch, way: float) -> float:
     """Contour parameter a way of 0 to 1 along, in which loads are smooth."""
     return stretch.begin + (stretch.end - stretch.begin) * (way * way if stretch.rooted else way)
 
 
-@inlined
+@compiled
 def along_rate(stretch: Stretch, way: float) -> float:
     """Its derivative."""
     return (stretch.end - stretch.begin) * (2.0 * way if stretch.rooted else 1.0)
 
 
-@inlined
+@compiled
 def _excess(at: Place, delta: float, exact: bool, room: Room) -> float:
     if exact:
         return exact_excess(at, delta, room)
@@ -126,7 +126,7 @@ def cut(
     return count
 
 
-@inlined
+@compiled
 def _cut_piece(
     outline: Outline,
     first: float,
@@ -162,7 +162,7 @@ def _cut_piece(
     return count
 
 
-@inlined
+@compiled
 def _cut_smooth(
     outline: Outline,
     begin: float,
@@ -201,7 +201,7 @@ def _cut_smooth(
     return count + 1
 
 
-@inlined
+@compiled
 def _nearest_zero(nodes: Floats, values: Floats, k: int) -> float:
     """Where a parabola through a node and its neighbours is nearest to zero, or the node itself."""
     before, after = nodes[k - 1] - nodes[k], nodes[k + 1] - nodes[k]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +111,18 @@ class Answers(NamedTuple):
     """From which on the straight rod is clear; NaN if it is not asked."""
 
 
+_INDICES, _FLAGS, _CODES = ("contour", "stroke", "phases"), ("backward",), ("reach", "snap_off")
+
+
+def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
+    """Numbers that lie side by side, so that compiled code is handed one array and not one for each name."""
+    kinds = {**dict.fromkeys(_INDICES, np.intp), **dict.fromkeys(_FLAGS, np.bool_), **dict.fromkeys(_CODES, np.int8)}
+    return np.dtype([(name, kinds.get(name, np.float64)) for name in names], align=True)
+
+
+_LANE, _EVENTS = _side_by_side(Lanes._fields), _side_by_side(Answers._fields[3:])
+
+
 @compiled
 def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tuple[float, float, float]:
     if kind == PARABOLA:
@@ -123,9 +135,9 @@ def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tupl
 
 
 @compiled
-def _outline(shapes: Shapes, lanes: Lanes, i: int, table: Floats) -> Outline:
+def _outline(shapes: Shapes, lane: Any, table: Floats) -> Outline:
     """As the rod of a lane sees it; the table is put where there is room for it."""
-    c, length = lanes.contour[i], lanes.length[i]
+    c, length = lane.contour, lane.length
     left, right = shapes.kinds
     of = shapes.halves[c]
     l_size, l_shape, l_unit = _in_rod_lengths(left, of[0], of[1], length)
@@ -135,19 +147,19 @@ def _outline(shapes: Shapes, lanes: Lanes, i: int, table: Floats) -> Outline:
         for r in range(table.shape[0]):
             for k in range(table.shape[1]):
                 table[r, k] = shapes.tables[c, r, k] / (length if begin <= k < end else 1.0)
-    x, y = (of[4] - lanes.base_x[i]) / length, (of[5] - lanes.base_y[i]) / length
+    x, y = (of[4] - lane.base_x) / length, (of[5] - lane.base_y) / length
     low, high = (-l_size if left == SLOPES else l_size), r_size
-    standoff = lanes.standoff[i] / length
+    standoff = lane.standoff / length
     outline = Outline(
         left, l_size, l_shape, l_unit, right, r_size, r_shape, r_unit, low, high, 1.0, x, y, standoff, table
     )
-    return mirrored(outline) if lanes.backward[i] else outline
+    return mirrored(outline) if lane.backward else outline
 
 
 @kept
 def _sweep(
     shapes: Shapes,
-    lanes: Lanes,
+    lanes: Any,
     strokes: Strokes,
     accuracy: Accuracy,
     tolerance: Floats,
@@ -156,41 +168,48 @@ def _sweep(
     states: Room,
     room: Work,
     table: Floats,
-    answers: Answers,
+    loads: Floats,
+    all_states: Floats,
+    changes: Floats,
+    events: Any,
 ) -> None:
     """Follow the path of every lane, and put what its samples feel into the answers.
 
     Parameters
     ----------
+    lanes : ndarray, shape (lanes,)
+        As in `Lanes`, side by side.
     tolerance : ndarray, shape (3,)
         By how much loads may miss, of moment and forces [EI/L and EI/L²].
     states, room
         Room for one state, and for one path.
     table : ndarray, shape (rows, columns)
         Room for the table of one contour.
+    loads, all_states, changes, events
+        As in `Answers`, the events side by side.
     """
-    count = shapes.knots.shape[1]
-    knots, prepared = np.empty(count), math.nan
-    for i in range(lanes.contour.size):
-        outline = _outline(shapes, lanes, i, table)
-        c, sign = lanes.contour[i], -1.0 if lanes.backward[i] else 1.0
+    count, knots, prepared = shapes.knots.shape[1], room.knots, math.nan
+    for i in range(lanes.size):
+        lane, event = lanes[i], events[i]
+        outline = _outline(shapes, lane, table)
+        c, sign = lane.contour, -1.0 if lane.backward else 1.0
         for k in range(count):
-            knots[k] = -shapes.knots[c, k] if lanes.backward[i] else shapes.knots[c, count - 1 - k]
-        first, last = strokes.first[lanes.stroke[i]], strokes.first[lanes.stroke[i] + 1]
+            knots[k] = -shapes.knots[c, k] if lane.backward else shapes.knots[c, count - 1 - k]
+        first, last = strokes.first[lane.stroke], strokes.first[lane.stroke + 1]
         samples = Samples(strokes.angles[first:last], strokes.rows[first:last], strokes.relative)
-        if lanes.friction_angle[i] != prepared:
-            prepared = lanes.friction_angle[i]
+        if lane.friction_angle != prepared:
+            prepared = lane.friction_angle
             prepare(known, prepared, states)
-        rig = Rig(lanes.friction_angle[i], lanes.compliance[i], sign * lanes.offset[i], sign, lanes.rigidity[i])
-        found = Found(answers.loads[c], answers.states[c], answers.changes[i])
+        rig = Rig(lane.friction_angle, lane.compliance, sign * lane.offset, sign, lane.rigidity)
+        found = Found(loads[c], all_states[c], changes[i])
         ends = follow(Scene(outline, rig, known, states), knots, samples, accuracy, tolerance, room, found)
-        answers.reach[i], answers.distance[i] = ends.reach, ends.distance
-        answers.first_angle[i], answers.first_parameter[i] = ends.first_angle, ends.first_parameter
-        answers.snap_angle[i], answers.snap_parameter[i] = ends.snap_angle, ends.snap_parameter
-        answers.snap_off[i], answers.phases[i], answers.curvature[i] = ends.snap_off, ends.phases, ends.curvature
-        answers.clear_angle[i] = math.nan
+        event.reach, event.distance = ends.reach, ends.distance
+        event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
+        event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
+        event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
+        event.clear_angle = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
-            answers.clear_angle[i] = clear_angle(outline, accuracy.first_step)
+            event.clear_angle = clear_angle(outline, accuracy.first_step)
 
 
 def answered(
@@ -227,27 +246,17 @@ def answered(
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     count, rows = shape
-    sweeps = lanes.contour.size
-    distance, first_angle, first_parameter, snap_angle, snap_parameter, curvature, clear = np.empty((7, sweeps))
-    answers = Answers(
-        loads=np.zeros((count, rows, 3)),
-        states=np.zeros((count, rows if states else 0, STATE_COLUMNS)),
-        changes=np.empty((sweeps, MOST_CHANGES if states else 0, 2)),
-        phases=np.empty(sweeps, dtype=np.intp),
-        reach=np.empty(sweeps, dtype=np.int8),
-        distance=distance,
-        first_angle=first_angle,
-        first_parameter=first_parameter,
-        snap_angle=snap_angle,
-        snap_parameter=snap_parameter,
-        snap_off=np.empty(sweeps, dtype=np.int8),
-        curvature=curvature,
-        clear_angle=clear,
-    )
+    lane = np.empty(lanes.contour.size, dtype=_LANE)
+    for name, values in zip(Lanes._fields, lanes, strict=True):
+        lane[name] = values
+    loads = np.zeros((count, rows, 3))
+    all_states = np.zeros((count, rows if states else 0, STATE_COLUMNS))
+    changes = np.empty((lane.size, MOST_CHANGES if states else 0, 2))
+    events = np.empty(lane.size, dtype=_EVENTS)
     longest = int(np.diff(strokes.first).max(initial=0))
     _sweep(
         shapes,
-        lanes,
+        lane,
         strokes,
         accuracy,
         _NEVER_MISSED if tolerance is None else tolerance,
@@ -256,6 +265,9 @@ def answered(
         room(),
         work(longest, order, shapes.knots.shape[1]),
         np.empty(shapes.tables.shape[1:]),
-        answers,
+        loads,
+        all_states,
+        changes,
+        events,
     )
-    return answers
+    return Answers(loads, all_states, changes, *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ()))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tactile_bayes import chebyshev
 from tactile_bayes.mechanics.arc import arc_to, chord_angle, slack
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
-from tactile_bayes.mechanics.compiler import compiled, inlined, kept
+from tactile_bayes.mechanics.compiler import compiled, kept
 
 __all__ = [
     "AMPLITUDE",
@@ -100,10 +100,12 @@ def room() -> Room:
 def tables() -> Tables:
     """Tables for any friction angle up to `MOST_FRICTION`."""
     angles, shares, levels = _in_cells(_ANGLES, _TERMS), _in_cells(_SHARES, _TERMS), _in_cells(_LEVELS, _LYING[0])
-    radius, tip = _tips_on(0.5 * np.pi * angles.ravel(), shares.ravel(), 0.5 * np.pi + _MARGIN + MOST_FRICTION)
+    radius, tip = np.empty(angles.size), np.empty((4, angles.size, shares.size))
+    _tips_on(0.5 * np.pi * angles.ravel(), shares.ravel(), 0.5 * np.pi + _MARGIN + MOST_FRICTION, radius, tip)
     by_share = chebyshev.coefficients(tip.reshape(4, *angles.shape, *shares.shape))
     by_both = chebyshev.coefficients(by_share.swapaxes(-1, -2)).transpose(3, 4, 1, 2, 0)
-    lying = _lying_on(levels.ravel(), MOST_FRICTION * chebyshev.nodes(_LYING[1]))
+    lying = np.empty((4, levels.size, _LYING[1]))
+    _lying_on(levels.ravel(), MOST_FRICTION * chebyshev.nodes(_LYING[1]), lying)
     by_friction = chebyshev.coefficients(lying.reshape(4, *levels.shape, -1))
     return Tables(
         lying=np.ascontiguousarray(chebyshev.coefficients(by_friction).transpose(2, 1, 3, 0)),
@@ -118,8 +120,7 @@ def _in_cells(ends: Floats, terms: int) -> Floats:
 
 
 @kept
-def _lying_on(levels: Floats, deltas: Floats) -> Floats:
-    out = np.empty((4, levels.size, deltas.size))
+def _lying_on(levels: Floats, deltas: Floats, out: Floats) -> None:
     for j in range(deltas.size):
         m, largest = 0.5 * (1.0 + math.sin(deltas[j])), 0.5 * math.pi + deltas[j]
         for i in range(levels.size):
@@ -129,14 +130,13 @@ def _lying_on(levels: Floats, deltas: Floats) -> Floats:
             chord = math.hypot(arc.length - arc.shortfall, arc.offset)
             out[FORCE, i, j], out[TURN, i, j] = chord * chord / angle, arc.turn / angle
             out[AMPLITUDE, i, j], out[STRETCH, i, j] = chi * chi / angle, arc.length / chord
-    return out
 
 
 @kept
-def _tips_on(angles: Floats, shares: Floats, largest: float) -> tuple[Floats, Floats]:
-    """Largest radius at every angle, where ε1 is the largest, and what is tabulated, shape (4, angles, shares)."""
+def _tips_on(angles: Floats, shares: Floats, largest: float, radius: Floats, out: Floats) -> None:
+    """Largest radius at every angle, where ε1 is the largest, and into `out` what is tabulated, shape (4, angles,
+    shares)."""
     m = math.sin(0.5 * largest) ** 2
-    radius, out = np.empty(angles.size), np.empty((4, angles.size, shares.size))
     for i in range(angles.size):
         low, high = 0.0, _CHI_MAX
         for _ in range(60):
@@ -154,7 +154,6 @@ def _tips_on(angles: Floats, shares: Floats, largest: float) -> tuple[Floats, Fl
             chi, tilt1, arc, _, _ = tip_arc(lack, tilt, chi, tilt1)
             out[FORCE, i, j], out[TURN, i, j] = arc.length * arc.length / angles[i], arc.turn - tilt1
             out[AMPLITUDE, i, j], out[TILT, i, j] = chi * chi / angles[i], tilt1 / shares[j]
-    return radius, out
 
 
 @compiled
@@ -171,7 +170,7 @@ def prepare(known: Tables, friction_angle: float, room: Room) -> None:
                     room.lying[k, c, i] += weight * known.lying[k, j, c, i]
 
 
-@inlined
+@compiled
 def _cell(ends: Floats, z: float) -> tuple[int, float]:
     """In which cell one is, and where in it."""
     cell = 0
@@ -180,7 +179,7 @@ def _cell(ends: Floats, z: float) -> tuple[int, float]:
     return cell, (z - ends[cell]) / (ends[cell + 1] - ends[cell])
 
 
-@inlined
+@compiled
 def series(room: Room, k: int, level: float) -> float:
     """What is tabulated of tangential contact at a share of the largest angle, by Clenshaw's recurrence."""
     cell, z = _cell(_LEVELS, level)
@@ -191,7 +190,7 @@ def series(room: Room, k: int, level: float) -> float:
     return (room.lying[k, cell, 0] - before) + 0.5 * twice * now
 
 
-@inlined
+@compiled
 def _polynomials(z: float, size: int, out: Floats) -> None:
     twice = 4.0 * z - 2.0
     out[0] = 1.0
@@ -200,7 +199,7 @@ def _polynomials(z: float, size: int, out: Floats) -> None:
         out[k] = twice * out[k - 1] - out[k - 2]
 
 
-@inlined
+@compiled
 def in_polar(known: Tables, lack: float, tilt: float, first: int, room: Room) -> tuple[float, float, float, float]:
     """Angle, share of the largest radius, and two of what is tabulated there, from the first on."""
     terms = _TERMS

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.arc import Arc, arc_and_slopes, arc_to
-from tactile_bayes.mechanics.compiler import compiled, inlined, kept
+from tactile_bayes.mechanics.compiler import compiled, kept
 
 __all__ = ["chords", "touches"]
 
 Floats = NDArray[np.float64]
 
 
-@inlined
+@compiled
 def _over(arc: Arc, divisor: float) -> Arc:
     return Arc(arc.length / divisor, arc.shortfall / divisor, arc.offset / divisor, arc.turn / divisor)
 
