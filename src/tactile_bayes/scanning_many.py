@@ -122,7 +122,7 @@ def scan_many(
         return dims, values, {"units": column.unit_in(system), "long_name": column.long_name}
 
     both = ("contour", "sample")
-    samples = sweep_samples(paths, units)
+    samples = sweep_samples(paths, units, np.arange(count))
     phase = np.array(PHASE_NAMES)[samples.pop("contact_phase")]
     variables: dict[str, Any] = {"drive_angle": labelled(both, angles, "drive_angle")}
     variables |= {name: labelled(both, values, name) for name, values in samples.items()}

@@ -42,7 +42,7 @@ class ManyUnits(NamedTuple):
         return ManyUnits(*(value[lane] if isinstance(value, np.ndarray) else value for value in self))
 
 
-def sweep_samples(paths: Paths, units: ManyUnits) -> dict[str, NDArray[Any]]:
+def sweep_samples(paths: Paths, units: ManyUnits, lane: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
     """What the base feels at the drive angles that paths were traced with, and the contacts.
 
     Parameters
@@ -51,16 +51,18 @@ def sweep_samples(paths: Paths, units: ManyUnits) -> dict[str, NDArray[Any]]:
         A lane for each sweep.
     units : ManyUnits
         Of the lanes' rods.
+    lane : ndarray of int
+        Which lanes, of any shape.
 
     Returns
     -------
-    dict of str to ndarray, shape (lanes, k)
+    dict of str to ndarray, shape (*lane.shape, k)
         `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
     """
-    states, lane = paths.sampled_states(), np.arange(paths.seen.lanes)[:, None]
-    found = in_world(paths.seen, lane, states, units.of(lane))
+    states, each = paths.sampled_states(lane), lane[..., None]
+    found = in_world(paths.seen, each, states, units.of(each))
     for name in LOADS:
-        found[name][states.wrench.phase == NONE] = 0.0
+        np.copyto(found[name], 0.0, where=states.wrench.phase == NONE)
     return {name: found[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
 
 

@@ -48,8 +48,10 @@ def in_world(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> d
     sign = np.where(mirrored, -1.0, 1.0)
     wrench = states.wrench
     length, standoff = (v[lane] if isinstance(v, np.ndarray) else v for v in (seen.length, seen.standoff))
-    x = states.x - standoff / length * np.sin(states.slope_angle)
-    y = states.y + standoff / length * np.cos(states.slope_angle)
+    x, y = states.x, states.y
+    if np.any(standoff):
+        x = x - standoff / length * np.sin(states.slope_angle)
+        y = y + standoff / length * np.cos(states.slope_angle)
 
     def turned(angle: Floats) -> Floats:
         return np.where(mirrored, np.pi - angle, angle)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS, rule_of
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.streams import CONTOUR, NORMAL, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import Paths, trace
@@ -108,9 +109,10 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         If of 1000 draws of a record none is a contour that every sweep can reach.
     """
     index = np.arange(begin, end)
-    streams = [_Stream(spec.seed, i) for i in index.tolist()]
+    uniform = streams(spec.seed, index, CONTOUR)
     keys = [key for key, _ in spec.laws]
     free = {g: draw for g, group in enumerate(spec.groups) if (draw := FAMILIES[group.family].draw_log_radius)}
+    normal = streams(spec.seed, index, NORMAL) if free else []
     turns = _turns(spec, index)
     drawn = {key: np.full(index.size, np.nan) for key in keys}
     drawn |= {f"contours[{g}].{LOG_RADIUS}": np.full((index.size, KNOTS.size), np.nan) for g in free}
@@ -125,7 +127,7 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
             reasons = [why for rows, whys in in_vain for why in whys[rows == left[0]].ravel()]
             raise _hopeless(int(index[left[0]]), Counter(reasons))
         of_record = np.repeat(left, ahead)
-        shares = np.array([streams[i].shares(1 + len(keys)) for i in of_record])
+        shares = np.array([_shares(uniform[i], 1 + len(keys)) for i in of_record])
         group = _group(spec, shares[:, 0], turns.get("contours"), of_record)
         values = {
             key: law.at(shares[:, 1 + k], turns[law.axis or key][of_record] if law.kind == "each" else of_record)
@@ -133,7 +135,7 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         }
         normals = np.full((of_record.size, KNOTS.size if free else 0), np.nan)
         for k in np.flatnonzero(np.isin(group, list(free))):
-            normals[k] = streams[of_record[k]].normals(KNOTS.size)
+            normals[k] = normal[of_record[k]].standard_normal(KNOTS.size)
         for g, draw_log_radius in free.items():
             parameters = {name: values[f"contours[{g}].{name}"] for name in spec.groups[g].laws}
             values[f"contours[{g}].{LOG_RADIUS}"] = draw_log_radius(parameters, normals)
@@ -141,54 +143,39 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         found = []
         for g in np.unique(group).tolist():
             among = np.flatnonzero(group == g)
-            why[among], swept = _swept(spec, g, {k: v[among] for k, v in values.items()})
-            found.append((g, among[why[among] == _GOOD], swept))
+            why[among], tried = _tried(spec, g, {k: v[among] for k, v in values.items()})
+            found.append((g, among, tried))
         is_good = (why == _GOOD).reshape(left.size, ahead)
         before = is_good.cumsum(axis=1)
         in_vain.append((left, why.reshape(left.size, ahead)))
         redrawn.update(in_vain[-1][1][before == 0].tolist())
         first = (is_good & (before == 1)).ravel()
-        for g, good, swept in found:
-            chosen = good[first[good]]
+        for g, among, tried in found:
+            taken = np.flatnonzero(first[among])
+            chosen = among[taken]
             kept = of_record[chosen]
             family[kept] = g
             for key in drawn:
                 if not key.startswith("contours[") or key.startswith(f"contours[{g}]."):
                     drawn[key][kept] = values[key][chosen]
-            for name, rows in swept.items():
-                place = sample if rows.ndim == 3 else sweep
-                if name not in place:
-                    place[name] = np.zeros(
-                        (index.size, *rows.shape[1:]), dtype=object if rows.dtype.kind == "U" else rows.dtype
-                    )
-                place[name][kept] = rows[first[good]]
+            if tried is None or not taken.size:
+                continue
+            sweeps = len(spec.sweeps)
+            lane = sweeps * np.searchsorted(tried.built, taken)[:, None] + np.arange(sweeps)
+            _put(sweep, {name: rows[lane] for name, rows in _of_sweeps(spec, tried).items()}, kept, index.size)
+            for some in spec.blocks(kept.size):
+                _put(sample, _of_samples(tried, lane[some]), kept[some], index.size)
         left, draws = left[~is_good.any(axis=1)], draws + ahead
         ahead = max(1, min(2 * ahead, max(_AT_ONCE, index.size) // max(left.size, 1), _MOST_DRAWS - draws))
     measure(spec, index, drawn, sample)
     return Records(index, family, drawn, sweep, sample, redrawn)
 
 
-class _Stream:
-    """The random numbers that a record is drawn with."""
-
-    def __init__(self, seed: int, record: int) -> None:
-        self.key = seed, record
-        self.bits = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(record, 0)))
-        self.uniform = np.random.Generator(self.bits)
-        self.normal: np.random.Generator | None = None
-
-    def shares(self, count: int) -> Floats:
-        """Uniform numbers of the next draw."""
-        found = self.uniform.random(count)
-        self.bits.advance(_APART - count)
-        return found
-
-    def normals(self, count: int) -> Floats:
-        """Normal numbers of the next shape-free contour, from a stream of their own."""
-        if self.normal is None:
-            seed, record = self.key
-            self.normal = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(record, 2)))
-        return self.normal.standard_normal(count)
+def _shares(stream: np.random.Generator, count: int) -> Floats:
+    """Uniform numbers of a record's next draw."""
+    found = stream.random(count)
+    stream.bit_generator.advance(_APART - count)  # type: ignore[attr-defined]
+    return found
 
 
 def _hopeless(record: int, reasons: Counter[str]) -> SpecificationError:
@@ -216,47 +203,56 @@ def _group(spec: Specification, share: Floats, turns: Index | None, left: Index)
     return np.minimum(np.searchsorted(weights, share * weights[-1], side="right"), len(spec.groups) - 1)
 
 
-def _swept(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
-    """Draws of one group: why each comes to nothing, `_GOOD` if it does not, and the sweeps of the good ones."""
+class _Tried(NamedTuple):
+    """Sweeps along the draws of one group that are contours: a lane each, those of a draw side by side."""
+
+    built: Index
+    """Which draws these are."""
+    paths: Paths
+    drive: Floats
+    """Drive angles as seen in forward sweeps, shape (lanes, k); or shares of the way from first contact to snap-off,
+    shape (k,)."""
+    units: ManyUnits
+
+
+def _tried(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[NDArray[Any], _Tried | None]:
+    """Draws of one group: why each comes to nothing, `_GOOD` if it does not, and their sweeps."""
     prefix = f"contours[{g}]."
     parameters = {key.removeprefix(prefix): v for key, v in values.items() if key.startswith(prefix)}
     why, contours = _built(spec.groups[g].family, parameters, len(next(iter(parameters.values()))))
     if contours is None:
-        return why, {}
-    built = np.flatnonzero(why == _GOOD)
-    lengths = values["rod.length"][built] if spec.rod else np.ones(built.size)
-    standoffs = 0.5 * values["rod.diameter"][built] if spec.rod else np.zeros(built.size)
-    sweeps = len(spec.sweeps)
+        return why, None
+    built, sweeps = np.flatnonzero(why == _GOOD), len(spec.sweeps)
+    draw, place = np.repeat(built, sweeps), np.repeat(np.arange(built.size), sweeps)
     base_x, base_y = (
-        np.concatenate([values[f"scan.bases[{b}][{axis}]"][built] for b, _ in spec.sweeps]) for axis in (0, 1)
+        np.stack([values[f"scan.bases[{b}][{axis}]"][built] for b, _ in spec.sweeps], axis=1).ravel() for axis in (0, 1)
     )
-    backward = np.repeat([direction == "backward" for _, direction in spec.sweeps], built.size)
-    lane_of = np.tile(np.arange(built.size), sweeps)
-    seen = SeenContour(
-        contours.take(lane_of), base_x, base_y, np.tile(lengths, sweeps), np.tile(standoffs, sweeps), backward
-    )
+    backward = np.tile([direction == "backward" for _, direction in spec.sweeps], built.size)
+    length, standoff, units = np.ones(draw.size), np.zeros(draw.size), ManyUnits(1.0, 1.0, 1.0)
+    if spec.rod:
+        length, rigidity, diameter = (
+            values[f"rod.{name}"][draw] for name in ("length", "flexural_rigidity", "diameter")
+        )
+        standoff, units = 0.5 * diameter, ManyUnits(length, rigidity / length, rigidity / length**2)
     drive, way = spec.drive, np.linspace(0.0, 1.0, spec.drive.samples)
-    is_relative = drive.begin is None or drive.end is None
     if drive.begin is None or drive.end is None:
-        as_seen = np.tile((1.0 + 2.0 * drive.margin) * way - drive.margin, (seen.lanes, 1))
+        as_seen = (1.0 + 2.0 * drive.margin) * way - drive.margin
     else:
         forward = drive.begin + (drive.end - drive.begin) * way
         as_seen = np.where(backward[:, None], np.pi - forward[::-1], forward)
     paths = trace(
-        seen,
+        SeenContour(contours.take(place), base_x, base_y, length, standoff, backward),
         friction_angle=float(np.arctan(spec.friction)),
         drive_angles=as_seen,
-        relative=is_relative,
+        relative=as_seen.ndim == 1,
         polished=False,
     )
-    if is_relative:
-        as_seen = paths.first_angle[:, None] + as_seen * (paths.snap_angle - paths.first_angle)[:, None]
-    fate = paths.reach.reshape(sweeps, -1).max(axis=0)
+    fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
-        clear = paths.is_clear().reshape(sweeps, -1).all(axis=0)
+        clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
     reasons = np.array([_REASONS[Reach(reach)] for reach in range(len(_REASONS))], dtype=object)[fate]
     why[built] = np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
-    return why, _recorded(spec, paths, as_seen, why[built] == _GOOD, _units(spec, values, lane_of, built))
+    return why, _Tried(built, paths, as_seen, units)
 
 
 def _built(family: str, parameters: Mapping[str, Floats], count: int) -> tuple[NDArray[Any], Contour | None]:
@@ -279,34 +275,36 @@ def _built(family: str, parameters: Mapping[str, Floats], count: int) -> tuple[N
     return why, definition.build(some).broadcast_to((built.size,))
 
 
-def _units(spec: Specification, values: Mapping[str, Floats], lane_of: Index, built: Index) -> ManyUnits:
-    if not spec.rod:
-        return ManyUnits(1.0, 1.0, 1.0)
-    length, rigidity = (values[f"rod.{name}"][built][lane_of] for name in ("length", "flexural_rigidity"))
-    return ManyUnits(length, rigidity / length, rigidity / length**2)
-
-
-def _recorded(
-    spec: Specification, paths: Paths, as_seen: Floats, good: NDArray[np.bool_], units: ManyUnits
-) -> dict[str, NDArray[Any]]:
-    """What the sweeps of the good contours record at drive angles as seen in forward sweeps, shape (good, sweeps) or
-    (good, sweeps, samples)."""
-    lanes = paths.seen.lanes
-
-    def by_record(values: NDArray[Any]) -> NDArray[Any]:
-        return np.moveaxis(values.reshape(len(spec.sweeps), lanes // len(spec.sweeps), *values.shape[1:]), 0, 1)[good]
-
+def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
+    """What is known of every sweep, shape (lanes,)."""
+    paths = tried.paths
     found = {
         "base_x": paths.seen.base_x,
         "base_y": paths.seen.base_y,
-        "phases": np.array(phases_of(paths), dtype=np.str_),
+        "phases": np.array(phases_of(paths), dtype=object),
     }
-    for event, columns in sweep_events(paths, units).items():
+    for event, columns in sweep_events(paths, tried.units).items():
         found |= {f"{event}_{name}": columns[name] for name in EVENT_COLUMNS}
     found["snap_off_kind"] = paths.snap_off
     if spec.has_thickness:
         found["largest_strain"] = np.nan_to_num(paths.largest_curvature * paths.seen.standoff / paths.seen.length)
-    samples = sweep_samples(paths, units)
-    found["drive_angle"] = np.where(paths.seen.mirrored[:, None], np.pi - as_seen, as_seen)
-    found |= {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
-    return {name: by_record(values) for name, values in found.items()}
+    return found
+
+
+def _of_samples(tried: _Tried, lane: Index) -> dict[str, NDArray[Any]]:
+    """What sweeps on lanes record, shape (*lane.shape, k)."""
+    paths, drive = tried.paths, tried.drive
+    first, snap = paths.first_angle[lane][..., None], paths.snap_angle[lane][..., None]
+    as_seen = first + drive * (snap - first) if drive.ndim == 1 else drive[lane]
+    samples = sweep_samples(paths, tried.units, lane)
+    mirrored = paths.seen.mirrored[lane][..., None]
+    found = {"drive_angle": np.where(mirrored, np.pi - as_seen, as_seen)}
+    return found | {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
+
+
+def _put(place: dict[str, NDArray[Any]], found: Mapping[str, NDArray[Any]], rows: Index, count: int) -> None:
+    """Put what is found into rows of what is there of so many records."""
+    for name, values in found.items():
+        if name not in place:
+            place[name] = np.empty((count, *values.shape[1:]), dtype=values.dtype)
+        place[name][rows] = values

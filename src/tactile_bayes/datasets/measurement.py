@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.streams import NOISE, Together, streams
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
@@ -40,39 +41,49 @@ _HARMLESS: dict[str, tuple[str, int | None]] = {
 
 def measure(spec: Specification, index: Index, drawn: Mapping[str, Floats], sample: dict[str, NDArray[Any]]) -> None:
     """Put what the load cell reads beside the truth."""
-    loads = np.stack([sample[f"truth_{name}"] for name in CHANNELS], axis=-1)
-    angles = sample["drive_angle"]
-    if spec.frame == "turning":
-        loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], angles)
-        for k, name in enumerate(CHANNELS):
-            sample[f"truth_{name}"] = loads[..., k]
-    laws = spec.load_cell
-    cells = _cells(spec, drawn, index.size)
-    readings = np.empty_like(loads)
+    cells, cell_of, scale = _cells(spec, drawn, index.size)
+    noise = streams(spec.seed, index, NOISE)
     direction = np.array([direction for _, direction in spec.sweeps])[:, None]
-    encoder = any(name.startswith("drive_angle") for name in laws)
+    encoder = any(name.startswith("drive_angle") for name in spec.load_cell)
     if encoder:
-        sample["truth_drive_angle"], sample["drive_angle"] = angles, np.empty_like(angles)
-    for i, (record, cell) in enumerate(zip(index.tolist(), cells, strict=True)):
-        rng = np.random.default_rng(np.random.SeedSequence(spec.seed, spawn_key=(record, 1)))
-        readings[i] = corrupted_loads(cell, loads[i].reshape(-1, 3), rng).reshape(loads[i].shape)
-        if encoder:
-            sample["drive_angle"][i] = corrupted_angles(cell, angles[i], direction, rng)
-    for k, name in enumerate(CHANNELS):
-        sample[name] = np.ascontiguousarray(readings[..., k])
+        sample["truth_drive_angle"] = sample["drive_angle"].copy()
+    sample |= {name: np.empty_like(sample["drive_angle"]) for name in CHANNELS}
+    for rows in spec.blocks(index.size):
+        loads = np.stack([sample[f"truth_{name}"][rows] for name in CHANNELS], axis=-1)
+        if spec.frame == "turning":
+            loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], sample["drive_angle"][rows])
+            for k, name in enumerate(CHANNELS):
+                sample[f"truth_{name}"][rows] = loads[..., k]
+        for number in np.unique(cell_of[rows]):
+            its = np.flatnonzero(cell_of[rows] == number)
+            cell, some = cells[number], rows[its]
+            rng = Together([noise[i] for i in some])
+            in_a_row = loads[its].reshape(its.size, -1, 3)
+            readings = corrupted_loads(cell, in_a_row, rng, scale[some]).reshape(its.size, *loads.shape[1:])
+            for k, name in enumerate(CHANNELS):
+                sample[name][some] = readings[..., k]
+            if encoder:
+                sample["drive_angle"][some] = corrupted_angles(cell, sample["drive_angle"][some], direction, rng)
 
 
-def _cells(spec: Specification, drawn: Mapping[str, Floats], count: int) -> list[LoadCell]:
-    """The load cell of every record."""
-    columns = {name: drawn[f"load_cell.{name}"] for name in spec.load_cell}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(v.tolist() for v in columns.values()), strict=True)]
+def _cells(spec: Specification, drawn: Mapping[str, Floats], count: int) -> tuple[list[LoadCell], Index, Floats]:
+    """Load cells, which of them each record is measured with, and by what factors its channels are noisier."""
+    columns, scale = {name: drawn[f"load_cell.{name}"] for name in spec.load_cell}, np.ones((count, 3))
+    if not columns:
+        return [LoadCell()], np.zeros(count, dtype=np.intp), scale
+    is_finite = all(np.all(np.isfinite(values)) for values in columns.values())
+    if is_finite and "relative_noise" not in columns:
+        for k, name in enumerate(("moment_noise", "force_noise", "force_noise")):
+            if name in columns:
+                scale[:, k] = drawn[f"load_cell.{name}"]
+                columns[name] = np.ones(count)
+    entries, cell_of = np.unique(np.column_stack(list(columns.values())), axis=0, return_inverse=True)
+    rows = [dict(zip(columns, row, strict=True)) for row in entries.tolist()]
+    differ = {name for name, values in columns.items() if np.any(values != values[0])}
     try:
-        if not rows:
-            return [LoadCell()] * count
-        differ = {name for name, values in columns.items() if np.any(values != values[0])}
-        if differ <= set(_HARMLESS) and all(np.all(np.isfinite(values)) for values in columns.values()):
-            return _like(LoadCell.from_entries(rows[0]), rows, differ)
-        return [LoadCell.from_entries(row) for row in rows]
+        if is_finite and differ <= set(_HARMLESS):
+            return _like(LoadCell.from_entries(rows[0]), rows, differ), cell_of, scale
+        return [LoadCell.from_entries(row) for row in rows], cell_of, scale
     except ParameterError as error:
         raise SpecificationError(f"load_cell: {error}") from error
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -85,23 +86,31 @@ def write_shard(task: tuple[str, int, str]) -> Written:
     records = generate_records(spec, begin, min(begin + spec.shard_records, spec.records))
     content = netcdf_of(records_as_dataset(spec, records))
     path = Path(folder) / shard_file(shard)
-    try:
-        with write_atomically(path) as temporary:
-            temporary.write_bytes(content)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
-    digest = hashlib.sha256(content).hexdigest()
+    with ThreadPoolExecutor(1) as beside:  # while the disk is waited for
+        digest = beside.submit(_sha256, content)
+        try:
+            with write_atomically(path) as temporary, open(temporary, "wb") as file:
+                file.writelines(content)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from error
     redrawn = {reason: count for reason, count in sorted(records.redrawn.items()) if count}
     return Written(
         path.name,
         begin,
         records.index.size,
-        len(content),
-        digest,
+        sum(map(len, content)),
+        digest.result(),
         redrawn,
         records.strained,
         records.untouched,
     )
+
+
+def _sha256(content: Iterable[memoryview]) -> str:
+    digest = hashlib.sha256()
+    for part in content:
+        digest.update(part)
+    return digest.hexdigest()
 
 
 @lru_cache(maxsize=1)

@@ -36,6 +36,9 @@ _MOST_NAMED = 8
 
 _LARGEST_SEED = 2**63 - 1
 
+_AT_HAND = 2**14
+"""Samples in a block: a column of them is 128 kB."""
+
 _SCAN = {
     "bases": [[0.0, 0.0]],
     "directions": ["forward", "backward"],
@@ -163,6 +166,11 @@ class Specification:
     def sweeps(self) -> tuple[tuple[int, str], ...]:
         """Base and direction of each sweep of a record."""
         return tuple((base, direction) for base in range(len(self.bases)) for direction in self.directions)
+
+    def blocks(self, records: int) -> list[NDArray[np.intp]]:
+        """Indices of so many records in blocks, each with no more samples than a processor has at hand at once."""
+        samples = records * len(self.sweeps) * self.drive.samples
+        return np.array_split(np.arange(records), max(1, -(-samples // _AT_HAND)))
 
     @property
     def laws(self) -> tuple[tuple[str, Law], ...]:

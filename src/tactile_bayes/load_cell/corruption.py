@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.load_cell.data_sheet import DataSheet
 
-__all__ = ["corrupted_angles", "corrupted_loads"]
+__all__ = ["Draws", "corrupted_angles", "corrupted_loads"]
 
 Floats = NDArray[np.float64]
 
 
-def corrupted_loads(sheet: DataSheet, loads: Floats, rng: np.random.Generator, noise_scale: ArrayLike = 1.0) -> Floats:
+class Draws(Protocol):
+    """What random numbers are drawn with: a `Generator`, or many side by side."""
+
+    def standard_normal(self, size: tuple[int, ...], /) -> Any: ...
+    def chisquare(self, df: float, size: tuple[int, ...], /) -> Any: ...
+
+
+def corrupted_loads(sheet: DataSheet, loads: Floats, rng: Draws, noise_scale: ArrayLike = 1.0) -> Floats:
     """Readings of loads: lever, gain and bias, drift and noise, then the range, then the steps of the reading.
 
     Parameters
@@ -23,7 +31,7 @@ def corrupted_loads(sheet: DataSheet, loads: Floats, rng: np.random.Generator, n
         In the units of the loads.
     loads : ndarray, shape (..., samples, 3)
         In the order of `CHANNELS`; one record's samples in the order in which they are taken. NaN stays NaN.
-    rng : numpy.random.Generator
+    rng : Draws
         White noise is drawn first, and each part for all three channels, whatever of it is needed.
     noise_scale : array_like, broadcastable to shape (..., 3)
         Factor on the white noise of each channel.
@@ -49,7 +57,7 @@ def corrupted_loads(sheet: DataSheet, loads: Floats, rng: np.random.Generator, n
     return rounded(readings, sheet.resolution)
 
 
-def corrupted_angles(sheet: DataSheet, angles: Floats, direction: ArrayLike, rng: np.random.Generator) -> Floats:
+def corrupted_angles(sheet: DataSheet, angles: Floats, direction: ArrayLike, rng: Draws) -> Floats:
     """Readings of drive angles, of any shape: offset, backlash by the drive's direction, noise, then the steps."""
     noise = sheet.drive_angle_noise * rng.standard_normal(angles.shape)
     return rounded(angles + sheet.misread(direction) + noise, np.array(sheet.drive_angle_resolution))

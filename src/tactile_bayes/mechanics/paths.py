@@ -117,9 +117,9 @@ class Paths:
         lane, sample = np.nonzero(self.sampled[..., 0] != NONE)
         return lane, sample, _as_states(self.sampled[lane, sample])
 
-    def sampled_states(self) -> States:
-        """States at all of these drive angles, shape (lanes, k); NaN and `NONE` out of contact."""
-        return _as_states(self.sampled)
+    def sampled_states(self, lane: Index) -> States:
+        """States on lanes at all of these drive angles, shape (*lane.shape, k); NaN and `NONE` out of contact."""
+        return _as_states(self.sampled[lane])
 
     def states_at(self, lane: Index, parameter: Floats) -> States:
         """Exact states at the contour's parameters, whether on the path or beyond its end."""
@@ -214,22 +214,24 @@ def _swept(
     relative: bool = False,
     **options: Any,
 ) -> Answers:
-    """What is found at drive angles, shape (k,) or (lanes, k), as seen in forward sweeps, a stroke for each lane."""
+    """What is found at drive angles, shape (k,) for all or (lanes, k), as seen in forward sweeps."""
     from tactile_bayes.mechanics.sweeps import Strokes, answered
 
-    count, each = lanes.contour.size, np.shape(drive_angles)[-1]
-    angles = np.broadcast_to(np.asarray(drive_angles, dtype=float), (count, each))
+    angles = np.atleast_2d(np.asarray(drive_angles, dtype=float))
     order = np.argsort(angles, axis=1, kind="stable")
-    increasing = np.take_along_axis(angles, order, axis=1)
-    strokes = Strokes(each * np.arange(count + 1), order.ravel(), increasing.ravel(), relative)
-    return answered(shapes, lanes, strokes, (count, each), tolerance=tolerance, **options)
+    strokes, each = angles.shape
+    asked = Strokes(
+        each * np.arange(strokes + 1), order.ravel(), np.take_along_axis(angles, order, axis=1).ravel(), relative
+    )
+    lanes = lanes._replace(stroke=lanes.contour % strokes)
+    return answered(shapes, lanes, asked, (lanes.contour.size, each), tolerance=tolerance, **options)
 
 
 def _as_states(columns: Floats) -> States:
     """States from what is kept of them, shape (..., columns); NaN where nothing is."""
     side_by_side = np.moveaxis(columns, -1, 0).copy()
     phase = side_by_side[0].astype(np.int8)
-    side_by_side[:, phase == NONE] = np.nan
+    np.copyto(side_by_side, np.nan, where=phase == NONE)
     _, parameter, x, y, alpha, drive_angle, moment, force_x, force_y, *rest = side_by_side
     arclength, tip_angle, by_slope, by_distance = rest
     lying = np.where(phase == TANGENTIAL, arclength, np.nan)
