@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from tactile_bayes.checks import check_choice, check_number, check_optional, refused
-from tactile_bayes.contact_fit import Reading
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.fitting import Reading
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
