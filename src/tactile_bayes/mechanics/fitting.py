@@ -1,11 +1,9 @@
-"""Contacts from noisy samples: taken at their word, or brought onto the sheets of possible contacts.
+"""The most likely contact: four noisy numbers, brought onto the sheets of possible contacts.
 
 A contact has three degrees of freedom, a sample has four numbers (drive angle, holding moment, two forces): the sum of
-squares that is left, in standard deviations, has one. Each phase is fitted on its sheet (`touching`); a sheet's optimum
-beyond the edge where the two meet does not count, and where neither has one before it, the most likely contact lies on
-the edge (`fits`).
-
-Dimensionless, relative to the pivot, forward contacts.
+squares that is left, in standard deviations, has one. Each phase is fitted by Levenberg's and Marquardt's method on its
+sheet (`touching`), all samples at once (`misses`); a sheet's optimum beyond the edge where the two meet does not count, and where
+neither has one before it, the most likely contact lies on the edge.
 """
 
 from __future__ import annotations
@@ -15,11 +13,31 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.phases import NONE
+from tactile_bayes.mechanics.elastica import contact_from_wrench
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, touch_room
 
-__all__ = ["ContactFit", "RawFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet", "raw_contacts"]
+__all__ = ["ContactFit", "RawFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet", "plain", "raw_contacts"]
 
 Floats = NDArray[np.float64]
+
+_FREE = {TIP: (FORCE, PSI1), TANGENTIAL: (FORCE, ARCLENGTH), None: (FORCE,)}
+"""Coordinates that are free on a sheet; None: on the edge."""
+
+_BLOCK = 4096
+
+_ROUGH, _ROUGH_STEPS = 1e-3, 10
+_SETTLED, _MOST_STEPS = 1e-12, 100
+"""Gain in the sum of squares that the next step promises, against one and the sum, at which a descent ends."""
+
+_OUTDONE = 2.0, 10.0
+"""Factor on the other sheet's sum of squares, and addend, beyond which a sheet that is roughly fitted is given up."""
+
+_STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Arc lengths to start from in tangential contact, and shares of its whole range for ψ1 in tip contact."""
+
+_LEAST_MOMENT = 0.1
+"""Standard deviations of the moment below which a start has not less of it."""
 
 
 class Reading(NamedTuple):
@@ -64,27 +82,30 @@ class ContactFit(NamedTuple):
     """Distance from the edge, in standard deviations of the coordinate that leads to it."""
     rival: Floats
     """By how much the sum of squares of the best contact of the other phase is larger; infinite where it has none."""
-    moment: Floats
-    """Holding moment of the contact."""
-    place: Floats
-    """Contact point, slope angle and arc length, shape (n, 4)."""
-    place_covariance: Floats
-    """Shape (n, 4, 4)."""
-    bend: Floats
-    """Squared distance, in the metric of the covariance, of the mean of two contacts that are one standard deviation to
-    either side from the contact; the largest of all axes, NaN where there is no such contact, shape (n,)."""
 
 
 class RawFit(NamedTuple):
     """Contacts of Step 2."""
 
     place: Floats
-    """Shape (n, 4)."""
+    """Contact point, slope angle and arc length, shape (n, 4)."""
     tip_angle: Floats
     covariance: Floats
     """Of the place, to first order, shape (n, 4, 4)."""
     bend: Floats
-    """As in `ContactFit`."""
+    """Squared distance, in the metric of the covariance, of the mean of two contacts that are one standard deviation to
+    either side from the contact; the largest of all axes, NaN where there is no such contact, shape (n,)."""
+
+
+def raw_contacts(reading: Reading, delta: Floats) -> RawFit:
+    """What Step 2 makes of n samples, with friction angles of shape (n,)."""
+    from tactile_bayes.mechanics.fits import raw_fits  # numba takes a second to load
+
+    count = delta.size
+    fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
+    room = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
+    raw_fits(plain(reading), np.array(delta), fit, *room, *touch_room())
+    return fit
 
 
 def fit_contacts(reading: Reading, friction_angle: Floats) -> ContactFit:
@@ -97,24 +118,45 @@ def fit_contacts(reading: Reading, friction_angle: Floats) -> ContactFit:
     friction_angle : ndarray, shape (n,)
         δ = arctan μ.
     """
-    from tactile_bayes.mechanics.fits import fits  # numba takes a second to load
+    size = reading.drive_angle.size
+    blocks = []
+    for begin in range(0, max(size, 1), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        blocks.append(_fit_block(reading.take(part), friction_angle[part]))
+    return ContactFit(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
 
-    count = friction_angle.size
-    fit = ContactFit(
-        coordinates=np.empty((count, 4)),
-        covariance=np.empty((count, 4, 4)),
-        misfit=np.empty(count),
-        phase=np.empty(count, np.int8),
-        at_edge=np.empty(count, np.bool_),
-        clearance=np.empty(count),
-        rival=np.empty(count),
-        moment=np.empty(count),
-        place=np.empty((count, 4)),
-        place_covariance=np.empty((count, 4, 4)),
-        bend=np.empty(count),
-    )
-    fits(_plain(reading), np.array(friction_angle), fit)
-    return fit
+
+def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
+    target = _Target(reading, delta)
+    tip, lying = _Descent(target, TIP), _Descent(target, TANGENTIAL)
+    everyone = np.arange(delta.size)
+    for descent in (tip, lying):
+        descent.go(everyone, _ROUGH, _ROUGH_STEPS)
+    tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
+    for descent, own, other in ((tip, tip_misfit, lying_misfit), (lying, lying_misfit, tip_misfit)):
+        descent.go(np.flatnonzero((own <= _OUTDONE[0] * other + _OUTDONE[1]) | np.isinf(other)), _SETTLED, _MOST_STEPS)
+    tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
+
+    ends = tip_misfit < lying_misfit
+    at_edge = np.isinf(np.minimum(tip_misfit, lying_misfit))
+    # Of a contact on the edge the variance is that of the sheet which the data miss by less.
+    ends[at_edge] = tip.misfit[at_edge] < lying.misfit[at_edge]
+    coordinates = np.where(ends[:, None], tip.z, lying.z)
+    covariance = np.where(ends[:, None, None], tip.covariance(), lying.covariance())
+    misfit = np.where(ends, tip.misfit, lying.misfit)
+    free = np.where(ends, PSI1, ARCLENGTH)[:, None]
+    spread = np.sqrt(np.take_along_axis(np.diagonal(covariance, axis1=1, axis2=2), free, axis=1)[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        clearance = np.where(ends, coordinates[:, PSI1] + delta, 1.0 - coordinates[:, ARCLENGTH]) / spread
+    where = np.flatnonzero(at_edge)
+    if where.size:
+        edge = _Descent(_Target(reading.take(where), delta[where]), None)
+        edge.go(np.arange(where.size), _SETTLED, _MOST_STEPS)
+        coordinates[where], misfit[where], clearance[where] = edge.z, edge.misfit, 0.0
+    phase = np.where(ends, np.int8(TIP), np.int8(TANGENTIAL))
+    with np.errstate(invalid="ignore"):
+        rival = np.where(at_edge, np.inf, np.maximum(tip_misfit, lying_misfit) - misfit)
+    return ContactFit(coordinates, covariance, misfit, phase, at_edge, clearance, rival)
 
 
 def fit_sheet(reading: Reading, delta: Floats, phase: int | None) -> SheetFit:
@@ -128,32 +170,138 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None) -> SheetFit:
         δ = arctan μ.
     phase : TIP, TANGENTIAL or None
     """
-    from tactile_bayes.mechanics.fits import sheet_fits  # numba takes a second to load
-
-    count = delta.size
-    fit = SheetFit(np.empty((count, 4)), np.empty((count, 4, 4)), np.empty(count))
-    sheet_fits(_plain(reading), np.array(delta), NONE if phase is None else phase, fit)
-    return fit
+    descent = _Descent(_Target(reading, delta), phase)
+    descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
+    return SheetFit(descent.z, descent.covariance(), descent.misfit)
 
 
-def raw_contacts(reading: Reading, delta: Floats) -> RawFit:
-    """What Step 2 makes of samples.
+class _Descent:
+    """Levenberg's and Marquardt's method on one sheet, for many samples."""
 
-    Parameters
-    ----------
-    reading : Reading
-        n samples.
-    delta : ndarray, shape (n,)
-        δ = arctan μ.
-    """
-    from tactile_bayes.mechanics.fits import raw_fits  # numba takes a second to load
+    def __init__(self, target: _Target, phase: int | None) -> None:
+        self._target = target
+        self._phase = phase
+        self._free = _FREE[phase] if target.is_exact else (*_FREE[phase], DRIVE_ANGLE)
+        self.z = _starts(target, phase)
+        self.misfit, self._pull, self._normal = target.at(self.z, np.arange(len(self.z)), self._free)
+        self._hardness = np.full(len(self.z), 1e-3)
 
-    count = delta.size
-    fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
-    raw_fits(_plain(reading), np.array(delta), fit)
-    return fit
+    def go(self, who: NDArray[np.intp], tolerance: float, most_steps: int) -> None:
+        """Descend until the gain that the next step promises is small."""
+        who = who[np.isfinite(self.misfit[who])]
+        with np.errstate(all="ignore"):  # a step into the impossible is none
+            for _ in range(most_steps):
+                if not who.size:
+                    return
+                who = self._step(who, tolerance)
+
+    def _step(self, who: NDArray[np.intp], tolerance: float) -> NDArray[np.intp]:
+        """One step, and who has not arrived with it."""
+        normal, pull = self._normal[who], self._pull[who]
+        index = np.arange(len(self._free))
+        normal[:, index, index] *= 1.0 + self._hardness[who, None]
+        step = (_inverse(normal) * pull[:, None, :]).sum(axis=2)
+        trial = self.z[who]
+        trial[:, self._free] -= step
+        new, new_pull, new_normal = self._target.at(trial, who, self._free)
+        better = new <= self.misfit[who]
+        settled = (step * pull).sum(axis=1) <= tolerance * (1.0 + self.misfit[who])
+        lucky = who[better]
+        self.z[lucky], self.misfit[lucky] = trial[better], new[better]
+        self._pull[lucky], self._normal[lucky] = new_pull[better], new_normal[better]
+        self._hardness[who] *= np.where(better, 0.1, 10.0)
+        return who[~settled]
+
+    def misfit_before(self, delta: Floats) -> Floats:
+        """Sum of squares; infinite for contacts beyond the edge."""
+        beyond = self.z[:, PSI1] < -delta if self._phase == TIP else self.z[:, ARCLENGTH] > 1.0
+        return np.where(beyond, np.inf, self.misfit)
+
+    def covariance(self) -> Floats:
+        """Of the coordinates, shape (n, 4, 4)."""
+        covariance = np.zeros((len(self.z), 4, 4))
+        covariance[np.ix_(range(len(self.z)), self._free, self._free)] = _inverse(self._normal)
+        return covariance
 
 
-def _plain(reading: Reading) -> Reading:
-    """In arrays of the one layout that is compiled."""
+def _inverse(matrix: Floats) -> Floats:
+    """Of symmetric positive matrices; infinite where there is none."""
+    scale = np.sqrt(np.diagonal(matrix, axis1=1, axis2=2))
+    with np.errstate(all="ignore"):
+        scaled = matrix / scale[:, :, None] / scale[:, None, :]
+        index = np.arange(matrix.shape[1])
+        scaled[:, index, index] = 1.0 + 1e-14
+        usable = np.isfinite(scaled).all(axis=(1, 2))
+        scaled[~usable] = np.eye(matrix.shape[1])
+        inverse = np.linalg.inv(scaled) / scale[:, :, None] / scale[:, None, :]
+    inverse[~usable] = np.inf
+    return inverse
+
+
+class _Target:
+    """Deviations of possible contacts from samples, in standard deviations."""
+
+    def __init__(self, reading: Reading, delta: Floats) -> None:
+        self.reading = reading
+        self.delta = delta
+        self.is_exact = not np.any(reading.angle_deviation)
+        self._plain = plain(reading)
+        self._whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
+
+    def at(self, z: Floats, who: NDArray[np.intp], free: tuple[int, ...]) -> tuple[Floats, Floats, Floats]:
+        """Sums of squares, half their derivatives by the free coordinates, and Gauss's half of the second ones.
+
+        Shapes (n,), (n, free) and (n, free, free); infinite sums where there is no such contact.
+        """
+        from tactile_bayes.mechanics.fits import misses  # numba takes a second to load
+
+        count, size = len(free), who.size
+        out = np.empty(size), np.empty((size, count)), np.empty((size, count, count))
+        room = np.empty((4, count + 1)), *touch_room()
+        misses(self._plain, self._whitening, z, who, np.array(free), *out, *room)
+        return out
+
+
+def plain(reading: Reading) -> Reading:
+    """A reading in arrays of the one layout that is compiled."""
     return Reading(*(np.array(column, dtype=float, order="C") for column in reading))
+
+
+def _starts(target: _Target, phase: int | None) -> Floats:
+    """Coordinates to start from: those of raw Step 2, or the best of several where it has no answer."""
+    reading, delta = target.reading, target.delta
+    force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
+    z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
+    if phase is None:
+        coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
+    else:
+        arclength, psi1 = _raw_start(reading, delta)
+        if phase == TIP:
+            spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
+            coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
+        else:
+            spread = [np.full(force.size, share) for share in _STARTS]
+            coordinate, options = ARCLENGTH, [np.clip(arclength, 0.02, 1.0), *spread]
+    best = np.full(force.size, np.inf)
+    found = np.full(z.shape, np.nan)
+    left = np.arange(force.size)
+    for number, values in enumerate(options):
+        trial = z[left]
+        trial[:, coordinate] = values[left]
+        misfit = target.at(trial, left, _FREE[phase])[0]
+        with np.errstate(invalid="ignore"):
+            better = misfit < best[left]
+        best[left[better]], found[left[better]] = misfit[better], trial[better]
+        if number == 0 and phase is not None:
+            left = np.flatnonzero(np.isinf(best))
+            if not left.size:
+                break
+    return found
+
+
+def _raw_start(reading: Reading, delta: Floats) -> tuple[Floats, Floats]:
+    """Arc length and ψ1 of raw Step 2; where the moment has the wrong sign, of one that is small and right."""
+    moment, force_x, force_y = reading.loads.T
+    least = _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
+    raw = contact_from_wrench(reading.drive_angle, np.maximum(moment, least), force_x, force_y, delta, side=1.0)
+    return raw.contact_arclength, raw.tip_angle - raw.slope_angle - delta

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.arc import arc_and_slopes, arc_to
-from tactile_bayes.mechanics.compiler import compiled, inlined, kept
+from tactile_bayes.mechanics.compiler import compiled, kept
 
-__all__ = ["Move", "Touch", "Touches", "chords", "moved", "room_for_ratios", "touch", "touches", "wrench_slopes"]
+__all__ = ["chords", "moved", "touch", "touches", "wrench_slopes"]
 
 Floats = NDArray[np.float64]
 
@@ -23,48 +23,16 @@ _EPSILON = 1e-16
 """Half the difference of two means, over the mean, below which they are one."""
 
 
-class _Bend(NamedTuple):
-    """Chord from the pivot along and across the direction at the contact, and turn; or derivatives of them."""
+class Bend(NamedTuple):
+    """What else there is to know of a touching rod; NaN where there is none."""
 
-    along: float
-    across: float
-    turn: float
-
-
-class Touch(NamedTuple):
-    """What the base of a touching rod feels, where it touches, and β; or derivatives of all that."""
-
-    moment: float
-    force_x: float
-    force_y: float
-    x: float
-    y: float
-    beta: float
-
-
-class Touches(NamedTuple):
-    """A touching rod, NaN if there is none, and how it changes with its coordinates."""
-
-    rod: Touch
-    by_force: Touch
-    by_psi1: Touch
-    by_arclength: Touch
-    by_drive_angle: Touch
+    chi: float
+    """Amplitude of the arc to the pivot."""
+    length_by_psi1: float
+    """Of the arc to that amplitude."""
     volume_tip: float
     volume_tangential: float
     """As in `Touching`."""
-    chi: float
-    length_by_psi1: float
-    """Of the arc to the amplitude χ at the pivot."""
-
-
-class Move(NamedTuple):
-    """Change of a place, to first order."""
-
-    x: float
-    y: float
-    slope_angle: float
-    arclength: float
 
 
 @compiled
@@ -86,96 +54,99 @@ def _amplitude(load: float, m: float, ratios: Floats) -> float:
     return chi
 
 
-@inlined
-def _column(rod: Touch, by: _Bend, cos: float, sin: float, beta: float, growth: float) -> Touch:
+@compiled
+def _column(
+    along: float, across: float, turn: float, beta: float, growth: float, cos: float, sin: float, by: Floats, c: int
+) -> None:
     """Derivatives by a coordinate from those in the direction at the contact, of β, and of the force's logarithm."""
-    x, y = by.along * cos - by.across * sin + rod.y * by.turn, by.along * sin + by.across * cos - rod.x * by.turn
-    fx, fy = growth * rod.force_x - beta * rod.force_y, growth * rod.force_y + beta * rod.force_x
-    moment = x * rod.force_y + rod.x * fy - y * rod.force_x - rod.y * fx
-    return Touch(moment, fx, fy, x, y, beta)
+    fx, fy, x, y = by[0, 1], by[0, 2], by[0, 3], by[0, 4]
+    x_by, y_by = along * cos - across * sin + y * turn, along * sin + across * cos - x * turn
+    fx_by, fy_by = growth * fx - beta * fy, growth * fy + beta * fx
+    by[c, 0] = x_by * fy + x * fy_by - y_by * fx - y * fx_by
+    by[c, 1], by[c, 2], by[c, 3], by[c, 4], by[c, 5] = fx_by, fy_by, x_by, y_by, beta
 
 
 @compiled
-def touch(force: float, psi1: float, arclength: float, drive_angle: float, ratios: Floats) -> Touches:
-    """One rod by its coordinates; `ratios` is `room_for_ratios`."""
+def touch(z: Floats, i: int, by: Floats, ratios: Floats) -> Bend:
+    """One rod, NaN if there is none.
+
+    Parameters
+    ----------
+    z : ndarray, shape (n, 4)
+        Coordinates, as `touching` takes them; the i-th is meant.
+    by : ndarray, shape (5, 6)
+        Stores moment and force at the base, contact point and direction β of the force; then their derivatives by each
+        coordinate.
+    ratios : ndarray, shape (20,)
+        For notes: where 1 − m is 1e-300, it takes 16 means.
+    """
+    force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
     possible = abs(psi1) < 0.5 * math.pi and arclength > 0.0 and 0.0 < force < math.inf
-    m = math.sin(0.25 * math.pi - 0.5 * psi1) ** 2
-    root = math.sqrt(force)
-    chi = _amplitude(root * arclength, m, ratios) if possible else math.nan
+    m, root, chi = math.sin(0.25 * math.pi - 0.5 * psi1) ** 2, math.sqrt(force), math.nan
+    if possible:
+        chi = _amplitude(root * arclength, m, ratios)
     if math.isnan(chi):
-        none = Touch(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
-        return Touches(none, none, none, none, none, math.nan, math.nan, chi, math.nan)
+        for c in range(5):
+            for k in range(6):
+                by[c, k] = math.nan
+        return Bend(math.nan, math.nan, math.nan, math.nan)
     arc, by_chi, by_psi1 = arc_and_slopes(chi, m)
     short, off, turn = by_chi.shortfall / by_chi.length, by_chi.offset / by_chi.length, by_chi.turn / by_chi.length
     per_force = 0.5 * arclength / root
-    at = _Bend(arclength - arc.shortfall / root, arc.offset / root, arc.turn)
-    by_f = _Bend(
-        (0.5 * arc.shortfall / force - short * per_force) / root,
-        (off * per_force - 0.5 * arc.offset / force) / root,
-        turn * per_force,
-    )
-    by_1 = _Bend(
-        (by_psi1.length * short - by_psi1.shortfall) / root,
-        (by_psi1.offset - by_psi1.length * off) / root,
-        by_psi1.turn - by_psi1.length * turn,
-    )
-    by_s = _Bend(1.0 - short, off, turn * root)
+    along, across = arclength - arc.shortfall / root, arc.offset / root
+    along_f = (0.5 * arc.shortfall / force - short * per_force) / root
+    across_f = (off * per_force - 0.5 * arc.offset / force) / root
+    along_1 = (by_psi1.length * short - by_psi1.shortfall) / root
+    across_1 = (by_psi1.offset - by_psi1.length * off) / root
+    turn_f, turn_1, turn_s = turn * per_force, by_psi1.turn - by_psi1.length * turn, turn * root
 
     tip_angle = drive_angle - arc.turn
     beta = tip_angle - psi1
     cos, sin = math.cos(tip_angle), math.sin(tip_angle)
     fx, fy = -force * math.sin(beta), force * math.cos(beta)
-    x, y = at.along * cos - at.across * sin, at.along * sin + at.across * cos
-    rod = Touch(x * fy - y * fx, fx, fy, x, y, beta)
-    return Touches(
-        rod,
-        _column(rod, by_f, cos, sin, -by_f.turn, 1.0 / force),
-        _column(rod, by_1, cos, sin, -by_1.turn - 1.0, 0.0),
-        _column(rod, by_s, cos, sin, -by_s.turn, 0.0),
-        Touch(0.0, -fy, fx, -y, x, 1.0),  # the whole turns
-        # In polar coordinates r, ϑ of the contact the volume is r ∂(r, ϑ − α), as all turn with the drive.
-        abs(by_f.along * by_1.across - by_1.along * by_f.across + at.along * by_f.along + at.across * by_f.across),
-        abs(by_f.along * by_s.across - by_s.along * by_f.across),
+    x, y = along * cos - across * sin, along * sin + across * cos
+    by[0, 0], by[0, 1], by[0, 2], by[0, 3], by[0, 4], by[0, 5] = x * fy - y * fx, fx, fy, x, y, beta
+    _column(along_f, across_f, turn_f, -turn_f, 1.0 / force, cos, sin, by, 1)
+    _column(along_1, across_1, turn_1, -turn_1 - 1.0, 0.0, cos, sin, by, 2)
+    _column(1.0 - short, off, turn_s, -turn_s, 0.0, cos, sin, by, 3)
+    by[4, 0], by[4, 1], by[4, 2], by[4, 3], by[4, 4], by[4, 5] = 0.0, -fy, fx, -y, x, 1.0  # the whole turns
+    return Bend(
         chi,
         by_psi1.length,
+        # In polar coordinates r, ϑ of the contact the volume is r ∂(r, ϑ − α), as all turn with the drive.
+        abs(along_f * across_1 - along_1 * across_f + along * along_f + across * across_f),
+        abs(along_f * off - (1.0 - short) * across_f),
     )
 
 
 @compiled
-def moved(at: Touches, psi1: float, arclength: float, angle: float, moment: float, fx: float, fy: float) -> Move:
+def moved(
+    z: Floats, i: int, bend: Bend, by: Floats, angle: float, moment: float, fx: float, fy: float
+) -> tuple[float, float, float, float]:
     """By how much the place moves, to first order, when drive angle and loads are so much more: the slopes of Step 2.
 
     By equation 26 sin ψ1 = sin ψ0 − m0²/(2 f), where ψ0 = φ0 − β. As ψ1 goes with ψ0, m0 and f held, so does the arc to
     χ: √f cos ψ1 ∂s1/∂ψ0 = ∂F/∂ψ1 cos ψ0 + (sin ψ1 flat + cos ψ1 steep) flat sin χ/Δ³, which is 0/0 in terms of turns.
     """
-    rod, m = at.rod, math.sin(0.25 * math.pi - 0.5 * psi1) ** 2
-    force2 = rod.force_x * rod.force_x + rod.force_y * rod.force_y
-    force, cos1 = math.sqrt(force2), 2.0 * math.sqrt(m * (1.0 - m))
-    w = math.sin(0.5 * at.chi) ** 2
+    force, m = z[i, 0], math.sin(0.25 * math.pi - 0.5 * z[i, 1]) ** 2
+    cos1, w = 2.0 * math.sqrt(m * (1.0 - m)), math.sin(0.5 * bend.chi) ** 2
     flat, steep = 1.0 - 2.0 * m * w, cos1 * w
     d2 = flat * flat + steep * steep
     cos0 = (cos1 * (flat - steep) * (flat + steep) - 2.0 * (1.0 - 2.0 * m) * flat * steep) / d2
-    along = ((1.0 - 2.0 * m) * flat + cos1 * steep) * flat * math.sin(at.chi) / (d2 * math.sqrt(d2))
+    along = ((1.0 - 2.0 * m) * flat + cos1 * steep) * flat * math.sin(bend.chi) / (d2 * math.sqrt(d2))
 
-    by_force = (rod.force_x * fx + rod.force_y * fy) / force
-    beta = (rod.force_x * fy - rod.force_y * fx) / force2
-    psi0 = angle - beta
-    lost = moment / force - 0.5 * rod.moment * by_force / force2
-    by_psi1 = (cos0 * psi0 - rod.moment * lost) / cos1
-    by_arclength = (along + at.length_by_psi1 * cos0) / (cos1 * math.sqrt(force)) * psi0
-    by_arclength -= at.by_psi1.beta * lost / cos1 + 0.5 * arclength * by_force / force
-    return Move(
-        at.by_force.x * by_force + at.by_psi1.x * by_psi1 + at.by_arclength.x * by_arclength - rod.y * angle,
-        at.by_force.y * by_force + at.by_psi1.y * by_psi1 + at.by_arclength.y * by_arclength + rod.x * angle,
+    by_force = (by[0, 1] * fx + by[0, 2] * fy) / force
+    beta = (by[0, 1] * fy - by[0, 2] * fx) / (force * force)
+    psi0, lost = angle - beta, (moment - 0.5 * by[0, 0] * by_force / force) / force
+    by_psi1 = (cos0 * psi0 - by[0, 0] * lost) / cos1
+    by_arclength = (along + bend.length_by_psi1 * cos0) / (cos1 * math.sqrt(force)) * psi0
+    by_arclength -= by[2, 5] * lost / cos1 + 0.5 * z[i, 2] * by_force / force
+    return (
+        by[1, 3] * by_force + by[2, 3] * by_psi1 + by[3, 3] * by_arclength + by[4, 3] * angle,
+        by[1, 4] * by_force + by[2, 4] * by_psi1 + by[3, 4] * by_arclength + by[4, 4] * angle,
         beta,
         by_arclength,
     )
-
-
-@compiled
-def room_for_ratios() -> Floats:
-    """For what `touch` notes on the way: 1 − m of 1e-300 takes 16 means."""
-    return np.empty(20)
 
 
 @kept
@@ -187,6 +158,8 @@ def touches(
     volumes: Floats,
     loads_by: Floats,
     place_by: Floats,
+    by: Floats,
+    ratios: Floats,
 ) -> None:
     """Loads and places of touching rods, NaN where there is none.
 
@@ -200,32 +173,31 @@ def touches(
         As in `Touching`.
     loads_by, place_by : ndarray, shapes (n, 3, 4) and (n, 4, 4), or none of them
         As in `TouchingSlopes`.
+    by, ratios : ndarray
+        As in `touch`.
     """
-    ratios = room_for_ratios()
     for i in range(delta.size):
-        arclength = coordinates[i, 2]
-        at = touch(coordinates[i, 0], coordinates[i, 1], arclength, coordinates[i, 3], ratios)
-        rod = at.rod
-        loads[0, i], loads[1, i], loads[2, i] = rod.moment, rod.force_x, rod.force_y
-        place[0, i], place[1, i], place[2, i], place[3, i] = rod.x, rod.y, rod.beta - delta[i], arclength
-        volumes[0, i], volumes[1, i] = at.volume_tip, at.volume_tangential
+        bend = touch(coordinates, i, by, ratios)
+        for k in range(3):
+            loads[k, i] = by[0, k]
+        place[0, i], place[1, i], place[2, i], place[3, i] = by[0, 3], by[0, 4], by[0, 5] - delta[i], coordinates[i, 2]
+        volumes[0, i], volumes[1, i] = bend.volume_tip, bend.volume_tangential
         if loads_by.shape[0]:
-            for c, by in enumerate((at.by_force, at.by_psi1, at.by_arclength, at.by_drive_angle)):
-                loads_by[i, 0, c], loads_by[i, 1, c], loads_by[i, 2, c] = by.moment, by.force_x, by.force_y
-                place_by[i, 0, c], place_by[i, 1, c], place_by[i, 2, c] = by.x, by.y, by.beta
+            for c in range(4):
+                for k in range(3):
+                    loads_by[i, k, c], place_by[i, k, c] = by[c + 1, k], by[c + 1, k + 3]
                 place_by[i, 3, c] = 1.0 if c == 2 else 0.0
 
 
 @kept
-def wrench_slopes(coordinates: Floats, out: Floats) -> None:
+def wrench_slopes(coordinates: Floats, by: Floats, ratios: Floats, out: Floats) -> None:
     """Derivatives of places by drive angle and loads, shape (n, 4, 4)."""
-    ratios = room_for_ratios()
     for i in range(coordinates.shape[0]):
-        force, psi1, arclength, drive_angle = coordinates[i]
-        at = touch(force, psi1, arclength, drive_angle, ratios)
+        bend = touch(coordinates, i, by, ratios)
         for c in range(4):
-            by = moved(at, psi1, arclength, 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3))
-            out[i, 0, c], out[i, 1, c], out[i, 2, c], out[i, 3, c] = by.x, by.y, by.slope_angle, by.arclength
+            change = moved(coordinates, i, bend, by, 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3))
+            for k in range(4):
+                out[i, k, c] = change[k]
 
 
 @kept

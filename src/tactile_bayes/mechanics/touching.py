@@ -24,6 +24,7 @@ __all__ = [
     "Touching",
     "TouchingSlopes",
     "place_by_wrench",
+    "touch_room",
     "touching",
     "touching_and_slopes",
 ]
@@ -91,8 +92,13 @@ def _touches(coordinates: Floats, friction_angle: Floats | float, slopes: int) -
     delta = np.array(np.broadcast_to(friction_angle, (count,)), dtype=float)
     loads, place, volumes = np.empty((3, count)), np.empty((4, count)), np.empty((2, count))
     by = TouchingSlopes(np.empty((slopes, 3, 4)), np.empty((slopes, 4, 4)))
-    touches(coordinates, delta, loads, place, volumes, *by)
+    touches(coordinates, delta, loads, place, volumes, *by, *touch_room())
     return Touching(loads, place, *volumes), by
+
+
+def touch_room() -> tuple[Floats, Floats]:
+    """Arrays for `touches.touch` to write in."""
+    return np.empty((5, 6)), np.empty(20)
 
 
 def place_by_wrench(coordinates: Floats) -> Floats:
@@ -106,5 +112,5 @@ def place_by_wrench(coordinates: Floats) -> Floats:
     from tactile_bayes.mechanics.touches import wrench_slopes  # numba takes a second to load
 
     slopes = np.empty((len(coordinates), 4, 4))
-    wrench_slopes(np.ascontiguousarray(coordinates, dtype=float), slopes)
+    wrench_slopes(np.ascontiguousarray(coordinates, dtype=float), *touch_room(), slopes)
     return slopes

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.fitting import fit_contacts
+from tactile_bayes.mechanics.fitting import ContactFit, fit_contacts
+from tactile_bayes.mechanics.touching import touching, touching_and_slopes
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,
     EITHER_PHASE,
@@ -52,18 +53,26 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     with np.errstate(over="ignore"):
         usable = np.isfinite(samples.reading.loads**2).all(axis=1)
     where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)
-    reading = samples.reading.take(where)
-    fit = fit_contacts(reading, delta[where])
-    found = np.isfinite(fit.misfit) & np.isfinite(fit.place).all(axis=1)
-    bent = is_weak(reading) | bends_too_much(fit.bend)
-    # At the ends of what is possible: the line of force through the pivot, or an upright contour.
-    bent |= fit.moment < np.sqrt(reading.covariance[:, 0, 0])
-    bent |= np.abs(fit.place[:, 2]) > 0.49 * np.pi
-    kinds = (~found, fit.misfit > _MISFIT, fit.clearance < _CLEARANCE, fit.rival < _RIVAL, bent)
-    status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
-    where = where[found]
-    place[where], covariance[where], phase[where] = fit.place[found], fit.place_covariance[found], fit.phase[found]
-    misfit[where], distance[where] = fit.misfit[found], fit.clearance[found]
+    if where.size:
+        reading = samples.reading.take(where)
+        fit = fit_contacts(reading, delta[where])
+        rod, slopes = touching_and_slopes(fit.coordinates, delta[where])
+        found = np.isfinite(fit.misfit) & np.isfinite(rod.place).all(axis=0)
+        by = slopes.place
+        with np.errstate(over="ignore", invalid="ignore"):
+            spread = by @ fit.covariance @ np.swapaxes(by, 1, 2)
+        covariance[where] = np.where(found[:, None, None], spread, np.nan)
+        place[where] = np.where(found[:, None], rod.place.T, np.nan)
+        phase[where] = np.where(found, fit.phase, 0)
+        misfit[where], distance[where] = np.where(found, (fit.misfit, fit.clearance), np.nan)
+        bent = is_weak(reading.loads, reading.covariance)
+        with np.errstate(invalid="ignore"):
+            # At the ends of what is possible: the line of force through the pivot, or an upright contour.
+            bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
+            bent |= np.abs(rod.place[2]) > 0.49 * np.pi
+        bent |= bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
+        kinds = (~found, fit.misfit > _MISFIT, fit.clearance < _CLEARANCE, fit.rival < _RIVAL, bent)
+        status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
     return Estimate(place, covariance, phase, status, misfit, distance)
 
 
@@ -85,3 +94,19 @@ def refuse_without_noise(samples: Samples) -> None:
             "which contact is most likely depends on the noise of every channel, and the load cell has none on at "
             "least one: give LoadCell(force_noise=..., moment_noise=...), or one of LoadCell.from_zero_load(record)"
         )
+
+
+def _aside(fit: ContactFit, delta: Floats) -> list[tuple[Floats, Floats]]:
+    """Contacts one standard deviation aside, along the axes of the covariance."""
+    scale = np.sqrt(np.diagonal(fit.covariance, axis1=1, axis2=2))
+    scale = np.where((scale > 0.0) & np.isfinite(scale), scale, 1.0)
+    with np.errstate(invalid="ignore"):
+        scaled = np.nan_to_num(fit.covariance / scale[:, :, None] / scale[:, None, :], posinf=1e6)
+    variances, axes = np.linalg.eigh(scaled)
+    pairs = []
+    for k in range(4):
+        step = scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
+        if np.any(variances[:, k] > 1e-9):
+            more, less = (touching(fit.coordinates + sign * step, delta).place.T for sign in (1.0, -1.0))
+            pairs.append((more, less))
+    return pairs

@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.fitting import Reading
-
 __all__ = [
     "AT_EDGE",
     "BEYOND_TIP",
     "CUT_OFF",
     "EITHER_PHASE",
+    "MOST_BEND",
     "NONLINEAR",
     "NO_CONTACT",
     "NO_FIT",
@@ -44,11 +43,13 @@ STATUSES = (
 )
 """What can become of a sample, by code."""
 
-_MOST_BEND = 0.5
+MOST_BEND = 0.5
 """Shift by curvature, in standard deviations, above which a covariance of first order is not to be trusted."""
 
 _WEAK = 10.0
 """Standard deviations of the noise below which a force is weak: its direction is then hardly known."""
+
+_ROUNDING = 1e-9
 
 
 class Estimate(NamedTuple):
@@ -82,15 +83,36 @@ def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floa
     return along, normal
 
 
-def is_weak(reading: Reading) -> NDArray[np.bool_]:
-    """Whether forces are not much larger than their noise."""
-    (_, x, y), covariance = reading.loads.T, reading.covariance
+def is_weak(loads: Floats, covariance: Floats) -> NDArray[np.bool_]:
+    """Whether forces, of loads (n, 3) with covariance (n, 3, 3), are not much larger than their noise."""
+    force = loads[:, 1:]
     with np.errstate(invalid="ignore", over="ignore"):
-        squared = x * x + y * y
-        noise = x * x * covariance[:, 1, 1] + 2.0 * x * y * covariance[:, 1, 2] + y * y * covariance[:, 2, 2]
-        return np.asarray(squared * squared < _WEAK**2 * noise)
+        squared = (force * force).sum(axis=1)
+        noise = np.einsum("ni,nij,nj->n", force, covariance[:, 1:, 1:], force) / np.where(squared > 0.0, squared, 1.0)
+        return np.asarray(squared < _WEAK**2 * noise)
 
 
-def bends_too_much(bend: Floats) -> NDArray[np.bool_]:
-    """Whether contacts one standard deviation aside do not lie as a covariance of first order has it, or not exist."""
-    return ~(bend <= _MOST_BEND**2)
+def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> NDArray[np.bool_]:
+    """Whether contacts one standard deviation aside do not lie as a covariance of first order has it.
+
+    Parameters
+    ----------
+    place : ndarray, shape (n, 4)
+    covariance : ndarray, shape (n, 4, 4)
+    aside : list of pairs of ndarray, shape (n, ≥ 2)
+        Where the contact would be, had the data been one standard deviation more, or less, of each independent error.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        True as well where such a contact does not exist.
+    """
+    xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
+    bent = np.zeros(len(place), dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        area = xx * yy - xy * xy
+        for more, less in aside:
+            x, y = (0.5 * (more[:, axis] + less[:, axis]) - place[:, axis] for axis in (0, 1))
+            shift = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / area
+            bent |= ~((shift <= MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
+    return bent

@@ -9,10 +9,10 @@ from tactile_bayes.mechanics.fitting import raw_contacts
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.reconstruction.estimate import (
     BEYOND_TIP,
+    MOST_BEND,
     NONLINEAR,
     OK,
     Estimate,
-    bends_too_much,
     is_weak,
     unanswered,
 )
@@ -39,7 +39,9 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
         if samples.has_noise:
             covariance = fit.covariance
             covariance[~found] = np.nan
-            status[found & (is_weak(samples.reading) | bends_too_much(fit.bend))] = NONLINEAR
+            status[
+                found & (is_weak(samples.reading.loads, samples.reading.covariance) | ~(fit.bend <= MOST_BEND**2))
+            ] = NONLINEAR
         status[found & (arclength > 1.0 + _ROUNDING)] = BEYOND_TIP
     fit.place[~found] = np.nan
     phase = np.where(found, np.where(tip, TIP, TANGENTIAL), NONE).astype(np.int8)
