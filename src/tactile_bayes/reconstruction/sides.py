@@ -65,6 +65,10 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     direction = np.where(record.direction.values == "backward", -1.0, 1.0)
     side = direction.copy()
     stated = _stated(record)
+    if set(np.unique(record.sweep.values).tolist()) <= set(stated):
+        for sweep, named in stated.items():
+            side[record.sweep.values == sweep] = -1.0 if named == "backward" else 1.0
+        return side
     for one in _judged(record, load_cell):
         if one.sweep in stated:
             side[one.rows] = -1.0 if stated[one.sweep] == "backward" else 1.0
