@@ -1,8 +1,9 @@
-"""One contact from one noisy sample: what Step 2 makes of it, and how far a possible one is off, as `fitting` asks."""
+"""One contact from one noisy sample: what Step 2 makes of it, and the descent to the most likely one (`fitting`)."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,10 @@ from tactile_bayes.mechanics.fitting import RawFit, Reading
 from tactile_bayes.mechanics.states import contact
 from tactile_bayes.mechanics.touches import moved, touch
 
-__all__ = ["misses", "raw_fits"]
+__all__ = ["Room", "descents", "raw_fits"]
 
 Floats = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 _MOST_SWEEPS = 30
 
@@ -28,65 +30,137 @@ _SAME = 1e-9
 """Distance below which two places are the same, but for rounding."""
 
 
+class Room(NamedTuple):
+    """Arrays to write in, for k free coordinates."""
+
+    trial: Floats
+    """Shape (1, 4)."""
+    slopes: Floats
+    """Derivatives of deviations, and these in a last column, shape (4, k + 1)."""
+    inverse: Floats
+    """Shape (k, k)."""
+    by: Floats
+    ratios: Floats
+    """As in `touch`."""
+
+
+@compiled
+def _miss(reading: Reading, whitening: Floats, i: int, z: Floats, j: int, free: Index, room: Room) -> float:
+    """Sum of squared deviations, in standard deviations, of a possible contact from a sample; infinite if none."""
+    slopes, by, count = room.slopes, room.by, free.size
+    touch(z, j, by, room.ratios)
+    deviation, turned = reading.angle_deviation[i], z[j, 3] - reading.drive_angle[i]
+    for r in range(4):
+        for c in range(count + 1):
+            slopes[r, c] = 0.0
+    for s in range(3):
+        lean = reading.leaning[i, s]
+        off = by[0, s] - reading.loads[i, s] - lean * turned
+        for r in range(s, 3):
+            slopes[r, count] += whitening[i, r, s] * off
+            for c in range(count):
+                slopes[r, c] += whitening[i, r, s] * (by[1 + free[c], s] - (lean if free[c] == 3 else 0.0))
+    if deviation > 0.0:
+        slopes[3, count] = turned / deviation
+        slopes[3, count - 1] = 1.0 / deviation if free[count - 1] == 3 else 0.0
+    total = 0.0
+    for r in range(4):
+        total += slopes[r, count] * slopes[r, count]
+    return math.inf if math.isnan(total) else total
+
+
 @kept
-def misses(
+def descents(
     reading: Reading,
     whitening: Floats,
+    who: Index,
+    free: Index,
+    gain: float,
+    steps: int,
     z: Floats,
-    who: NDArray[np.intp],
-    free: NDArray[np.intp],
     misfit: Floats,
-    pull: Floats,
     normal: Floats,
-    slopes: Floats,
-    by: Floats,
-    ratios: Floats,
+    hardness: Floats,
+    room: Room,
 ) -> None:
-    """Squared deviations of possible contacts from samples, in standard deviations, to second order.
+    """Levenberg's and Marquardt's steps, until the gain that the next one promises is small.
 
     Parameters
     ----------
     reading : Reading
     whitening : ndarray, shape (n, 3, 3)
         Inverse of the lower triangular root of the covariance of the loads.
-    z : ndarray, shape (m, 4)
-        Coordinates.
-    who : ndarray, shape (m,)
-        Their samples.
+    who : ndarray
+        Samples that are to descend.
     free : ndarray, shape (k,)
         Coordinates that are free, the drive angle as the last if it is among them.
-    misfit, pull, normal : ndarray, shapes (m,), (m, k) and (m, k, k)
-        Stores sums of squares, half their derivatives, and Gauss's half of the second ones.
-    slopes, by, ratios : ndarray, shape (4, k + 1), and as in `touch`
+    gain : float
+        What is small, against one and the sum of squares.
+    steps : int
+        At most; with none, the samples are looked at where they are.
+    z, misfit, normal, hardness : ndarray, shapes (n, 4), (n,), (n, k, k + 1) and (n,)
+        Coordinates, sums of squares, Gauss's half of their second derivatives and in a last column half the first ones,
+        and by how much the diagonal is raised.
     """
-    count = free.size
+    count, inverse, slopes, trial = free.size, room.inverse, room.slopes, room.trial
     for j in range(who.size):
         i = who[j]
-        touch(z, j, by, ratios)
-        deviation, turned = reading.angle_deviation[i], z[j, 3] - reading.drive_angle[i]
-        slopes[:] = 0.0
-        for s in range(3):
-            lean = reading.leaning[i, s]
-            off = by[0, s] - reading.loads[i, s] - lean * turned
-            for r in range(s, 3):
-                slopes[r, count] += whitening[i, r, s] * off
-                for c in range(count):
-                    slopes[r, c] += whitening[i, r, s] * (by[1 + free[c], s] - (lean if free[c] == 3 else 0.0))
-        if deviation > 0.0:
-            slopes[3, count] = turned / deviation
-            slopes[3, count - 1] = 1.0 / deviation if free[count - 1] == 3 else 0.0
-        total = 0.0
-        for r in range(4):
-            total += slopes[r, count] * slopes[r, count]
-        misfit[j] = math.inf if math.isnan(total) else total
+        for _ in range(max(steps, 1)):
+            settled = steps == 0
+            for k in range(4):
+                trial[0, k] = z[i, k]
+            if steps > 0:
+                if not misfit[i] < math.inf:
+                    break
+                _invert(normal, i, 1.0 + hardness[i], inverse)
+                promised = 0.0
+                for a in range(count):
+                    step = 0.0
+                    for b in range(count):
+                        step += inverse[a, b] * normal[i, b, count]
+                    promised += step * normal[i, a, count]
+                    trial[0, free[a]] -= step
+                settled = promised <= gain * (1.0 + misfit[i])
+            new = _miss(reading, whitening, i, trial, 0, free, room)
+            if steps == 0 or new <= misfit[i]:
+                misfit[i] = new
+                hardness[i] *= 0.1
+                for k in range(4):
+                    z[i, k] = trial[0, k]
+                for a in range(count):
+                    for b in range(count + 1):
+                        total = 0.0
+                        for r in range(4):
+                            total += slopes[r, a] * slopes[r, b]
+                        normal[i, a, b] = total
+            else:
+                hardness[i] *= 10.0
+            if settled:
+                break
+
+
+@compiled
+def _invert(normal: Floats, i: int, harder: float, inverse: Floats) -> None:
+    """A symmetric positive matrix whose diagonal is so many times as large; NaN where there is no inverse."""
+    count = inverse.shape[0]
+    for a in range(count):
+        for b in range(count):
+            inverse[a, b] = normal[i, a, b] / math.sqrt(normal[i, a, a] * normal[i, b, b]) / harder
+        inverse[a, a] = 1.0 + 1e-14
+    for p in range(count):
+        pivot = inverse[p, p]
+        inverse[p, p] = 1.0
+        for b in range(count):
+            inverse[p, b] /= pivot
         for a in range(count):
-            pull[j, a] = 0.0
-            for r in range(4):
-                pull[j, a] += slopes[r, a] * slopes[r, count]
-            for b in range(count):
-                normal[j, a, b] = 0.0
-                for r in range(4):
-                    normal[j, a, b] += slopes[r, a] * slopes[r, b]
+            if a != p:
+                factor = inverse[a, p]
+                inverse[a, p] = 0.0
+                for b in range(count):
+                    inverse[a, b] -= factor * inverse[p, b]
+    for a in range(count):
+        for b in range(count):
+            inverse[a, b] /= math.sqrt(normal[i, a, a] * normal[i, b, b]) * harder
 
 
 @kept

@@ -182,35 +182,53 @@ class _Descent:
         self._target = target
         self._phase = phase
         self._free = _FREE[phase] if target.is_exact else (*_FREE[phase], DRIVE_ANGLE)
-        self.z = _starts(target, phase)
-        self.misfit, self._pull, self._normal = target.at(self.z, np.arange(len(self.z)), self._free)
-        self._hardness = np.full(len(self.z), 1e-3)
+        self.z = np.full((target.delta.size, 4), np.nan)
+        count = len(self.z)
+        self.misfit = np.full(count, np.inf)
+        self._normal = np.full((count, len(self._free), len(self._free) + 1), np.nan)
+        self._hardness = np.full(count, 1e-3)
+        self._start()
 
-    def go(self, who: NDArray[np.intp], tolerance: float, most_steps: int) -> None:
+    def _start(self) -> None:
+        """Start from raw Step 2, or from the best of several contacts where that has no answer."""
+        reading, delta, phase = self._target.reading, self._target.delta, self._phase
+        force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
+        z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
+        if phase is None:
+            coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
+        else:
+            arclength, psi1 = _raw_start(reading, delta)
+            if phase == TIP:
+                spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
+                coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
+            else:
+                spread = [np.full(force.size, share) for share in _STARTS]
+                coordinate, options = ARCLENGTH, [np.clip(arclength, 0.02, 1.0), *spread]
+        left = np.arange(force.size)
+        best, found = np.full(force.size, np.inf), self.z
+        for number, values in enumerate(options):
+            self.z = z.copy()
+            self.z[:, coordinate] = values
+            self.go(left, 0.0, 0)
+            better = left[self.misfit[left] < best[left]]
+            best[better], found[better] = self.misfit[better], self.z[better]
+            if number == 0 and phase is not None:
+                left = np.flatnonzero(np.isinf(best))
+                if not left.size:
+                    break
+        self.z = found
+        if phase is None or left.size:
+            self.go(np.arange(force.size), 0.0, 0)
+        self._hardness[:] = 1e-3
+
+    def go(self, who: NDArray[np.intp], gain: float, most_steps: int) -> None:
         """Descend until the gain that the next step promises is small."""
-        who = who[np.isfinite(self.misfit[who])]
-        with np.errstate(all="ignore"):  # a step into the impossible is none
-            for _ in range(most_steps):
-                if not who.size:
-                    return
-                who = self._step(who, tolerance)
+        from tactile_bayes.mechanics.fits import Room, descents  # numba takes a second to load
 
-    def _step(self, who: NDArray[np.intp], tolerance: float) -> NDArray[np.intp]:
-        """One step, and who has not arrived with it."""
-        normal, pull = self._normal[who], self._pull[who]
-        index = np.arange(len(self._free))
-        normal[:, index, index] *= 1.0 + self._hardness[who, None]
-        step = (_inverse(normal) * pull[:, None, :]).sum(axis=2)
-        trial = self.z[who]
-        trial[:, self._free] -= step
-        new, new_pull, new_normal = self._target.at(trial, who, self._free)
-        better = new <= self.misfit[who]
-        settled = (step * pull).sum(axis=1) <= tolerance * (1.0 + self.misfit[who])
-        lucky = who[better]
-        self.z[lucky], self.misfit[lucky] = trial[better], new[better]
-        self._pull[lucky], self._normal[lucky] = new_pull[better], new_normal[better]
-        self._hardness[who] *= np.where(better, 0.1, 10.0)
-        return who[~settled]
+        count, target = len(self._free), self._target
+        room = Room(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), *touch_room())
+        known = target.reading, target.whitening, who, np.array(self._free)
+        descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, room)
 
     def misfit_before(self, delta: Floats) -> Floats:
         """Sum of squares; infinite for contacts beyond the edge."""
@@ -220,7 +238,7 @@ class _Descent:
     def covariance(self) -> Floats:
         """Of the coordinates, shape (n, 4, 4)."""
         covariance = np.zeros((len(self.z), 4, 4))
-        covariance[np.ix_(range(len(self.z)), self._free, self._free)] = _inverse(self._normal)
+        covariance[np.ix_(range(len(self.z)), self._free, self._free)] = _inverse(self._normal[:, :, :-1])
         return covariance
 
 
@@ -239,64 +257,18 @@ def _inverse(matrix: Floats) -> Floats:
 
 
 class _Target:
-    """Deviations of possible contacts from samples, in standard deviations."""
+    """Samples, and how deviations from them are weighed."""
 
     def __init__(self, reading: Reading, delta: Floats) -> None:
-        self.reading = reading
+        self.reading = plain(reading)
         self.delta = delta
         self.is_exact = not np.any(reading.angle_deviation)
-        self._plain = plain(reading)
-        self._whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
-
-    def at(self, z: Floats, who: NDArray[np.intp], free: tuple[int, ...]) -> tuple[Floats, Floats, Floats]:
-        """Sums of squares, half their derivatives by the free coordinates, and Gauss's half of the second ones.
-
-        Shapes (n,), (n, free) and (n, free, free); infinite sums where there is no such contact.
-        """
-        from tactile_bayes.mechanics.fits import misses  # numba takes a second to load
-
-        count, size = len(free), who.size
-        out = np.empty(size), np.empty((size, count)), np.empty((size, count, count))
-        room = np.empty((4, count + 1)), *touch_room()
-        misses(self._plain, self._whitening, z, who, np.array(free), *out, *room)
-        return out
+        self.whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
 
 
 def plain(reading: Reading) -> Reading:
     """A reading in arrays of the one layout that is compiled."""
     return Reading(*(np.array(column, dtype=float, order="C") for column in reading))
-
-
-def _starts(target: _Target, phase: int | None) -> Floats:
-    """Coordinates to start from: those of raw Step 2, or the best of several where it has no answer."""
-    reading, delta = target.reading, target.delta
-    force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
-    z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
-    if phase is None:
-        coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
-    else:
-        arclength, psi1 = _raw_start(reading, delta)
-        if phase == TIP:
-            spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
-            coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
-        else:
-            spread = [np.full(force.size, share) for share in _STARTS]
-            coordinate, options = ARCLENGTH, [np.clip(arclength, 0.02, 1.0), *spread]
-    best = np.full(force.size, np.inf)
-    found = np.full(z.shape, np.nan)
-    left = np.arange(force.size)
-    for number, values in enumerate(options):
-        trial = z[left]
-        trial[:, coordinate] = values[left]
-        misfit = target.at(trial, left, _FREE[phase])[0]
-        with np.errstate(invalid="ignore"):
-            better = misfit < best[left]
-        best[left[better]], found[left[better]] = misfit[better], trial[better]
-        if number == 0 and phase is not None:
-            left = np.flatnonzero(np.isinf(best))
-            if not left.size:
-                break
-    return found
 
 
 def _raw_start(reading: Reading, delta: Floats) -> tuple[Floats, Floats]:
