@@ -1,9 +1,9 @@
-"""The most likely contact: four noisy numbers, brought onto the sheets of possible contacts.
+"""Contacts from noisy samples: taken at their word, or brought onto the sheets of possible contacts.
 
 A contact has three degrees of freedom, a sample has four numbers (drive angle, holding moment, two forces): the sum of
 squares that is left, in standard deviations, has one. Each phase is fitted by Levenberg's and Marquardt's method on its
-sheet (`touching`), all samples at once (`misses`); a sheet's optimum beyond the edge where the two meet does not count, and where
-neither has one before it, the most likely contact lies on the edge.
+sheet (`touching`), sample by sample (`fits`); a sheet's optimum beyond the edge where the two meet does not count, and
+where neither has one before it, the most likely contact lies on the edge.
 """
 
 from __future__ import annotations
