@@ -153,7 +153,7 @@ def test_slopes_are_those_of_the_integrated_rod(phase, amplitudes):
 def test_volumes_are_the_determinants_of_the_slopes(phase):
     """The volume of a sheet is found in polar coordinates of the contact, the slopes are not."""
     rods = some_rods(phase, BENT, seed=8, count=300)
-    rod = touching(*rods)
+    rod, slopes = touching_and_slopes(*rods)
     determinant = np.abs(np.linalg.det(slopes.place[:, :3][:, :, FREE[phase]]))
     volume = rod.volume_tip if phase == TIP else rod.volume_tangential
     size = np.prod(np.linalg.norm(slopes.place[:, :3][:, :, FREE[phase]], axis=1), axis=1)
