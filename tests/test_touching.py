@@ -199,12 +199,12 @@ def wrench_of(rod: Touching, rods: Rods):
 def test_slopes_of_step2_are_those_of_the_integrated_one(phase, amplitudes):
     """From the pivot on, to the first zero of curvature: relative to the largest slope by the same number."""
     rods = some_rods(phase, amplitudes, seed=11)
-    rod, slopes = touching_and_slopes(*rods)
+    rod = touching(*rods)
     wrench = wrench_of(rod, rods)
     place = integrated_step2.step2(wrench, rods.delta)
     np.testing.assert_allclose(place.real, rod.place.T, rtol=0.0, atol=1e-11)
     right = integrated_step2.slopes(integrated_step2.step2, wrench, rods.delta)
-    assert_slopes_agree(place_by_wrench(slopes), right, 1e-10)
+    assert_slopes_agree(place_by_wrench(rods.coordinates), right, 1e-10)
 
 
 def test_contacts_of_step2_beyond_the_tip_have_slopes_too():
@@ -214,15 +214,15 @@ def test_contacts_of_step2_beyond_the_tip_have_slopes_too():
     longer[:, FORCE] /= 9.0
     longer[:, PSI1] += 0.2
     rods = Rods(longer, rods.delta)
-    rod, slopes = touching_and_slopes(*rods)
+    rod = touching(*rods)
     right = integrated_step2.slopes(integrated_step2.step2, wrench_of(rod, rods), rods.delta)
-    assert_slopes_agree(place_by_wrench(slopes), right, 1e-10)
+    assert_slopes_agree(place_by_wrench(rods.coordinates), right, 1e-10)
 
 
 @pytest.mark.slow
 @PHASES
 def test_many_slopes_of_step2(phase):
     rods = some_rods(phase, BENT + WEAK, seed=13, count=1000, shortest=1e-3)
-    rod, slopes = touching_and_slopes(*rods)
+    rod = touching(*rods)
     right = integrated_step2.slopes(integrated_step2.step2, wrench_of(rod, rods), rods.delta)
-    assert_slopes_agree(place_by_wrench(slopes), right, 1e-10)
+    assert_slopes_agree(place_by_wrench(rods.coordinates), right, 1e-10)

@@ -42,8 +42,10 @@ from tactile_bayes.mechanics.tables import (
 
 __all__ = [
     "NOWHERE",
+    "Found",
     "QuickState",
     "State",
+    "contact",
     "contacts",
     "exact_excess",
     "exact_state",
@@ -200,6 +202,48 @@ def _store(state: State, out: Floats) -> None:
         out[k] = state[k]
 
 
+class Found(NamedTuple):
+    """Where a rod touches, seen as a forward contact; NaN where there is no answer. As `Contact`."""
+
+    x: float
+    y: float
+    slope_angle: float
+    arclength: float
+    tip_angle: float
+    modulus: float
+
+
+@compiled
+def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
+    """Where a rod touches, from what its base feels."""
+    force, modulus = math.sqrt(fx * fx + fy * fy), math.nan
+    root = math.sqrt(force)
+    beta = math.atan2(-fx, fy)
+    psi0 = phi0 - beta
+    quarter = 0.25 * math.pi - 0.5 * (psi0 - 2.0 * math.pi * math.floor((psi0 + 0.5 * math.pi) / (2.0 * math.pi)))
+    a, a_cos, b = math.sin(quarter), math.cos(quarter), 0.5 * moment / root
+    complement = (a_cos - b) * (a_cos + b)
+    if force > 0.0:
+        modulus = a * a + b * b
+    # A force without moment passes through the pivot of a straight rod: it may be anywhere.
+    if not (complement > 0.0 and modulus > 0.0 and (b > 0.0 or (b == 0.0 and a < 0.0)) and force < math.inf):
+        return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
+    # θ0 = atan2(a, b) is linked to χ by tan χ = cot θ0 / √(1 − m).
+    width = a_cos * math.sqrt(modulus)
+    cos_chi = a * math.sqrt(complement) / width
+    arc = arc_at(b / width, cos_chi, modulus)
+    tip_angle = phi0 - arc.turn
+    along, across = (arc.length - arc.shortfall) / root, arc.offset / root
+    if cos_chi < SHORT_COSINE:
+        # In a rod bent far round, m0 = f u keeps more digits; the rest of the contact lies along the force.
+        u, v = moment / force, along * (1.0 - 2.0 * modulus) + across * 2.0 * math.sqrt(modulus * complement)
+        x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
+    else:
+        cos, sin = math.cos(tip_angle), math.sin(tip_angle)
+        x, y = along * cos - across * sin, along * sin + across * cos
+    return Found(x, y, beta - delta, arc.length / root, tip_angle, modulus)
+
+
 @kept
 def contacts(columns: Floats, out: Floats) -> None:
     """Where rods touch, from what their bases feel, seen as forward contacts.
@@ -212,37 +256,9 @@ def contacts(columns: Floats, out: Floats) -> None:
         As `Contact`.
     """
     for i in range(columns.shape[0]):
-        phi0, moment, fx, fy, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4]
-        out[i] = math.nan
-        force = math.sqrt(fx * fx + fy * fy)
-        if not force > 0.0:
-            continue
-        root = math.sqrt(force)
-        beta = math.atan2(-fx, fy)
-        psi0 = phi0 - beta
-        quarter = 0.25 * math.pi - 0.5 * (psi0 - 2.0 * math.pi * math.floor((psi0 + 0.5 * math.pi) / (2.0 * math.pi)))
-        a, a_cos, b = math.sin(quarter), math.cos(quarter), 0.5 * moment / root
-        modulus = a * a + b * b
-        out[i, 5] = modulus
-        complement = (a_cos - b) * (a_cos + b)
-        # A force without moment passes through the pivot of a straight rod: it may be anywhere.
-        if not (complement > 0.0 and modulus > 0.0 and (b > 0.0 or (b == 0.0 and a < 0.0)) and force < math.inf):
-            continue
-        # θ0 = atan2(a, b) is linked to χ by tan χ = cot θ0 / √(1 − m).
-        width = a_cos * math.sqrt(modulus)
-        cos_chi = a * math.sqrt(complement) / width
-        arc = arc_at(b / width, cos_chi, modulus)
-        tip_angle = phi0 - arc.turn
-        along, across = (arc.length - arc.shortfall) / root, arc.offset / root
-        if cos_chi < SHORT_COSINE:
-            # In a rod bent far round, m0 = f u keeps more digits; the rest of the contact lies along the force.
-            u, v = moment / force, along * (1.0 - 2.0 * modulus) + across * 2.0 * math.sqrt(modulus * complement)
-            x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
-        else:
-            cos, sin = math.cos(tip_angle), math.sin(tip_angle)
-            x, y = along * cos - across * sin, along * sin + across * cos
-        out[i, 0], out[i, 1], out[i, 2] = x, y, beta - delta
-        out[i, 3], out[i, 4] = arc.length / root, tip_angle
+        found = contact(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
+        for k in range(6):
+            out[i, k] = found[k]
 
 
 @compiled

@@ -7,100 +7,197 @@ its amplitude gives way: ∂/∂ψ1 at that length is ∂/∂ψ1 − F_ψ1/F_χ 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.mechanics.arc import Arc, arc_and_slopes, arc_to
+from tactile_bayes.mechanics.arc import arc_and_slopes, arc_to
 from tactile_bayes.mechanics.compiler import compiled, kept
 
-__all__ = ["chords", "touches"]
+__all__ = ["chords", "moved", "touch", "touches", "wrench_slopes"]
 
 Floats = NDArray[np.float64]
 
+_EPSILON = 1e-16
+"""Half the difference of two means, over the mean, below which they are one."""
+
+
+class Bend(NamedTuple):
+    """What else there is to know of a touching rod; NaN where there is none."""
+
+    chi: float
+    """Amplitude of the arc to the pivot."""
+    length_by_psi1: float
+    """Of the arc to that amplitude."""
+    volume_tip: float
+    volume_tangential: float
+    """As in `Touching`."""
+
 
 @compiled
-def _over(arc: Arc, divisor: float) -> Arc:
-    return Arc(arc.length / divisor, arc.shortfall / divisor, arc.offset / divisor, arc.turn / divisor)
+def _amplitude(load: float, m: float, ratios: Floats) -> float:
+    """Jacobi's am(load | m) by arithmetic and geometric means; NaN beyond twice the quarter period."""
+    a, b, last = 1.0, math.sqrt(1.0 - m), 0
+    ratios[0] = math.sqrt(m)
+    while ratios[last] > _EPSILON and last + 1 < ratios.size:
+        a, b, c = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)
+        last += 1
+        ratios[last] = c / a
+    # With twice K = π/(2 a) the line of force passes through the pivot.
+    if not load <= math.pi / a:
+        return math.nan
+    chi = math.ldexp(a * load, last)
+    while last > 0:
+        chi = 0.5 * (chi + math.asin(ratios[last] * math.sin(chi)))
+        last -= 1
+    return chi
 
 
 @compiled
 def _column(
-    along: float, across: float, turn: float, beta: float, cos: float, sin: float, x: float, y: float, out: Floats
+    along: float, across: float, turn: float, beta: float, growth: float, cos: float, sin: float, by: Floats, c: int
 ) -> None:
-    """Derivatives of contact point and direction of the force, from those along and across the contact's direction."""
-    out[0], out[1], out[2] = along * cos - across * sin + y * turn, along * sin + across * cos - x * turn, beta
+    """Derivatives by a coordinate from those in the direction at the contact, of β, and of the force's logarithm."""
+    fx, fy, x, y = by[0, 1], by[0, 2], by[0, 3], by[0, 4]
+    x_by, y_by = along * cos - across * sin + y * turn, along * sin + across * cos - x * turn
+    fx_by, fy_by = growth * fx - beta * fy, growth * fy + beta * fx
+    by[c, 0] = x_by * fy + x * fy_by - y_by * fx - y * fx_by
+    by[c, 1], by[c, 2], by[c, 3], by[c, 4], by[c, 5] = fx_by, fy_by, x_by, y_by, beta
+
+
+@compiled
+def touch(z: Floats, i: int, by: Floats, ratios: Floats) -> Bend:
+    """One rod, NaN if there is none.
+
+    Parameters
+    ----------
+    z : ndarray, shape (n, 4)
+        Coordinates, as `touching` takes them; the i-th is meant.
+    by : ndarray, shape (5, 6)
+        Stores moment and force at the base, contact point and direction β of the force; then their derivatives by each
+        coordinate.
+    ratios : ndarray, shape (20,)
+        For notes: where 1 − m is 1e-300, it takes 16 means.
+    """
+    force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
+    possible = abs(psi1) < 0.5 * math.pi and arclength > 0.0 and 0.0 < force < math.inf
+    m, root, chi = math.sin(0.25 * math.pi - 0.5 * psi1) ** 2, math.sqrt(force), math.nan
+    if possible:
+        chi = _amplitude(root * arclength, m, ratios)
+    if math.isnan(chi):
+        for c in range(5):
+            for k in range(6):
+                by[c, k] = math.nan
+        return Bend(math.nan, math.nan, math.nan, math.nan)
+    arc, by_chi, by_psi1 = arc_and_slopes(chi, m)
+    short, off, turn = by_chi.shortfall / by_chi.length, by_chi.offset / by_chi.length, by_chi.turn / by_chi.length
+    per_force = 0.5 * arclength / root
+    along, across = arclength - arc.shortfall / root, arc.offset / root
+    along_f = (0.5 * arc.shortfall / force - short * per_force) / root
+    across_f = (off * per_force - 0.5 * arc.offset / force) / root
+    along_1 = (by_psi1.length * short - by_psi1.shortfall) / root
+    across_1 = (by_psi1.offset - by_psi1.length * off) / root
+    turn_f, turn_1, turn_s = turn * per_force, by_psi1.turn - by_psi1.length * turn, turn * root
+
+    tip_angle = drive_angle - arc.turn
+    beta = tip_angle - psi1
+    cos, sin = math.cos(tip_angle), math.sin(tip_angle)
+    fx, fy = -force * math.sin(beta), force * math.cos(beta)
+    x, y = along * cos - across * sin, along * sin + across * cos
+    by[0, 0], by[0, 1], by[0, 2], by[0, 3], by[0, 4], by[0, 5] = x * fy - y * fx, fx, fy, x, y, beta
+    _column(along_f, across_f, turn_f, -turn_f, 1.0 / force, cos, sin, by, 1)
+    _column(along_1, across_1, turn_1, -turn_1 - 1.0, 0.0, cos, sin, by, 2)
+    _column(1.0 - short, off, turn_s, -turn_s, 0.0, cos, sin, by, 3)
+    by[4, 0], by[4, 1], by[4, 2], by[4, 3], by[4, 4], by[4, 5] = 0.0, -fy, fx, -y, x, 1.0  # the whole turns
+    return Bend(
+        chi,
+        by_psi1.length,
+        # In polar coordinates r, ϑ of the contact the volume is r ∂(r, ϑ − α), as all turn with the drive.
+        abs(along_f * across_1 - along_1 * across_f + along * along_f + across * across_f),
+        abs(along_f * off - (1.0 - short) * across_f),
+    )
+
+
+@compiled
+def moved(
+    z: Floats, i: int, bend: Bend, by: Floats, angle: float, moment: float, fx: float, fy: float
+) -> tuple[float, float, float, float]:
+    """By how much the place moves, to first order, when drive angle and loads are so much more: the slopes of Step 2.
+
+    By equation 26 sin ψ1 = sin ψ0 − m0²/(2 f), where ψ0 = φ0 − β. As ψ1 goes with ψ0, m0 and f held, so does the arc to
+    χ: √f cos ψ1 ∂s1/∂ψ0 = ∂F/∂ψ1 cos ψ0 + (sin ψ1 flat + cos ψ1 steep) flat sin χ/Δ³, which is 0/0 in terms of turns.
+    """
+    force, m = z[i, 0], math.sin(0.25 * math.pi - 0.5 * z[i, 1]) ** 2
+    cos1, w = 2.0 * math.sqrt(m * (1.0 - m)), math.sin(0.5 * bend.chi) ** 2
+    flat, steep = 1.0 - 2.0 * m * w, cos1 * w
+    d2 = flat * flat + steep * steep
+    cos0 = (cos1 * (flat - steep) * (flat + steep) - 2.0 * (1.0 - 2.0 * m) * flat * steep) / d2
+    along = ((1.0 - 2.0 * m) * flat + cos1 * steep) * flat * math.sin(bend.chi) / (d2 * math.sqrt(d2))
+
+    by_force = (by[0, 1] * fx + by[0, 2] * fy) / force
+    beta = (by[0, 1] * fy - by[0, 2] * fx) / (force * force)
+    psi0, lost = angle - beta, (moment - 0.5 * by[0, 0] * by_force / force) / force
+    by_psi1 = (cos0 * psi0 - by[0, 0] * lost) / cos1
+    by_arclength = (along + bend.length_by_psi1 * cos0) / (cos1 * math.sqrt(force)) * psi0
+    by_arclength -= by[2, 5] * lost / cos1 + 0.5 * z[i, 2] * by_force / force
+    return (
+        by[1, 3] * by_force + by[2, 3] * by_psi1 + by[3, 3] * by_arclength + by[4, 3] * angle,
+        by[1, 4] * by_force + by[2, 4] * by_psi1 + by[3, 4] * by_arclength + by[4, 4] * angle,
+        beta,
+        by_arclength,
+    )
 
 
 @kept
 def touches(
     coordinates: Floats,
-    chi: Floats,
     delta: Floats,
     loads: Floats,
     place: Floats,
     volumes: Floats,
     loads_by: Floats,
     place_by: Floats,
+    by: Floats,
+    ratios: Floats,
 ) -> None:
-    """Loads and places of touching rods, NaN where the amplitude is.
+    """Loads and places of touching rods, NaN where there is none.
 
     Parameters
     ----------
     coordinates : ndarray, shape (n, 4)
         As `touching` takes them.
-    chi, delta : ndarray, shape (n,)
-        Amplitude of each rod, and friction angle.
+    delta : ndarray, shape (n,)
+        Friction angle.
     loads, place, volumes : ndarray, shapes (3, n), (4, n) and (2, n)
         As in `Touching`.
     loads_by, place_by : ndarray, shapes (n, 3, 4) and (n, 4, 4), or none of them
         As in `TouchingSlopes`.
+    by, ratios : ndarray
+        As in `touch`.
     """
-    for i in range(chi.size):
-        force, psi1, arclength, drive_angle = coordinates[i]
-        loads[:, i], place[:, i], volumes[:, i] = math.nan, math.nan, math.nan
+    for i in range(delta.size):
+        bend = touch(coordinates, i, by, ratios)
+        for k in range(3):
+            loads[k, i] = by[0, k]
+        place[0, i], place[1, i], place[2, i], place[3, i] = by[0, 3], by[0, 4], by[0, 5] - delta[i], coordinates[i, 2]
+        volumes[0, i], volumes[1, i] = bend.volume_tip, bend.volume_tangential
         if loads_by.shape[0]:
-            loads_by[i], place_by[i] = math.nan, math.nan
-        if not math.isfinite(chi[i]):
-            continue
-        root = math.sqrt(force)
-        arc, by_chi, by_psi1 = arc_and_slopes(chi[i], math.sin(0.25 * math.pi - 0.5 * psi1) ** 2)
-        by_load = _over(by_chi, by_chi.length)
-        along, across = arclength - arc.shortfall / root, arc.offset / root
-        tip_angle = drive_angle - arc.turn
-        beta = tip_angle - psi1
-        cos, sin = math.cos(tip_angle), math.sin(tip_angle)
-        fx, fy = -force * math.sin(beta), force * math.cos(beta)
-        x, y = along * cos - across * sin, along * sin + across * cos
-        loads[0, i], loads[1, i], loads[2, i] = x * fy - y * fx, fx, fy
-        place[0, i], place[1, i], place[2, i], place[3, i] = x, y, beta - delta[i], arclength
+            for c in range(4):
+                for k in range(3):
+                    loads_by[i, k, c], place_by[i, k, c] = by[c + 1, k], by[c + 1, k + 3]
+                place_by[i, 3, c] = 1.0 if c == 2 else 0.0
 
-        per_force = 0.5 * arclength / root
-        along_f = (0.5 * arc.shortfall / force - by_load.shortfall * per_force) / root
-        across_f = (by_load.offset * per_force - 0.5 * arc.offset / force) / root
-        along_1 = -(by_psi1.shortfall - by_psi1.length * by_load.shortfall) / root
-        across_1 = (by_psi1.offset - by_psi1.length * by_load.offset) / root
-        along_s, across_s = 1.0 - by_load.shortfall, by_load.offset
-        # In polar coordinates r, ϑ of the contact the volume is r ∂(r, ϑ − α), as all turn with the drive.
-        volumes[0, i] = abs(along_f * across_1 - along_1 * across_f + along * along_f + across * across_f)
-        volumes[1, i] = abs(along_f * across_s - along_s * across_f)
-        if not loads_by.shape[0]:
-            continue
-        by, of = place_by[i], loads_by[i]
-        turn_f, turn_s = by_load.turn * per_force, by_load.turn * root
-        turn_1 = by_psi1.turn - by_psi1.length * by_load.turn
-        _column(along_f, across_f, turn_f, -turn_f, cos, sin, x, y, by[:, 0])
-        _column(along_1, across_1, turn_1, -turn_1 - 1.0, cos, sin, x, y, by[:, 1])
-        _column(along_s, across_s, turn_s, -turn_s, cos, sin, x, y, by[:, 2])
-        by[0, 3], by[1, 3], by[2, 3] = -y, x, 1.0
-        by[3, 0], by[3, 1], by[3, 2], by[3, 3] = 0.0, 0.0, 1.0, 0.0
+
+@kept
+def wrench_slopes(coordinates: Floats, by: Floats, ratios: Floats, out: Floats) -> None:
+    """Derivatives of places by drive angle and loads, shape (n, 4, 4)."""
+    for i in range(coordinates.shape[0]):
+        bend = touch(coordinates, i, by, ratios)
         for c in range(4):
-            fx_by, fy_by = -fy * by[2, c], fx * by[2, c]
-            if c == 0:
-                fx_by, fy_by = fx_by + fx / force, fy_by + fy / force
-            of[0, c] = by[0, c] * fy + x * fy_by - by[1, c] * fx - y * fx_by
-            of[1, c], of[2, c] = fx_by, fy_by
-        of[0, 3] = 0.0  # the whole turns
+            change = moved(coordinates, i, bend, by, 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3))
+            for k in range(4):
+                out[i, k, c] = change[k]
 
 
 @kept

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ellipj, ellipk
 
 __all__ = [
     "ARCLENGTH",
@@ -25,6 +24,7 @@ __all__ = [
     "Touching",
     "TouchingSlopes",
     "place_by_wrench",
+    "touch_room",
     "touching",
     "touching_and_slopes",
 ]
@@ -92,32 +92,25 @@ def _touches(coordinates: Floats, friction_angle: Floats | float, slopes: int) -
     delta = np.array(np.broadcast_to(friction_angle, (count,)), dtype=float)
     loads, place, volumes = np.empty((3, count)), np.empty((4, count)), np.empty((2, count))
     by = TouchingSlopes(np.empty((slopes, 3, 4)), np.empty((slopes, 4, 4)))
-    touches(coordinates, _amplitudes(coordinates), delta, loads, place, volumes, *by)
+    touches(coordinates, delta, loads, place, volumes, *by, *touch_room())
     return Touching(loads, place, *volumes), by
 
 
-def _amplitudes(coordinates: Floats) -> Floats:
-    """χ at the pivot, shape (n,); NaN where no rod touches so."""
-    force, psi1, arclength, _ = coordinates.T
-    m = np.sin(0.25 * np.pi - 0.5 * psi1) ** 2
-    with np.errstate(invalid="ignore", over="ignore"):
-        load = np.sqrt(force) * arclength
-        possible = (np.abs(psi1) < 0.5 * np.pi) & (load > 0.0) & (arclength > 0.0) & (force < np.inf)
-        # With twice K the line of force passes through the pivot.
-        possible &= load <= 2.0 * ellipk(np.where(possible, m, 0.5))
-    return np.where(possible, ellipj(np.where(possible, load, 1.0), np.where(possible, m, 0.5))[3], np.nan)
+def touch_room() -> tuple[Floats, Floats]:
+    """Arrays for `touches.touch` to write in."""
+    return np.empty((5, 6)), np.empty(20)
 
 
-def place_by_wrench(slopes: TouchingSlopes) -> Floats:
+def place_by_wrench(coordinates: Floats) -> Floats:
     """Derivatives of `PLACE` by drive angle and loads, shape (n, 4, 4): the slopes of Step 2, in closed form.
 
     Examples
     --------
-    >>> _, slopes = touching_and_slopes(np.array([[2.0, 0.3, 0.9, 2.0]]))
-    >>> place_by_wrench(slopes)[0, 3].round(3)  # of the arc length
+    >>> place_by_wrench(np.array([[2.0, 0.3, 0.9, 2.0]]))[0, 3].round(3)  # of the arc length
     array([ 0.419,  0.361,  0.416, -0.031])
     """
-    free = [FORCE, PSI1, ARCLENGTH]
-    by_loads = slopes.place[:, :, free] @ np.linalg.inv(slopes.loads[:, :, free])
-    by_angle = slopes.place[:, :, [DRIVE_ANGLE]] - by_loads @ slopes.loads[:, :, [DRIVE_ANGLE]]
-    return np.concatenate([by_angle, by_loads], axis=-1)
+    from tactile_bayes.mechanics.touches import wrench_slopes  # numba takes a second to load
+
+    slopes = np.empty((len(coordinates), 4, 4))
+    wrench_slopes(np.ascontiguousarray(coordinates, dtype=float), *touch_room(), slopes)
+    return slopes

@@ -94,7 +94,7 @@ def amplification(plan: Plan) -> xr.Dataset:
     chosen = record.isel(sample=loaded)
     contacts, delta = _forward(refined, record, loaded), float(np.arctan(plan.taken_friction))
     of_angle = plan.cell.drive_angle_deviation
-    gains = (_raw(contacts, delta), _constrained(contacts, delta, of_angle))
+    gains = (_raw(contacts), _constrained(contacts, delta, of_angle))
     both = [_along_and_across(contacts, gain, 0.5 * rod.diameter / rod.length) for gain in gains]
     deviations = [[_deviation(gain, contacts, of_angle) for gain in of_method] for of_method in both]
     # A reading is in the unit of the record, not in EI/L or EI/L².
@@ -186,10 +186,9 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: NDArray[np.intp]) -> _Forwa
     return whole.take(chosen)
 
 
-def _raw(contacts: _Forward, delta: float) -> Floats:
+def _raw(contacts: _Forward) -> Floats:
     """Errors of place and slope (x, y, slope angle, arc length) by those of the four readings, shape (n, 4, 4)."""
-    _, slopes = touching_and_slopes(contacts.coordinates, delta)
-    by_angle_and_loads = place_by_wrench(slopes)
+    by_angle_and_loads = place_by_wrench(contacts.coordinates)
     by_loads = by_angle_and_loads[:, :, 1:]
     by_angle = by_angle_and_loads[:, :, :1] + by_loads @ contacts.leaning[:, :, None]
     return np.concatenate([by_loads @ contacts.from_readings, by_angle * contacts.side[:, None, None]], axis=2)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.contact_fit import ContactFit, fit_contacts
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.fitting import ContactFit, fit_contacts
 from tactile_bayes.mechanics.touching import touching, touching_and_slopes
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,

@@ -12,6 +12,7 @@ __all__ = [
     "BEYOND_TIP",
     "CUT_OFF",
     "EITHER_PHASE",
+    "MOST_BEND",
     "NONLINEAR",
     "NO_CONTACT",
     "NO_FIT",
@@ -42,7 +43,7 @@ STATUSES = (
 )
 """What can become of a sample, by code."""
 
-_MOST_BEND = 0.5
+MOST_BEND = 0.5
 """Shift by curvature, in standard deviations, above which a covariance of first order is not to be trusted."""
 
 _WEAK = 10.0
@@ -113,5 +114,5 @@ def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, 
         for more, less in aside:
             x, y = (0.5 * (more[:, axis] + less[:, axis]) - place[:, axis] for axis in (0, 1))
             shift = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / area
-            bent |= ~((shift <= _MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
+            bent |= ~((shift <= MOST_BEND**2) | (x * x + y * y < _ROUNDING**2))
     return bent

@@ -15,7 +15,15 @@ from tactile_bayes.load_cell import LoadCell, rough_noise
 from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 
-__all__ = ["CONTACT_SIDES", "OTHER_SIDE", "contact_sides", "doubtful_sweeps", "side_of", "with_sides"]
+__all__ = [
+    "CONTACT_SIDES",
+    "OTHER_SIDE",
+    "contact_sides",
+    "doubtful_sweeps",
+    "side_of",
+    "sides_and_doubts",
+    "with_sides",
+]
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -62,22 +70,30 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     load_cell : LoadCell, optional
         Its noise counts where neighbours differ by less.
     """
-    direction = np.where(record.direction.values == "backward", -1.0, 1.0)
-    side = direction.copy()
-    stated = _stated(record)
-    for one in _judged(record, load_cell):
-        if one.sweep in stated:
-            side[one.rows] = -1.0 if stated[one.sweep] == "backward" else 1.0
-        elif one.is_contradicted:
-            side[one.rows] = -direction[one.rows[0]]
+    sides = _stated(record)
+    if not set(np.unique(record.sweep.values).tolist()) <= sides.keys():
+        sides, _ = sides_and_doubts(record, load_cell)
+    side = np.ones(record.sizes["sample"])
+    for sweep, named in sides.items():
+        if named == "backward":
+            side[record.sweep.values == sweep] = -1.0
     return side
 
 
 def doubtful_sweeps(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[int, ...]:
     """Sweeps whose moment speaks against their direction, and not clearly, the most doubtful first."""
-    found = [one for one in _judged(record, load_cell) if one.sweep not in _stated(record)]
-    doubted = [one for one in found if one.score < _DOUBTED and not one.is_contradicted]
-    return tuple(one.sweep for one in sorted(doubted, key=lambda one: one.score))
+    return sides_and_doubts(record, load_cell)[1]
+
+
+def sides_and_doubts(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[dict[int, str], tuple[int, ...]]:
+    """Sides of all sweeps, as `contact_sides` has them, and `doubtful_sweeps`, judged once."""
+    stated, sides, doubted = _stated(record), {}, []
+    for one in _judged(record, load_cell):
+        said = str(record.direction.values[one.rows[0]])
+        sides[one.sweep] = stated.get(one.sweep, OTHER_SIDE[said] if one.is_contradicted else said)
+        if one.sweep not in stated and one.score < _DOUBTED and not one.is_contradicted:
+            doubted.append(one)
+    return sides, tuple(one.sweep for one in sorted(doubted, key=lambda one: one.score))
 
 
 def side_of(record: xr.Dataset, sweep: int) -> str:

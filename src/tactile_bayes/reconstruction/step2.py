@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from tactile_bayes.checks import check_choice, check_number, check_optional, refused
-from tactile_bayes.contact_fit import Reading
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.fitting import Reading
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
 from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
-from tactile_bayes.reconstruction.sides import OTHER_SIDE, doubtful_sweeps, side_of, with_sides
+from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
 from tactile_bayes.rod import Rod
 
@@ -175,12 +175,13 @@ def reconstruct(
 def _with_likelier_sides(
     measured: xr.Dataset, cell: LoadCell, suspension_compliance: float, friction: float
 ) -> tuple[xr.Dataset, dict[int, str]]:
-    """The record with the sides of doubtful sweeps stated, and these: as directions say, or the other that fits better.
+    """The record with the sides of its sweeps stated, and those of doubtful ones: as said, or the likelier.
 
     Without any noise to go by there is no misfit, and directions are believed.
     """
     taken: dict[int, str] = {}
-    for sweep in doubtful_sweeps(_in_channels(measured, cell), cell):
+    sides, doubtful = sides_and_doubts(_in_channels(measured, cell), cell)
+    for sweep in doubtful:
         stated = side_of(measured, sweep)
         part = measured.isel(sample=np.flatnonzero(measured.sweep.values == sweep))
         misfits = []
@@ -193,7 +194,7 @@ def _with_likelier_sides(
             misfits.append(float(np.minimum(np.nan_to_num(none, nan=_NO_CONTACT), _NO_CONTACT)[samples.loaded].sum()))
         fits_better = len(misfits) == 2 and misfits[1] < misfits[0] - _TWENTY_TO_ONE
         taken[sweep] = OTHER_SIDE[stated] if fits_better else stated
-    return with_sides(measured, taken) if taken else measured, taken
+    return with_sides(measured, sides | taken), taken
 
 
 def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:

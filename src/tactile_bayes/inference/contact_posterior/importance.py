@@ -9,9 +9,9 @@ from arviz_stats.base.array import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from tactile_bayes.contact_fit import fit_sheet
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
+from tactile_bayes.mechanics.fitting import fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 

@@ -1,9 +1,9 @@
-"""The most likely contact: four noisy numbers, brought onto the sheets of possible contacts.
+"""Contacts from noisy samples: taken at their word, or brought onto the sheets of possible contacts.
 
 A contact has three degrees of freedom, a sample has four numbers (drive angle, holding moment, two forces): the sum of
 squares that is left, in standard deviations, has one. Each phase is fitted by Levenberg's and Marquardt's method on its
-sheet (`touching`), all samples at once; a sheet's optimum beyond the edge where the two meet does not count, and where
-neither has one before it, the most likely contact lies on the edge.
+sheet (`touching`), sample by sample (`fits`); a sheet's optimum beyond the edge where the two meet does not count, and
+where neither has one before it, the most likely contact lies on the edge.
 """
 
 from __future__ import annotations
@@ -15,17 +15,9 @@ from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.touching import (
-    ARCLENGTH,
-    DRIVE_ANGLE,
-    FORCE,
-    PSI1,
-    Touching,
-    touching,
-    touching_and_slopes,
-)
+from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, touch_room
 
-__all__ = ["ContactFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet"]
+__all__ = ["ContactFit", "RawFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet", "plain", "raw_contacts"]
 
 Floats = NDArray[np.float64]
 
@@ -90,6 +82,30 @@ class ContactFit(NamedTuple):
     """Distance from the edge, in standard deviations of the coordinate that leads to it."""
     rival: Floats
     """By how much the sum of squares of the best contact of the other phase is larger; infinite where it has none."""
+
+
+class RawFit(NamedTuple):
+    """Contacts of Step 2."""
+
+    place: Floats
+    """Contact point, slope angle and arc length, shape (n, 4)."""
+    tip_angle: Floats
+    covariance: Floats
+    """Of the place, to first order, shape (n, 4, 4)."""
+    bend: Floats
+    """Squared distance, in the metric of the covariance, of the mean of two contacts that are one standard deviation to
+    either side from the contact; the largest of all axes, NaN where there is no such contact, shape (n,)."""
+
+
+def raw_contacts(reading: Reading, delta: Floats) -> RawFit:
+    """What Step 2 makes of n samples, with friction angles of shape (n,)."""
+    from tactile_bayes.mechanics.fits import raw_fits  # numba takes a second to load
+
+    count = delta.size
+    fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
+    room = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
+    raw_fits(plain(reading), np.array(delta), fit, *room, *touch_room())
+    return fit
 
 
 def fit_contacts(reading: Reading, friction_angle: Floats) -> ContactFit:
@@ -166,38 +182,53 @@ class _Descent:
         self._target = target
         self._phase = phase
         self._free = _FREE[phase] if target.is_exact else (*_FREE[phase], DRIVE_ANGLE)
-        self.z = _starts(target, phase)
-        self._miss, self._slopes = target.at(self.z, np.arange(len(self.z)), self._free)
-        self.misfit = np.nan_to_num((self._miss * self._miss).sum(axis=1), nan=np.inf)
-        self._hardness = np.full(len(self.z), 1e-3)
+        self.z = np.full((target.delta.size, 4), np.nan)
+        count = len(self.z)
+        self.misfit = np.full(count, np.inf)
+        self._normal = np.full((count, len(self._free), len(self._free) + 1), np.nan)
+        self._hardness = np.full(count, 1e-3)
+        self._start()
 
-    def go(self, who: NDArray[np.intp], tolerance: float, most_steps: int) -> None:
+    def _start(self) -> None:
+        """Start from raw Step 2, or from the best of several contacts where that has no answer."""
+        reading, delta, phase = self._target.reading, self._target.delta, self._phase
+        force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
+        z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
+        if phase is None:
+            coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
+        else:
+            arclength, psi1 = _raw_start(reading, delta)
+            if phase == TIP:
+                spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
+                coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
+            else:
+                spread = [np.full(force.size, share) for share in _STARTS]
+                coordinate, options = ARCLENGTH, [np.clip(arclength, 0.02, 1.0), *spread]
+        left = np.arange(force.size)
+        best, found = np.full(force.size, np.inf), self.z
+        for number, values in enumerate(options):
+            self.z = z.copy()
+            self.z[:, coordinate] = values
+            self.go(left, 0.0, 0)
+            better = left[self.misfit[left] < best[left]]
+            best[better], found[better] = self.misfit[better], self.z[better]
+            if number == 0 and phase is not None:
+                left = np.flatnonzero(np.isinf(best))
+                if not left.size:
+                    break
+        self.z = found
+        if phase is None or left.size:
+            self.go(np.arange(force.size), 0.0, 0)
+        self._hardness[:] = 1e-3
+
+    def go(self, who: NDArray[np.intp], gain: float, most_steps: int) -> None:
         """Descend until the gain that the next step promises is small."""
-        who = who[np.isfinite(self.misfit[who])]
-        with np.errstate(all="ignore"):  # a step into the impossible is none
-            for _ in range(most_steps):
-                if not who.size:
-                    return
-                who = self._step(who, tolerance)
+        from tactile_bayes.mechanics.fits import Room, descents  # numba takes a second to load
 
-    def _step(self, who: NDArray[np.intp], tolerance: float) -> NDArray[np.intp]:
-        """One step, and who has not arrived with it."""
-        slopes, miss = self._slopes[who], self._miss[who]
-        normal, pull = np.swapaxes(slopes, 1, 2) @ slopes, (slopes * miss[:, :, None]).sum(axis=1)
-        index = np.arange(len(self._free))
-        normal[:, index, index] *= 1.0 + self._hardness[who, None]
-        step = (_inverse(normal) * pull[:, None, :]).sum(axis=2)
-        trial = self.z[who]
-        trial[:, self._free] -= step
-        new_miss, new_slopes = self._target.at(trial, who, self._free)
-        new = (new_miss * new_miss).sum(axis=1)
-        better = new <= self.misfit[who]
-        settled = (step * pull).sum(axis=1) <= tolerance * (1.0 + self.misfit[who])
-        lucky = who[better]
-        self.z[lucky], self.misfit[lucky] = trial[better], new[better]
-        self._miss[lucky], self._slopes[lucky] = new_miss[better], new_slopes[better]
-        self._hardness[who] *= np.where(better, 0.1, 10.0)
-        return who[~settled]
+        count, target = len(self._free), self._target
+        room = Room(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), *touch_room())
+        known = target.reading, target.whitening, who, np.array(self._free)
+        descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, room)
 
     def misfit_before(self, delta: Floats) -> Floats:
         """Sum of squares; infinite for contacts beyond the edge."""
@@ -207,8 +238,7 @@ class _Descent:
     def covariance(self) -> Floats:
         """Of the coordinates, shape (n, 4, 4)."""
         covariance = np.zeros((len(self.z), 4, 4))
-        normal = np.swapaxes(self._slopes, 1, 2) @ self._slopes
-        covariance[np.ix_(range(len(self.z)), self._free, self._free)] = _inverse(normal)
+        covariance[np.ix_(range(len(self.z)), self._free, self._free)] = _inverse(self._normal[:, :, :-1])
         return covariance
 
 
@@ -227,71 +257,18 @@ def _inverse(matrix: Floats) -> Floats:
 
 
 class _Target:
-    """Deviations of possible contacts from samples, in standard deviations."""
+    """Samples, and how deviations from them are weighed."""
 
     def __init__(self, reading: Reading, delta: Floats) -> None:
-        self.reading = reading
+        self.reading = plain(reading)
         self.delta = delta
         self.is_exact = not np.any(reading.angle_deviation)
-        self._whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
-
-    def misfit(self, z: Floats, who: NDArray[np.intp]) -> Floats:
-        """Sum of squares, shape (n,)."""
-        miss = self._miss(touching(z, self.delta[who]), z, who)
-        return np.asarray((miss * miss).sum(axis=1))
-
-    def at(self, z: Floats, who: NDArray[np.intp], free: tuple[int, ...]) -> tuple[Floats, Floats]:
-        """Deviations, shape (n, 3 or 4), and their derivatives by the free coordinates."""
-        rod, slopes = touching_and_slopes(z, self.delta[who])
-        loads = slopes.loads
-        loads[:, :, DRIVE_ANGLE] -= self.reading.leaning[who]
-        by = self._whitening[who] @ loads[:, :, free]
-        if not self.is_exact:
-            last = np.zeros((who.size, 1, len(free)))
-            last[:, 0, free.index(DRIVE_ANGLE)] = 1.0 / self.reading.angle_deviation[who]
-            by = np.concatenate([by, last], axis=1)
-        return self._miss(rod, z, who), by
-
-    def _miss(self, rod: Touching, z: Floats, who: NDArray[np.intp]) -> Floats:
-        reading = self.reading
-        turned = z[:, DRIVE_ANGLE] - reading.drive_angle[who]
-        off = rod.loads.T - reading.loads[who] - reading.leaning[who] * turned[:, None]
-        miss = (self._whitening[who] * off[:, None, :]).sum(axis=2)
-        if self.is_exact:
-            return miss
-        return np.concatenate([miss, (turned / reading.angle_deviation[who])[:, None]], axis=1)
+        self.whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
 
 
-def _starts(target: _Target, phase: int | None) -> Floats:
-    """Coordinates to start from: those of raw Step 2, or the best of several where it has no answer."""
-    reading, delta = target.reading, target.delta
-    force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
-    z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
-    if phase is None:
-        coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
-    else:
-        arclength, psi1 = _raw_start(reading, delta)
-        if phase == TIP:
-            spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
-            coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
-        else:
-            spread = [np.full(force.size, share) for share in _STARTS]
-            coordinate, options = ARCLENGTH, [np.clip(arclength, 0.02, 1.0), *spread]
-    best = np.full(force.size, np.inf)
-    found = np.full(z.shape, np.nan)
-    left = np.arange(force.size)
-    for number, values in enumerate(options):
-        trial = z[left]
-        trial[:, coordinate] = values[left]
-        misfit = target.misfit(trial, left)
-        with np.errstate(invalid="ignore"):
-            better = misfit < best[left]
-        best[left[better]], found[left[better]] = misfit[better], trial[better]
-        if number == 0 and phase is not None:
-            left = np.flatnonzero(np.isinf(best))
-            if not left.size:
-                break
-    return found
+def plain(reading: Reading) -> Reading:
+    """A reading in arrays of the one layout that is compiled."""
+    return Reading(*(np.array(column, dtype=float, order="C") for column in reading))
 
 
 def _raw_start(reading: Reading, delta: Floats) -> tuple[Floats, Floats]:

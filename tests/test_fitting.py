@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.special import ellipkinc
 
-from tactile_bayes.contact_fit import ContactFit, Reading, fit_contacts, fit_sheet
 from tactile_bayes.mechanics.elastica import contact_from_wrench, tangential_arclength, wrench_from_contact
+from tactile_bayes.mechanics.fitting import ContactFit, Reading, fit_contacts, fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.touching import ARCLENGTH, FORCE, PSI1, touching
 
