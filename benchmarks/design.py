@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.35, 0.3), "x_c": stats.norm(0.0, 0.1)}
 STEP = float(np.radians(2.0))
 ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), (-0.1, 0.0, 0.1)
-SETTINGS = SamplerSettings(ensembles=2, walkers=24, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
+SETTINGS = SamplerSettings(ensembles=2, walkers=32, block_steps=25, max_r_hat=1.05, min_ess=400.0, max_steps=1000)
 PLACES = 25
 
 

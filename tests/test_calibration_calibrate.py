@@ -365,7 +365,7 @@ def test_a_killed_run_goes_on(tmp_path, wait):
     ("other", "told"),
     [
         ({"seed": 2}, "seed is 1 there and 2 here"),
-        ({"friction": 0.1}, "friction is 0.0 there and 0.1 here"),
+        ({"friction": 0.1}, "friction is None there and 0.1 here"),
         ({"world": World(friction=0.1)}, "world_friction is 0.0 there and 0.1 here"),
         ({"world": World(priors={"a": stats.norm(1.0)})}, r"world_priors is \{\} there and .*norm"),
         ({"load_cell": LoadCell(force_noise=0.1, moment_noise=0.02)}, "load_cell is .*0.05.* there and .*0.1.* here"),
@@ -393,7 +393,6 @@ def test_another_calibration_is_left_alone(noted, tmp_path, other, told):
     [
         {"seed": np.int64(1)},
         {"probability": np.float64(0.9)},
-        {"friction": np.float64(0.0)},
         {"world": World(base_shift=[0.0, 0.0])},
         {"settings": replace(BY_DEFAULT, ensembles=np.int64(2))},
     ],
@@ -416,7 +415,7 @@ def test_what_an_experiment_is_follows_from_its_words():
         "drive_angles": None,
         "priors": None,
         "nuisances": [],
-        "friction": 0.0,
+        "friction": None,
         "events": True,
         "settings": None,
         "probability": 0.9,

@@ -120,7 +120,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
     >>> from tactile_bayes.contours import paper_profile
     >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
-    >>> quick = SamplerSettings(ensembles=2, walkers=24, max_steps=100)
+    >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=100)
     >>> for profile in ("II", "IV"):
     ...     ideal = scan(paper_profile(profile, q=0.5), drive_step=0.05).record
     ...     measured = cell.measure(ideal, seed=1)
