@@ -173,11 +173,13 @@ def _refined(
             certain = (np.abs(z) > limit_one) & _neighboured(z)
         else:
             certain = np.abs(sums[m:] - sums[:-m]) / m > limit * np.sqrt(1.0 / m + 1.0 / len(ends))
-        loaded = np.flatnonzero(certain.any(axis=1))
-        if loaded.size:
-            first = min(first, int(loaded[0]) + m - 1)
-            if loaded[-1] > last:
-                last, width = int(loaded[-1]), m
+        flat = certain.ravel()  # only the first and the last sample that is loaded in any channel are asked for
+        begin = int(flat.argmax())
+        if flat[begin]:
+            first = min(first, begin // channels + m - 1)
+            end = (flat.size - 1 - int(flat[::-1].argmax())) // channels
+            if end > last:
+                last, width = end, m
     if last < 0:
         return None
     begin = _last_before_ramp(readings, first, after, false_alarm, floor)
