@@ -289,7 +289,7 @@ def loads(count: int) -> Callable[[], Any]:
     """As a likelihood asks for them."""
     zero = np.zeros(count)
     seen = SeenContour(contours(count), zero, zero, 1.0, 0.0, zero > 0.0)
-    return lambda: trace(seen, tolerance=np.array([4e-5, 1e-4, 1e-4]), drive_angles=ANGLES)
+    return lambda: trace(seen, tolerance=np.array([4e-5, 1e-4, 1e-4]), drive_angles=ANGLES, polished=False)
 
 
 if __name__ == "__main__":
