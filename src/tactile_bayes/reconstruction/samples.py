@@ -85,7 +85,8 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         covariance = np.zeros((1, 3, 3))
         if has_noise:
             inverse = np.linalg.inv(cell.gain_matrix)
-            covariance = inverse @ cell.covariance(loads) @ inverse.T
+            told_by = loads if cell.relative_noise or cell.drift is not None else loads[:1]  # or all are alike
+            covariance = inverse @ cell.covariance(told_by) @ inverse.T
         leaning = np.zeros(loads.shape)
         if frame_of(measured) == "turning":
             loads[:, 1], loads[:, 2] = turned(loads[:, 1], loads[:, 2], -angle)
