@@ -9,7 +9,7 @@ from pathlib import Path
 
 def lowest(requirement: str) -> str:
     """Of "numpy>=2.0", "numpy==2.0.*": the lowest that is allowed, with its repairs."""
-    found = re.fullmatch(r"([\w.-]+(?:\[[\w,-]+\])?)>=([\d.]+)", requirement)
+    found = re.fullmatch(r"([\w.-]+(?:\[[\w,-]+\])?)>=([\d.]+)(?:,<[\d.]+)?", requirement)
     if found is None:
         raise SystemExit(f"{requirement!r} has no lowest version: state it as name>=version")
     version = found[2] if "." in found[2] else f"{found[2]}.0"
