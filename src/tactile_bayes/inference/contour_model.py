@@ -89,6 +89,12 @@ class ContourModel:
         return Ends(np.maximum(support[0], self.low), np.minimum(support[1], self.high))
 
     @property
+    def walked_ends(self) -> Ends:
+        """The same of the coordinates."""
+        with np.errstate(divide="ignore"):  # a size may be as small as it likes
+            return Ends(self.coordinates.of(self.ends.low), self.coordinates.of(self.ends.high))
+
+    @property
     def may_vanish(self) -> NDArray[np.bool_]:
         """Which parameters may be zero, and not less."""
         return np.isin(self.names, MAY_VANISH)

@@ -166,8 +166,7 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
                 yield place
 
     low, high = model.ends.low[:size], model.ends.high[:size]
-    with np.errstate(divide="ignore"):  # a size may be as small as it likes
-        about = middle, spread, located.of(low), located.of(high), deadline
+    about = middle, spread, model.walked_ends.low[:size], model.walked_ends.high[:size], deadline
     possible = candidates[:, size:]
     for found in optima(residuals, starts(), *about):
         point = located.parameters(found.point[None])[0][0]

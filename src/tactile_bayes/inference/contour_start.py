@@ -15,7 +15,6 @@ from tactile_bayes.inference.contour_optimum import ContourOptimum, contact_fit,
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
     Coordinates,
-    Ends,
     Logarithms,
     Mixture,
     Proposal,
@@ -233,7 +232,6 @@ def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) 
 
 def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator, deadline: Deadline) -> _Mode:
     target = in_coordinates(model.log_probability, model.coordinates)
-    with np.errstate(divide="ignore"):  # a size may be as small as it likes
-        ends = Ends(model.coordinates.of(model.ends.low), model.coordinates.of(model.ends.high))
+    ends = model.walked_ends
     cloud = gather(target, model.coordinates.of(optimum.point), optimum.covariance, rng, deadline, ends)
     return _Mode(optimum, cloud, approximate(target, cloud.centre, cloud.narrow_covariance, rng, deadline, ends))

@@ -206,7 +206,7 @@ def raw_fits(
             change = moved(z, 0, bend, by, errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3])
             for p in range(4):
                 changes[k, p] = change[p]
-        _spread(changes, 4, out.covariance, i)
+        _spread(changes, out.covariance, i)
         out.bend[i] = 0.0
         for k in range(4 if deviation > 0.0 else 3):
             x_off, y_off = -found.x, -found.y
@@ -218,12 +218,12 @@ def raw_fits(
 
 
 @compiled
-def _spread(changes: Floats, count: int, covariance: Floats, i: int) -> None:
-    """Store the covariance of a place, by how far independent errors move it."""
+def _spread(changes: Floats, covariance: Floats, i: int) -> None:
+    """Store the covariance of a place, by how far four independent errors move it."""
     for a in range(4):
         for b in range(4):
             covariance[i, a, b] = 0.0
-            for k in range(count):
+            for k in range(4):
                 covariance[i, a, b] += changes[k, a] * changes[k, b]
 
 

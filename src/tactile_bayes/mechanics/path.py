@@ -244,11 +244,11 @@ def follow(
             row[0], row[3], row[4] = middle, 0.0, row[4] + 1.0
             count, stretches = count + 1, stretches + 1
             continue
-        onward = LOST
+        behind = -1.0  # way to the maximum: of a stretch beyond it nothing is
         if fate == _NEVER:
             may_fall = limit.begin - stretch.end >= BRIEF * whole or count == 1
             end = _follow_stretch(scene, stretch, accuracy, may_fall, is_first, at_begin, wants_states, curves)
-            fate, onward = end.fate, end.course.stop
+            fate, behind = end.fate, end.course.stop
             if fate != _CORNER:
                 if wants_states:
                     largest = max(end.curvature, 0.0 if math.isnan(largest) else largest)
@@ -268,7 +268,7 @@ def follow(
                     done += 1
         count -= 1
         if fate != _NEVER:  # a maximum is behind: whether the drive angle exceeds it again
-            onward = regained(onward, at_begin, curves)
+            onward = regained(behind, at_begin, curves)
             if onward == LOST or stretches >= most:
                 break
             if onward <= 1.0:
