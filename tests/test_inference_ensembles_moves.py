@@ -8,9 +8,10 @@ import emcee
 import numpy as np
 import pytest
 
+from tactile_bayes.inference.ensembles.block import WalkingEnsembles
 from tactile_bayes.inference.ensembles.moves import FittedMove, FixedMove, NormalMove, standard_moves, whitened_moves
 from tactile_bayes.inference.ensembles.proposal import Proposal
-from tactile_bayes.inference.ensembles.walkers import first_random_state, walking_ensemble
+from tactile_bayes.inference.ensembles.walkers import first_random_state
 
 WALKERS = 40
 """Of an ensemble; 5 for each of 8 parameters, and the default has 6."""
@@ -62,10 +63,9 @@ def moments(target: Gaussian, moves, *, ensembles: int, steps: int, watched: int
     for own in np.random.SeedSequence(1).spawn(ensembles):
         first, second = own.spawn(2)
         start = target.draw(np.random.default_rng(first), WALKERS)
-        states = walking_ensemble(
-            start, target.log_probability(start), target.log_probability, first_random_state(second), moves()
-        )
-        samples = np.array([next(states).coords.copy() for _ in range(steps)])
+        values, random = target.log_probability(start), first_random_state(second)
+        ensemble = WalkingEnsembles(target.log_probability, moves, start[None], values[None], [random])
+        samples = ensemble.make_block(steps).samples[0]
         moved += float(np.mean(samples[1:, :, watched] != samples[:-1, :, watched])) / ensembles
         centred = (samples - target.mean) / target.deviation
         totals.append([centred.mean(axis=(0, 1)), (centred**2).mean(axis=(0, 1)) - 1.0])

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
+import emcee
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.inference.ensembles.moves import Moves
-from tactile_bayes.inference.ensembles.target import LogProbability, Together
-from tactile_bayes.inference.ensembles.walkers import RandomState, walking_ensemble
+from tactile_bayes.inference.ensembles.moves import Abreast, Moves
+from tactile_bayes.inference.ensembles.target import LogProbability
+from tactile_bayes.inference.ensembles.walkers import RandomState
 
 __all__ = ["Block", "WalkingEnsembles", "next_look"]
 
@@ -44,25 +44,25 @@ class Block:
 
 
 class WalkingEnsembles:
-    """All ensembles, each in a thread of its own, in step; a context, at whose end they are gone."""
+    """All ensembles, in step."""
 
     def __init__(
         self, target: LogProbability, moves: Moves, points: Floats, values: Floats, randoms: Sequence[RandomState]
     ) -> None:
         """`points`: (chain, walker, parameter), where they go on; `values`: (chain, walker), the target there."""
-        self._shape = points.shape
-        self._together = Together(target, len(points))
-        self._ensembles = [
-            walking_ensemble(place, value, self._together.target_of(k), random, moves())
-            for k, (place, value, random) in enumerate(zip(points, values, randoms, strict=True))
-        ]
-        self._pool = ThreadPoolExecutor(len(points))
-
-    def __enter__(self) -> WalkingEnsembles:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._pool.shutdown()
+        self._shape = chains, walkers, parameters = points.shape
+        self._moves = Abreast([moves() for _ in randoms], [random.numbers() for random in randoms])
+        sampler: Any = emcee.EnsembleSampler(
+            chains * walkers, parameters, target, moves=[(self._moves, 1.0)], vectorize=True
+        )
+        sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
+        # Starting points are checked before; those of a run that goes on are where it was, whatever emcee thinks.
+        self._states = sampler.sample(
+            emcee.State(points.reshape(-1, parameters), log_prob=values.ravel(), copy=True),
+            iterations=None,
+            store=False,
+            skip_initial_state_check=True,
+        )
 
     def make_block(self, steps: int, deadline: float = math.inf) -> Block:
         """Make steps; at least one, but fewer than asked for once the clock passes the deadline, or if an interrupt
@@ -73,17 +73,12 @@ class WalkingEnsembles:
         made, randoms, whole = 0, tuple[RandomState, ...](), True
         try:
             while made < steps and not (made and time.monotonic() > deadline):
-                waiting = [self._pool.submit(self._together.step, states) for states in self._ensembles]
-                failures = [failure for failure in (one.exception() for one in waiting) if failure is not None]
-                for failure in sorted(failures, key=lambda f: isinstance(f, threading.BrokenBarrierError)):
-                    raise failure
-                states = [one.result() for one in waiting]
-                for k, state in enumerate(states):
-                    samples[k, made], values[k, made] = state.coords, state.log_prob
-                randoms = tuple(RandomState(*state.random_state) for state in states)
+                state = next(self._states)
+                samples[:, made] = state.coords.reshape(self._shape)
+                values[:, made] = state.log_prob.reshape(chains, walkers)
+                randoms = tuple(RandomState.of(random) for random in self._moves.randoms)
                 made += 1
         except KeyboardInterrupt:
-            self._together.abort()  # an ensemble may wait for others that were never asked to step
             whole = False
         return Block(samples[:, :made], values[:, :made], randoms, whole)
 

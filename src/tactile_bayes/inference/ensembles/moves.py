@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 
-__all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
+__all__ = ["Abreast", "FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
 
 Floats = NDArray[np.float64]
 Moves = Callable[[], list[tuple[Any, float]]]
@@ -25,6 +25,48 @@ _SMALL = 0.25
 
 _MOST_FIXED, _EFFICIENT = 0.8, 0.5
 """Share of proposals from a distribution of that efficiency or a better one."""
+
+
+class Abreast(emcee.moves.Move):
+    """Moves of several ensembles, whose walkers come one ensemble after the other.
+
+    Each moves by halves, as emcee's moves do (Foreman-Mackey et al. 2013, doi 10.1086/670067), with moves and random
+    numbers of its own, and so as if it were alone; but the target, which likes many points, is asked for all at once.
+    """
+
+    def __init__(self, moves: Sequence[Sequence[tuple[Any, float]]], randoms: Sequence[np.random.RandomState]) -> None:
+        """`moves`: of each ensemble, with their shares."""
+        self._moves = [[move for move, _ in each] for each in moves]
+        shares = [np.array([share for _, share in each]) for each in moves]
+        self._shares = [each / each.sum() for each in shares]
+        self.randoms = randoms
+
+    def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, NDArray[np.bool_]]:
+        """The state after a step of every ensemble, and which walkers moved."""
+        count, size = len(self.randoms), state.coords.shape[1]
+        points, values = state.coords.reshape(count, -1, size), state.log_prob.reshape(count, -1)
+        accepted = np.zeros(values.shape, dtype=bool)
+        chosen, halves = [], []
+        for moves, shares, random, place in zip(self._moves, self._shares, self.randoms, points, strict=True):
+            chosen.append(random.choice(moves, p=shares))
+            chosen[-1].setup(place)
+            halves.append(np.arange(len(place)) % 2)
+            random.shuffle(halves[-1])
+        for half in range(2):
+            moving = [each == half for each in halves]
+            proposed = [
+                move.get_proposal(place[some], [place[~some]], random)
+                for move, place, some, random in zip(chosen, points, moving, self.randoms, strict=True)
+            ]
+            there, _ = model.compute_log_prob_fn(np.concatenate([place for place, _ in proposed]))
+            for k, ((place, factors), some, value) in enumerate(
+                zip(proposed, moving, np.split(there, count), strict=True)
+            ):
+                taken = factors + value - values[k, some] > np.log(self.randoms[k].rand(len(value)))
+                movers = np.flatnonzero(some)[taken]
+                points[k, movers], values[k, movers], accepted[k, movers] = place[taken], value[taken], True
+        state.coords, state.log_prob = points.reshape(-1, size), values.ravel()
+        return state, accepted.ravel()
 
 
 class FixedMove(emcee.moves.RedBlueMove):
@@ -105,7 +147,7 @@ def standard_moves(proposal: Mixture | None = None) -> list[tuple[Any, float]]:
     Proposals fitted to the walkers where the posterior is nearly normal; differences of two other walkers, scaled and
     now and then unscaled, where it is not. Where there is a proposal that comes near the posterior anyway, it is used
     most, the more efficient it is; what it misses, one fitted to walkers would miss as well, and differences of other
-    walkers, scaled far down, do not. All cut the ensemble in two halves, which `Together` counts on.
+    walkers, scaled far down, do not. All cut the ensemble in two halves, as `Abreast` does.
     """
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]

@@ -70,8 +70,8 @@ def learned(
     for steps in _STEPS:
         walked = in_coordinates(log_probability, best)
         places = best.of(points)
-        with WalkingEnsembles(walked, best.moves, places[None], walked(places)[None], [random]) as ensembles:
-            block = ensembles.make_block(steps, deadline.moment)
+        ensembles = WalkingEnsembles(walked, best.moves, places[None], walked(places)[None], [random])
+        block = ensembles.make_block(steps, deadline.moment)
         if not block.whole:
             raise KeyboardInterrupt
         (random,) = block.random_states

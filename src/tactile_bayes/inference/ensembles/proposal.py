@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -154,9 +155,13 @@ class Proposal:
 
     def steps(self, points: Floats) -> Floats:
         """Points, shape (n, parameters), as seen from the mean, in units of the scale."""
-        return np.asarray(solve_triangular(self.root, (points - self.mean).T, lower=True).T)
+        return np.asarray((points - self.mean) @ self._inverse.T)
 
-    @property
+    @cached_property
+    def _inverse(self) -> Floats:
+        return np.asarray(solve_triangular(self.root, np.eye(self.mean.size), lower=True))
+
+    @cached_property
     def _log_volume(self) -> float:
         return float(np.log(np.diag(self.root)).sum())
 
@@ -177,7 +182,7 @@ class Mixture:
         """Number of coordinates."""
         return self.parts[0].mean.size
 
-    @property
+    @cached_property
     def shares(self) -> Floats:
         """Of the parts, in proportion to the target's integral; equal where that is not known of any."""
         masses = np.array([part.log_mass for part in self.parts])
@@ -210,8 +215,9 @@ class Mixture:
 
     def log_density(self, points: Floats) -> Floats:
         """As `Proposal.log_density`."""
-        each = [part.log_density(points) for part in self.parts]
-        return np.asarray(logsumexp(each, axis=0, b=self.shares[:, None]))
+        with np.errstate(divide="ignore"):  # a part of no mass counts for nothing
+            each = [np.log(share) + part.log_density(points) for share, part in zip(self.shares, self.parts, strict=True)]
+        return np.asarray(np.logaddexp.reduce(each))
 
 
 def approximate(

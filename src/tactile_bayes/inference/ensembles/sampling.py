@@ -163,10 +163,8 @@ def sample(
         else:
             last = _beginning(points, walked, seed)
             kept = KeptSteps(coordinates, points)
-        ensembles = stack.enter_context(
-            WalkingEnsembles(
-                walked, coordinates.moves, last.samples[:, -1], last.log_probability[:, -1], last.random_states
-            )
+        ensembles = WalkingEnsembles(
+            walked, coordinates.moves, last.samples[:, -1], last.log_probability[:, -1], last.random_states
         )
 
         while not ending:

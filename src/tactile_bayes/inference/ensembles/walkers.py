@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import emcee
 import numpy as np
@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
-from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = [
     "RandomState",
@@ -22,7 +21,6 @@ __all__ = [
     "scatter_walkers",
     "seed_sequence",
     "spawn",
-    "walking_ensemble",
 ]
 
 
@@ -31,7 +29,7 @@ Seed = int | np.random.SeedSequence
 
 
 class RandomState(NamedTuple):
-    """State of NumPy's Mersenne Twister, as emcee hands it out and takes it."""
+    """State of NumPy's Mersenne Twister, whose random numbers emcee's moves take."""
 
     algorithm: str
     key: NDArray[np.uint32]
@@ -40,12 +38,19 @@ class RandomState(NamedTuple):
     has_gauss: int
     gauss: float
 
-    def same_as(self, other: Any) -> bool:
-        return self[0] == other[0] and np.array_equal(self.key, other[1]) and self[2:] == tuple(other[2:])
+    @classmethod
+    def of(cls, random: np.random.RandomState) -> RandomState:
+        return cls(*random.get_state(legacy=True))
+
+    def numbers(self) -> np.random.RandomState:
+        """Random numbers that go on from here."""
+        random = np.random.RandomState()
+        random.set_state(self)
+        return random
 
 
 def first_random_state(seed: np.random.SeedSequence) -> RandomState:
-    return RandomState(*np.random.RandomState(np.random.MT19937(seed)).get_state(legacy=True))
+    return RandomState.of(np.random.RandomState(np.random.MT19937(seed)))
 
 
 def seed_sequence(seed: Seed) -> np.random.SeedSequence:
@@ -58,27 +63,6 @@ def seed_sequence(seed: Seed) -> np.random.SeedSequence:
 def spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:
     """Independent seeds; the same for the same seed, however often it has been asked before."""
     return seed_sequence(seed).spawn(count)
-
-
-def walking_ensemble(
-    points: Floats,
-    values: Floats,
-    target: LogProbability,
-    random_state: RandomState,
-    moves: Sequence[tuple[Any, float]],
-) -> Iterator[Any]:
-    """Endless states of one ensemble, after the one given."""
-    walkers, parameters = points.shape
-    sampler: Any = emcee.EnsembleSampler(walkers, parameters, target, moves=list(moves), vectorize=True)
-    sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
-    sampler.random_state = random_state
-    if not random_state.same_as(sampler.random_state):
-        raise InferenceError("emcee did not take the random state that it was given: use version 3.1.6 or a later 3.1")
-    # Starting points are checked before; those of a run that goes on are where it was, whatever emcee thinks of them.
-    states: Iterator[Any] = sampler.sample(
-        emcee.State(points, log_prob=values), iterations=None, store=False, skip_initial_state_check=True
-    )
-    return states
 
 
 def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:
