@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import emcee
 import numpy as np
 import pytest
 from arviz_stats.base.array import array_stats
@@ -372,13 +371,3 @@ def test_scattered_walkers_lie_inside_and_differ():
     )
     with pytest.raises(InferenceError, match="0 of 1000 random starting points"):
         scatter_walkers(lambda x: np.full(len(x), -np.inf), wide, parameters=2, seed=1, settings=settings)
-
-
-def test_a_random_state_that_emcee_swallows_is_noticed(monkeypatch):
-    monkeypatch.setattr(
-        emcee.EnsembleSampler,
-        "random_state",
-        property(lambda self: ("MT19937", None, 0, 0, 0.0), lambda self, state: None),
-    )
-    with pytest.raises(InferenceError, match="random state"):
-        draw_from(standard, 2, settings=SMALL)

@@ -57,6 +57,7 @@ ALWAYS = (
     ("power-law", "thick", 0.0),
     ("parabola/power-law", "thick", 0.3),
     ("circle/ellipse", "thin", 0.0),
+    ("circle", "thin", 0.6),
 )
 """Each family, each rod with halves of two kinds, with and without friction."""
 
@@ -69,7 +70,7 @@ ALWAYS = (
         )
         for name in NAMES
         for kind, rod in (("thin", THIN), ("thick", THICK))
-        for mu in (0.0, 0.1, 0.2, 0.3, 0.7)
+        for mu in (0.0, 0.1, 0.2, 0.3, 0.6, 0.7)
     ],
 )
 def test_loads_and_usable_contours_are_the_exact_ones(name, rod, friction):

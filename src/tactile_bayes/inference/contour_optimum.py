@@ -15,7 +15,7 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Logarithms
 from tactile_bayes.inference.nuisances import BIASES
-from tactile_bayes.inference.start import optima
+from tactile_bayes.inference.start import descend, optima
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
@@ -71,9 +71,13 @@ class Brackets(NamedTuple):
     width: Floats
     """In which a residual grows by one."""
 
+    def at(self, events: Floats) -> Floats:
+        """Of events, shape (n, strokes, 2), those that have to happen, shape (n, events); NaN where one does not."""
+        return np.asarray(events[:, self.stroke, self.ends])
+
     def missed(self, events: Floats) -> Floats:
         """By how much events, shape (n, strokes, 2), are outside, in widths, shape (n, events)."""
-        at = events[:, self.stroke, self.ends]
+        at = self.at(events)
         missed = np.maximum(self.low - at, 0.0) - np.maximum(at - self.high, 0.0)
         return np.nan_to_num(missed / self.width, nan=_FAR_OFF)
 
@@ -146,7 +150,9 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
         if allowed.any():
             loads, events = _continued(model, points[allowed])
             expected = model.likelihood.load_cell.expected(loads)
-            out[allowed] = measured - expected[..., present] / deviation[present]
+            # Where loads are large, to have none would often be nearer than to have others: it leads nowhere.
+            happens = ~np.isnan(brackets.at(events)).any(axis=1)
+            out[np.flatnonzero(allowed)[happens]] = measured - expected[happens][..., present] / deviation[present]
             late[allowed] = brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
@@ -161,7 +167,7 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
         costs = np.concatenate([np.sum(np.minimum(np.abs(residuals(part)), 30.0), axis=1) for part in parts])
         for place in drawn[np.argsort(costs)[:_CANDIDATES]]:
             if brackets.low.size and not deadline.has_passed:
-                yield next(optima(events_missed, [place], *about)).point
+                yield descend(events_missed, place, middle, spread, deadline=deadline).point
             else:
                 yield place
 

@@ -43,8 +43,9 @@ _MUCH = 100
 _TRIED = 9
 """Searches after which there is no other, unless none of them explains a record that says little."""
 
-_AGAIN = 2
-"""Searches that end where others did, after which it is believed that there is nothing else."""
+_AGAIN, _SURELY = 2, 4
+"""Searches that end where others did, after which it is believed that there is nothing else, of a record that says
+much and of another, if the posterior is nearly normal where they end."""
 
 _EFFICIENT = 0.35
 """Efficiency of a proposal from which on the posterior is nearly normal around it."""
@@ -209,7 +210,8 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
             again += 1
         else:
             found.append(_mode(model, optimum, rng, deadline))
-        if says_much and found and (again == _AGAIN or found[-1].proposal.efficiency > _EFFICIENT):
+        normal = bool(found) and found[-1].proposal.efficiency > _EFFICIENT
+        if found and (again == _AGAIN or normal if says_much else again == _SURELY and normal):
             break
         if tried >= _TRIED and (found or says_much):
             break

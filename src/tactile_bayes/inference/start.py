@@ -13,7 +13,7 @@ from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.differences import central_slopes
 from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends
 
-__all__ = ["Cloud", "Optimum", "gather", "optima"]
+__all__ = ["Cloud", "Optimum", "descend", "gather", "optima"]
 
 Floats = NDArray[np.float64]
 Residuals = Callable[[Floats], Floats]
@@ -25,6 +25,9 @@ _CLOSER = 0.2
 """Factor from one such residual to the next, the first being as large as all of them are."""
 
 _MOST_STEPS = 40
+
+_ENOUGH, _ON_THE_WAY = 1e-4, 1e-2
+"""Share of its cost, or of its size, that a step has to gain or change for a search to go on; before the last one."""
 
 _GAIN = 1.0
 """Cost by which a search that begins where one ended has to be better to go on."""
@@ -93,15 +96,15 @@ def optima(
         Past it, the search that is under way ends where it is, and no other begins.
     """
     for candidate in candidates:
-        found = _descend(residuals, candidate, middle, spread, deadline=deadline)
+        found = descend(residuals, candidate, middle, spread, deadline=deadline)
         gain = np.inf
         while gain > _GAIN and not deadline.has_passed:  # samples may have fallen on an event's other side on the way
-            again = _descend(residuals, found.point, middle, spread, deadline=deadline)
+            again = descend(residuals, found.point, middle, spread, deadline=deadline)
             gain = found.cost - again.cost
             found = again if gain > 0.0 else found
         if not np.all((found.point > low) & (found.point < high)):
             inside = np.clip(found.point, low + _INSIDE * spread, high - _INSIDE * spread)
-            bounded = _descend(residuals, inside, middle, spread, low, high, deadline)
+            bounded = descend(residuals, inside, middle, spread, low, high, deadline)
             if not deadline.has_passed:  # else what the record wants is not known
                 bounded = bounded._replace(beyond=found.point, excess=bounded.cost - found.cost)
             found = bounded
@@ -110,7 +113,7 @@ def optima(
             break
 
 
-def _descend(
+def descend(
     residuals: Residuals,
     start: Floats,
     middle: Floats,
@@ -119,7 +122,9 @@ def _descend(
     high: Floats | float = np.inf,
     deadline: Deadline = NEVER,
 ) -> Optimum:
-    """In units of the spread, so that the record's units do not matter."""
+    """Robust least squares from one place, as in `optima`; in units of the spread, so that those of the record do not
+    matter.
+    """
 
     def one(point: Floats) -> Floats:
         return np.append(residuals((point * spread)[None])[0], point - middle / spread)
@@ -142,8 +147,17 @@ def _descend(
     while scale > _BRAVE:  # far off, residuals all pull by their squares, or the way would be long
         typical = float(np.sqrt(np.mean(np.square(one(point)))))
         scale = max(_BRAVE, min(typical, _CLOSER * scale))
+        enough = _ENOUGH if scale == _BRAVE else _ON_THE_WAY
         solution = deadline.least_squares(
-            one, point, jacobian, bounds=bounds, loss=robust, f_scale=scale, max_nfev=_MOST_STEPS
+            one,
+            point,
+            jacobian,
+            bounds=bounds,
+            loss=robust,
+            f_scale=scale,
+            max_nfev=_MOST_STEPS,
+            ftol=enough,
+            xtol=enough,
         )
         point = solution.x
         if deadline.has_passed:

@@ -39,7 +39,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-MOST_FRICTION = 0.4
+MOST_FRICTION = 0.58
 """Friction angle up to which there are tables [rad]: the nearer to where the map folds, the longer their series."""
 
 FORCE, TURN, AMPLITUDE, STRETCH, TILT = 0, 1, 2, 3, 3
@@ -52,13 +52,13 @@ _TERMS = 10
 _ANGLES = np.array([0.0, 0.1, 0.25, 0.45, 0.6, 0.75, 0.9, 1.0])
 """Where cells of tip contact begin and end, shares of the right angle."""
 
-_SHARES = np.array([0.0, 0.5, 0.75, 0.9, 0.97, 1.0])
+_SHARES = np.array([0.0, 0.5, 0.75, 0.9, 0.97, 0.993, 1.0])
 """And shares of the largest radius."""
 
-_LYING = 12, 16
+_LYING = 12, 20
 """Terms of a cell in tangential contact, over the angle, and over the friction angle."""
 
-_LEVELS = np.array([0.0, 0.5, 0.8, 1.0])
+_LEVELS = np.array([0.0, 0.45, 0.65, 0.82, 1.0])
 """Where these cells begin and end, shares of the largest angle."""
 
 _MARGIN = 0.02

@@ -13,7 +13,7 @@ that do not move meanwhile (after Boehl 2022, doi 10.2139/ssrn.4250395), which g
 draws per evaluation where a posterior is nearly normal. The others are differential evolution (ter Braak 2006, doi
 10.1007/s11222-006-8769-1; Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11): the difference of two other walkers,
 scaled, which follows whatever shape there is, and now and then unscaled, which lets a walker jump between separated
-modes. The snooker proposal of emcee 3.1.6 does not leave the target invariant and is not used.
+modes.
 
 Walkers may walk in other coordinates than the parameters, which then are what is judged and returned. `learned` finds
 such coordinates, and a proposal in them, by a short run whose draws are thrown away. Where there is a proposal, most

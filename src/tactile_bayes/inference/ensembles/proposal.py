@@ -216,7 +216,9 @@ class Mixture:
     def log_density(self, points: Floats) -> Floats:
         """As `Proposal.log_density`."""
         with np.errstate(divide="ignore"):  # a part of no mass counts for nothing
-            each = [np.log(share) + part.log_density(points) for share, part in zip(self.shares, self.parts, strict=True)]
+            each = [
+                np.log(share) + part.log_density(points) for share, part in zip(self.shares, self.parts, strict=True)
+            ]
         return np.asarray(np.logaddexp.reduce(each))
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
+from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = [
     "RandomState",
