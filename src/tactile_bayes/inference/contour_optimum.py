@@ -41,8 +41,9 @@ _FAR_OFF = 1000.0
 _FIRM = 2.0
 """Standard deviation of a contact across the contour, over the median one, up to which a contour is fitted to it."""
 
-_FAR_BETTER = 100.0
-"""Log-likelihood, roughly, by which a record is explained better beyond the end of a prior for that to be a mistake."""
+_FAR_BETTER, _NEARLY = 100.0, 5.0
+"""Log-likelihood, roughly, by which a record is explained better beyond the end of a prior for that to be a mistake;
+and cost per residual there, for what is not nearly explained is where a search got lost."""
 
 
 class ContourOptimum(NamedTuple):
@@ -184,7 +185,8 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
         covariance[:size, :size] = found.covariance * np.outer(narrow, narrow)
         covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
         beyond = ""
-        if found.beyond is not None and found.excess > _FAR_BETTER:
+        explained = found.cost - found.excess < _NEARLY * found.residuals.size
+        if found.beyond is not None and found.excess > _FAR_BETTER and explained:
             wanted = located.parameters(found.beyond[None])[0][0]
             off = np.flatnonzero((wanted <= low) | (wanted >= high))
             beyond = ", ".join(
