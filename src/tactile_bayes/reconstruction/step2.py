@@ -36,6 +36,9 @@ _NO_CONTACT = 25.0
 """Misfit of a loaded sample that no contact explains, at least."""
 _TWENTY_TO_ONE = 6.0
 """Difference of misfits by which one of two sides is twenty times likelier."""
+_MIRROR = np.array([-1.0, 1.0, -1.0, 1.0])
+"""What backward contacts turn round of a place, its slope angle and the arc length."""
+
 _CLEAR = 3.0
 """Standard deviations from the edge between the phases at which the misfit is χ² with one degree of freedom."""
 
@@ -263,9 +266,9 @@ def _covariance_in_world(place: Floats, covariance: Floats, side: Floats, radius
         shift = np.broadcast_to(np.eye(4), covariance.shape).copy()
         shift[:, 0, 2], shift[:, 1, 2] = -radius * np.cos(place[:, 2]), -radius * np.sin(place[:, 2])
         covariance = shift @ covariance @ np.swapaxes(shift, 1, 2)
-    signs = np.ones((side.size, 4))
-    signs[:, 0] = signs[:, 2] = side
-    return np.asarray(signs[:, :, None] * covariance * signs[:, None, :])
+    covariance = covariance.copy()
+    covariance[side < 0.0] *= np.outer(_MIRROR, _MIRROR)
+    return covariance
 
 
 def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float) -> dict[str, float | int]:

@@ -60,13 +60,13 @@ def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[An
 
 def _refuse_text(name: str, values: NDArray[Any], source: Source) -> None:
     """Refuse cells that no file, or not every one, can store."""
-    cells = values.tolist()
-    for text in set(cells):
+    other = values[1:][values[1:] != values[:-1]]  # as a rule many in a row are the same
+    for text in {*values[:1].tolist(), *other.tolist()}:
         reason = not_storable(text)
         if reason is None and len(text) > LONGEST_CELL:
             reason = f"has {len(text)} characters, more than {LONGEST_CELL}"
         if reason:
-            raise source.cell_error(cells.index(text), name, f"the text {reason}: correct it, or shorten it")
+            raise source.cell_error(values.tolist().index(text), name, f"the text {reason}: correct it, or shorten it")
 
 
 def _text(cell: Any) -> str | None:
