@@ -91,8 +91,9 @@ class ContourModel:
     @property
     def walked_ends(self) -> Ends:
         """The same of the coordinates."""
+        ends = self.ends
         with np.errstate(divide="ignore"):  # a size may be as small as it likes
-            return Ends(self.coordinates.of(self.ends.low), self.coordinates.of(self.ends.high))
+            return Ends(self.coordinates.of(ends.low), self.coordinates.of(ends.high))
 
     @property
     def may_vanish(self) -> NDArray[np.bool_]:

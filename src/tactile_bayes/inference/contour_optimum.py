@@ -172,8 +172,9 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
             else:
                 yield place
 
-    low, high = model.ends.low[:size], model.ends.high[:size]
-    about = middle, spread, model.walked_ends.low[:size], model.walked_ends.high[:size], deadline
+    ends, walked = model.ends, model.walked_ends
+    low, high = ends.low[:size], ends.high[:size]
+    about = middle, spread, walked.low[:size], walked.high[:size], deadline
     possible = candidates[:, size:]
     for found in optima(residuals, starts(), *about):
         point = located.parameters(found.point[None])[0][0]

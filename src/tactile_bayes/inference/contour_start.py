@@ -211,7 +211,9 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
         else:
             found.append(_mode(model, optimum, rng, deadline))
         normal = bool(found) and found[-1].proposal.efficiency > _EFFICIENT
-        if found and (again == _AGAIN or normal if says_much else again == _SURELY and normal):
+        if says_much and (normal or again == _AGAIN):
+            break
+        if normal and again == _SURELY:
             break
         if tried >= _TRIED and (found or says_much):
             break

@@ -216,9 +216,8 @@ class Mixture:
     def log_density(self, points: Floats) -> Floats:
         """As `Proposal.log_density`."""
         with np.errstate(divide="ignore"):  # a part of no mass counts for nothing
-            each = [
-                np.log(share) + part.log_density(points) for share, part in zip(self.shares, self.parts, strict=True)
-            ]
+            shares = np.log(self.shares)
+        each = [share + part.log_density(points) for share, part in zip(shares, self.parts, strict=True)]
         return np.asarray(np.logaddexp.reduce(each))
 
 
