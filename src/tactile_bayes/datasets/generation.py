@@ -39,7 +39,7 @@ _APART = 2**20
 """Random numbers from where one draw of a record begins to where the next does: far more than there are laws, so that a
 contour is the same whatever is drawn after it."""
 
-_GOOD = ""
+_GOOD = Reach.TOUCHES.words
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,6 @@ class Records:
         return int(np.count_nonzero(~np.any(self.sample["truth_contact_phase"], axis=2)))
 
 
-_REASONS = {
-    Reach.TOUCHES: _GOOD,
-    Reach.TOO_FAR: "out of reach",
-    Reach.CUTS_PIVOT: "cuts the pivot",
-    Reach.ENDS: "first touched beyond its end",
-    Reach.TOO_CLOSE: "too close to the pivot",
-    Reach.RUNS_OUT: "still touched at its other end",
-}
 _NOT_CLEAR = "not clear after snap-off"
 _NO_CONTOUR = "no contour"
 
@@ -90,6 +82,7 @@ _REMEDIES = {
     "first touched beyond its end": _WIDER,
     "too close to the pivot": _HIGHER,
     "still touched at its other end": _WIDER,
+    "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the straight rod would still cut the object",
     _NO_CONTOUR: "change the law of that parameter",
 }
@@ -250,7 +243,7 @@ def _tried(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
         clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
-    reasons = np.array([_REASONS[Reach(reach)] for reach in range(len(_REASONS))], dtype=object)[fate]
+    reasons = np.array([reach.words for reach in Reach], dtype=object)[fate]
     why[built] = np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
     return why, _Tried(built, paths, as_seen, units)
 

@@ -80,7 +80,7 @@ _IN_A_DIP = 1e-5
 _NO_MOMENT = 1e-12
 """Holding moment [EI/L] that is none."""
 
-_TOUCHES, _RUNS_OUT = int(Reach.TOUCHES), int(Reach.RUNS_OUT)
+_TOUCHES, _RUNS_OUT, _GRAZES = int(Reach.TOUCHES), int(Reach.RUNS_OUT), int(Reach.GRAZES)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 
 
@@ -276,6 +276,8 @@ def follow(
         if limit.runs_out:
             return _nothing(_RUNS_OUT, limit.distance)
         fate = _THRUST
+    if not at_begin > first:
+        return _nothing(_GRAZES, limit.distance)
     if samples.relative:
         for j in range(samples.angles.size):
             room.asked.angles[j] = first + samples.angles[j] * (at_begin - first) + scene.rig.offset
