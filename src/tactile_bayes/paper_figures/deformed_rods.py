@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.paper_figures.choice import Choice, Direction, Profile
-from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
-from tactile_bayes.plotting.axes import PHASES
+from tactile_bayes.paper_figures.legends import legend_in_rows
+from tactile_bayes.plotting.axes import PHASES, legend_entries
 from tactile_bayes.plotting.rod_map import rods
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.shape import rod_shape
@@ -52,7 +52,7 @@ def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -
     grid[0, 0].xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))  # sparse: panels are neighbours
     for ax, (made, number) in zip(grid.ravel(), sweeps, strict=False):
         rods(made, sweep=number, count=choice.rods, ax=ax)
-        found |= entries_of([ax])
+        found |= legend_entries(ax)
         ax.get_legend().remove()
         ax.set_title(f"{made.sweeps[number].direction}, $q$ = {_distance(made):g} $L$")
     for place, ax in enumerate(grid.ravel()):
@@ -81,11 +81,8 @@ def _limits(sweeps: list[tuple[Scan, int]]) -> tuple[tuple[float, float], tuple[
         states = [np.append(a, b) for a, b in zip(wrench, at_ends, strict=True)]
         x, y = rod_shape(*states, side=1 if events.direction == "forward" else -1)
         corners.append([x.min(), x.max(), y.min(), y.max()])
-    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-    return (
-        (float(low[0]) - _ROOM, float(high[1]) + _ROOM),
-        (float(low[2]) - _ROOM, float(high[3]) + _ROOM),
-    )
+    (left, _, bottom, _), (_, right, _, top) = np.min(corners, axis=0), np.max(corners, axis=0)
+    return (float(left) - _ROOM, float(right) + _ROOM), (float(bottom) - _ROOM, float(top) + _ROOM)
 
 
 def _distance(made: Scan) -> float:

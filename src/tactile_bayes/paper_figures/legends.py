@@ -5,21 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tactile_bayes.plotting.axes import handles_once
-
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["entries_of", "legend_in_rows"]
-
-
-def entries_of(panels: Sequence[Axes]) -> dict[str, Any]:
-    """Handles by label, each label once."""
-    found: dict[str, Any] = {}
-    for ax in panels:
-        found |= dict(zip(*reversed(handles_once(ax)), strict=True))
-    return found
+__all__ = ["legend_in_rows"]
 
 
 def legend_in_rows(figure: Figure, found: Mapping[str, Any], groups: Sequence[Sequence[str]], columns: int) -> None:
@@ -35,11 +24,5 @@ def legend_in_rows(figure: Figure, found: Mapping[str, Any], groups: Sequence[Se
     # Matplotlib fills a legend column by column.
     labels = [row[k] for k in range(wide) for row in filled]
     empty = Line2D([], [], linestyle="none")
-    figure.legend(
-        [found.get(label, empty) for label in labels],
-        labels,
-        loc="outside upper center",
-        ncols=wide,
-        fontsize="small",
-        frameon=False,
-    )
+    handles = [found.get(label, empty) for label in labels]
+    figure.legend(handles, labels, loc="outside upper center", ncols=wide, fontsize="small", frameon=False)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.paper_figures.choice import Choice, Profile
-from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
-from tactile_bayes.plotting.axes import BASES, LABELS, PALETTE, legend_entry, set_unit
+from tactile_bayes.paper_figures.legends import legend_in_rows
+from tactile_bayes.plotting.axes import BASES, LABELS, PALETTE, SWEEP_MARKERS, legend_entries, legend_entry, set_unit
 from tactile_bayes.plotting.maps import draw_pivot, outline
 from tactile_bayes.reconstruction import reconstruct
 
@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_reconstructed_points"]
 
-_SWEEPS: dict[str, dict[str, Any]] = {
-    "forward": {"color": BASES[3], "marker": "o"},
-    "backward": {"color": BASES[2], "marker": "^"},
-}
+_COLOURS = {"forward": BASES[3], "backward": BASES[2]}
 _X = (-0.92, 0.92)
 _Y = (-0.06, 1.0)
 """What every panel shows [L]: no rod reaches farther."""
@@ -50,10 +47,10 @@ def draw_reconstructed_points(profiles: Sequence[Profile], choice: Choice) -> Fi
         set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", {}, np.zeros(1))
     for ax in grid[:, 0]:
         set_unit(ax.yaxis, LABELS["contact_y"] + " ", "contact_y", {}, np.zeros(1))
-    groups = [[f"{direction} sweep" for direction in _SWEEPS], ["contour", "gap", "pivot"]]
+    groups = [[f"{direction} sweep" for direction in _COLOURS], ["contour", "gap", "pivot"]]
     if not choice.is_column:
         groups = [[*groups[0], *groups[1]]]
-    legend_in_rows(figure, entries_of(list(grid.flat)), groups, 3 if choice.is_column else 5)
+    legend_in_rows(figure, legend_entries(*grid.flat), groups, 3 if choice.is_column else 5)
     return figure
 
 
@@ -71,8 +68,9 @@ def _draw_points(ax: Axes, profile: Profile, distance: float, choice: Choice) ->
     lowest = outline(made.contour, *_X)[1].min()
     ax.text(0.0, lowest - 0.04, f"$q$ = {distance:g} $L$", ha="center", va="top", fontsize="small")
     x, y = contacts["contact_x"].values, contacts["contact_y"].values
-    for direction, style in _SWEEPS.items():
+    for direction, colour in _COLOURS.items():
         chosen = (contacts["direction"].values == direction) & np.isfinite(x) & np.isfinite(y)
-        points: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0.0, **style}
+        points: dict[str, Any] = {"linestyle": "none", "color": colour, "marker": SWEEP_MARKERS[direction]}
+        points["markeredgewidth"] = 0.0
         ax.plot(x[chosen], y[chosen], markersize=2.4, zorder=3, **points)
         legend_entry(ax, f"{direction} sweep", markersize=4.5, **points)

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, legend_entry, set_unit, single_axes
-from tactile_bayes.plotting.maps import CONTACT_MARKERS, draw_gap, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, legend_entry, percent, set_unit, single_axes
+from tactile_bayes.plotting.maps import CONTACT_MARKERS, TRUTH, draw_gap, draw_pivot, finish_map, outline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,15 +81,13 @@ def contour(
         slack = 1e-9 * (high - low)
         inside = band.isel(x=np.flatnonzero((band["x"].values >= low - slack) & (band["x"].values <= high + slack)))
         probability = band.attrs.get("probability")
-        label = "band" if probability is None else f"{100.0 * float(probability):.6g} % band"
+        label = "band" if probability is None else f"{percent(probability)} band"
         lower, upper = inside["lower"].values, inside["upper"].values
         ax.fill_between(inside["x"].values, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5, label=label)
         if "median" in inside:
             ax.plot(inside["x"].values, inside["median"].values, color=PALETTE["median"], linewidth=1.0, label="median")
     if truth is not None:
-        ax.plot(
-            *outline(truth, low, high), color=PALETTE["change"], linewidth=1.0, linestyle="--", label="true contour"
-        )
+        ax.plot(*outline(truth, low, high), **TRUTH)
     if contacts is not None:
         attrs = contacts["contact_x"].attrs or attrs
         _draw_contacts(ax, contacts, low, high)
@@ -140,7 +138,7 @@ def band_detail(
     ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5)
     ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0)
     if truth is not None:
-        ax.plot(x, np.asarray(truth.height(x)) - median, color=PALETTE["change"], linewidth=1.0, linestyle="--")
+        ax.plot(x, np.asarray(truth.height(x)) - median, **TRUTH)
     margin = 0.03 * float(np.ptp(x))
     ax.set_xlim(float(x.min()) - margin, float(x.max()) + margin)
     attrs = band["lower"].attrs or band["x"].attrs
@@ -158,11 +156,7 @@ def _draw_contacts(ax: Axes, contacts: xr.Dataset, low: float, high: float) -> N
     for name, label in (*PHASES.items(), ("none", "contact")):
         chosen = drawn & (phase == name)
         if chosen.any():
-            style: dict[str, Any] = {
-                "color": PALETTE[name],
-                "marker": CONTACT_MARKERS.get(name, "o"),
-                "linestyle": "none",
-            }
+            style: dict[str, Any] = {"color": PALETTE[name], "marker": CONTACT_MARKERS[name], "linestyle": "none"}
             ax.plot(x[chosen], y[chosen], markersize=2.6, markeredgewidth=0.0, alpha=0.6, zorder=3, **style)
             legend_entry(ax, label, markersize=4.0, **style)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import LABELS, Floats, legend_entry, single_axes
+from tactile_bayes.plotting.axes import DRIVE_ANGLE, Floats, legend_above, legend_entry, single_axes
 from tactile_bayes.plotting.planning_groups import METHOD_COLOURS, group_of, of_sweep, set_log_scale, sweep_in_words
 
 if TYPE_CHECKING:
@@ -15,6 +15,15 @@ if TYPE_CHECKING:
 
 __all__ = ["amplification"]
 
+_VARIABLES = {
+    "sd_along",
+    "sd_across",
+    "holds",
+    "contact_phase",
+    "after_first_contact",
+    "before_snap_off",
+    "reconstruction",
+}
 _STYLES = {"along": "-", "across": "--"}
 
 _CLOSEST = 0.004
@@ -58,16 +67,7 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     >>> amplification(found, ax=Figure().subplots()).get_ylabel()
     'standard deviation of a contact point [$L$]'
     """
-    names = {
-        "sd_along",
-        "sd_across",
-        "holds",
-        "contact_phase",
-        "after_first_contact",
-        "before_snap_off",
-        "reconstruction",
-    }
-    grown = of_sweep(group_of(found, "amplification", names), sweep)
+    grown = of_sweep(group_of(found, "amplification", _VARIABLES), sweep)
     ax = single_axes() if ax is None else ax
     angle = np.degrees(grown["drive_angle"].values)
     first, last = _events(grown)
@@ -102,8 +102,8 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     legend_entry(ax, "strip: first order does not hold", color="0.6", linewidth=6.0, solid_capstyle="butt")
     margin = 0.05 * abs(last - first)
     ax.set_xlim(min(first, last) - margin, max(first, last) + margin)
-    ax.set_xlabel(f"{LABELS['drive_angle']} [°], {sweep_in_words(grown)}")
-    ax.legend(fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+    ax.set_xlabel(f"{DRIVE_ANGLE}, {sweep_in_words(grown)}")
+    legend_above(ax, 3)
     return ax
 
 
@@ -121,18 +121,9 @@ def _mark_events(ax: Axes, first: float, last: float) -> None:
         is_left = angle == min(first, last)
         # Outside of the sweep, where no curve is.
         ax.axvline(angle, color="0.45", linewidth=0.8, linestyle=":", zorder=1)
-        ax.annotate(
-            words,
-            (angle, 0.97),
-            (-3.0 if is_left else 3.0, 0.0),
-            xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
-            ha="right" if is_left else "left",
-            va="top",
-            rotation=90.0,
-            fontsize="small",
-            color="0.3",
-        )
+        place: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points"}
+        place |= {"ha": "right", "xytext": (-3.0, 0.0)} if is_left else {"ha": "left", "xytext": (3.0, 0.0)}
+        ax.annotate(words, (angle, 0.97), va="top", rotation=90.0, fontsize="small", color="0.3", **place)
 
 
 def _joined(chosen: np.ndarray) -> np.ndarray:

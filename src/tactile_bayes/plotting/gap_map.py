@@ -7,7 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import LABELS, PALETTE, Floats, handles_once, number, set_unit, shown_unit, single_axes
+from tactile_bayes.plotting.axes import (
+    LABELS,
+    PALETTE,
+    Floats,
+    legend_above,
+    legend_entries,
+    number,
+    percent,
+    set_unit,
+    shown_unit,
+    single_axes,
+    write_instead,
+)
+from tactile_bayes.plotting.maps import TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,9 +73,7 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     attrs = found["left"].attrs
     middle = {name: float(found[name].sel(bound="median")) for name, v in found.items() if v.dims == ("bound",)}
     if not middle["left"] < middle["right"]:
-        ax.set_axis_off()
-        ax.text(0.5, 0.5, "the sweeps overlap: no gap is left", transform=ax.transAxes, ha="center", va="center")
-        return ax
+        return write_instead(ax, "the sweeps overlap: no gap is left")
     ends = np.array([middle["left"], middle["right"]])
     heights = np.array([middle["left_y"], middle["right_y"]])
     incline = float(np.diff(heights)[0] / np.diff(ends)[0])
@@ -70,27 +81,25 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     def above_chord(x: Floats, y: Floats) -> Floats:
         return y - (heights[0] + incline * (x - ends[0]))
 
+    def edges(name: str, *which: str) -> list[Floats]:
+        return [above_chord(x, found[f"{name}_{edge}"].values) for edge in which]
+
+    def wide(width: Any) -> str:
+        power, unit = shown_unit("contact_x", attrs, np.array([float(width)]))
+        return f"{number(float(width), power, digits=3)} {unit} wide"
+
     x = found["x"].values
     margin = _MARGIN * float(np.diff(ends)[0])
-    share = f"{100.0 * found.attrs['probability']:.6g} %"
-    probability = f"{share} band"
-
-    def widest(name: str) -> str:
-        return words_of(middle[name] if name in middle else float(found[name]))
-
-    def words_of(value: float) -> str:
-        power, unit = shown_unit("contact_x", attrs, np.array([value]))
-        return f"{number(value, power, digits=3)} {unit} wide"
-
-    least, most = (above_chord(x, found[f"triangle_{edge}"].values) for edge in ("lower", "upper"))
-    style: dict[str, Any] = {"linewidth": 0.0}
+    share = percent(found.attrs["probability"])
+    least, most = edges("triangle", "lower", "upper")
     corners_x = np.array([ends[0], middle["apex_x"], ends[1]])
     corners_y = above_chord(corners_x, np.array([heights[0], middle["apex_y"], heights[1]]))
-    label = f"triangle of chord and tangents, {widest('triangle_width')}"
-    ax.fill(corners_x, corners_y, color=PALETTE["gap"], alpha=0.45, zorder=0.6, label=label, **style)
+    style: dict[str, Any] = {"linewidth": 0.0, "color": PALETTE["gap"]}
+    label = f"triangle of chord and tangents, {wide(middle['triangle_width'])}"
+    ax.fill(corners_x, corners_y, alpha=0.45, zorder=0.6, label=label, **style)
     if np.isfinite(most - least).any():
-        label = f"triangle with uncertain ends, {share}, {words_of(float(np.nanmax(most - least)))}"
-        ax.fill_between(x, least, most, color=PALETTE["gap"], alpha=0.22, zorder=0.5, label=label, **style)
+        label = f"triangle with uncertain ends, {share}, {wide(np.nanmax(most - least))}"
+        ax.fill_between(x, least, most, alpha=0.22, zorder=0.5, label=label, **style)
     outside = np.concatenate([ends[:1] - margin, ends, ends[1:] + margin])
     ax.plot(outside, np.zeros(4), color="0.45", linewidth=0.8, linestyle=(0, (6.0, 3.0)), zorder=1.0, label="chord")
     for side, beyond in ((0, -margin), (1, margin)):
@@ -100,22 +109,21 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
 
     drawn = np.concatenate([corners_y, least, most])
     if "band_without_events_lower" in found:
-        lower, upper = (above_chord(x, found[f"band_without_events_{edge}"].values) for edge in ("lower", "upper"))
-        label = f"{probability} without events, {widest('band_width_without_events')}"
-        ax.fill_between(x, lower, upper, color="0.86", zorder=0.4, label=label, **style)
+        lower, upper = edges("band_without_events", "lower", "upper")
+        label = f"{share} band without events, {wide(found['band_width_without_events'])}"
+        ax.fill_between(x, lower, upper, color="0.86", linewidth=0.0, zorder=0.4, label=label)
         for edge in (lower, upper):
             ax.plot(x, edge, color="0.4", linewidth=0.9, linestyle=(0, (1.0, 1.2)), zorder=2.1)
         # A band much wider than the triangle runs out of the figure: else nothing would be seen of the rest.
         room = 0.7 * float(np.ptp(drawn))
         drawn = np.concatenate([drawn, np.clip([*lower, *upper], drawn.min() - room, drawn.max() + room)])
-    lower, median, upper = (above_chord(x, found[f"band_{edge}"].values) for edge in ("lower", "median", "upper"))
-    label = f"{probability}, {widest('band_width')}"
-    ax.fill_between(x, lower, upper, color=PALETTE["band"], zorder=1.6, label=label, **style)
+    lower, median, upper = edges("band", "lower", "median", "upper")
+    label = f"{share} band, {wide(found['band_width'])}"
+    ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.0, zorder=1.6, label=label)
     ax.plot(x, median, color=PALETTE["median"], linewidth=1.2, zorder=2.2, label="median")
     if truth is not None:
-        wide = np.linspace(outside[0], outside[-1], 401)
-        y = above_chord(wide, np.asarray(truth.height(wide)))
-        ax.plot(wide, y, color=PALETTE["change"], linewidth=1.0, linestyle="--", zorder=2.4, label="true contour")
+        along = np.linspace(outside[0], outside[-1], 401)
+        ax.plot(along, above_chord(along, np.asarray(truth.height(along))), zorder=2.4, **TRUTH)
     _draw_ends(ax, found, above_chord)
 
     drawn = np.concatenate([drawn, lower, upper])
@@ -124,8 +132,7 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     ax.set_ylim(low - _ROOM * (high - low), high + _ROOM * (high - low) + 0.1 * abs(low))
     set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, outside)
     set_unit(ax.yaxis, LABELS["contact_y"] + " − chord ", "contact_y", attrs, drawn)
-    handles, labels = handles_once(ax)
-    ax.legend(handles, labels, fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    legend_above(ax, 2, legend_entries(ax))
     return ax
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import LABELS, PALETTE, Floats, handles_once, set_unit
+from tactile_bayes.plotting.axes import LABELS, PALETTE, Floats, legend, legend_above, legend_entries, set_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,18 +17,27 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CONTACT_MARKERS",
+    "TRUTH",
     "draw_gap",
     "draw_object",
     "draw_pivot",
     "finish_map",
     "fit_height",
+    "label_map",
     "limits_of",
     "outline",
     "set_below",
     "write_on_top",
 ]
 
-CONTACT_MARKERS = {"tip": "o", "tangential": "s"}
+CONTACT_MARKERS = {"tip": "o", "tangential": "s", "none": "o"}
+TRUTH: Mapping[str, Any] = {
+    "color": PALETTE["change"],
+    "linewidth": 1.0,
+    "linestyle": "--",
+    "label": "true contour",
+}
+"""The line of the true contour."""
 
 
 def limits_of(ax: Axes) -> Floats:
@@ -41,19 +50,19 @@ def limits_of(ax: Axes) -> Floats:
 def finish_map(ax: Axes, attrs: Mapping[Any, Any]) -> None:
     """Equal scales, labels, and a legend beside or above the data, whichever leaves them larger."""
     limits = limits_of(ax)
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, limits)
-    set_unit(ax.yaxis, LABELS["contact_y"] + " ", "contact_y", attrs, limits)
-    handles, labels = handles_once(ax)
-    if not labels:
-        return
+    label_map(ax, attrs, limits)
+    entries = legend_entries(ax)
     left, right, bottom, top = limits
-    beside = (right - left) < 1.6 * (top - bottom)
-    place: dict[str, Any] = (
-        {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
-        if beside
-        else {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": min(4, len(labels))}
-    )
-    ax.legend(handles, labels, fontsize="small", frameon=False, **place)
+    if (right - left) < 1.6 * (top - bottom):
+        legend(ax, entries, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    else:
+        legend_above(ax, min(4, len(entries)), entries)
+
+
+def label_map(ax: Axes, attrs: Mapping[Any, Any], limits: Floats, form: str = "{}") -> None:
+    """Label both axes of a map with their unit, in a form that holds the symbol."""
+    for axis, name in ((ax.xaxis, "contact_x"), (ax.yaxis, "contact_y")):
+        set_unit(axis, f"{form.format(LABELS[name])} ", name, attrs, limits)
 
 
 def fit_height(ax: Axes) -> None:
