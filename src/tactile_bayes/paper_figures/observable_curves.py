@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.paper_figures.choice import Choice, Direction, Profile
-from tactile_bayes.paper_figures.legends import legend_in_rows
-from tactile_bayes.plotting.axes import DRIVE_ANGLE, LABELS, PHASES, legend_entries, legend_entry, set_unit
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_in_rows
+from tactile_bayes.plotting.marks import PHASES
 from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, draw_events, phase_runs, with_events
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.scanning import scan

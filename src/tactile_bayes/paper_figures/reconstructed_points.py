@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.paper_figures.choice import Choice, Profile
-from tactile_bayes.paper_figures.legends import legend_in_rows
-from tactile_bayes.plotting.axes import BASES, LABELS, PALETTE, SWEEP_MARKERS, legend_entries, legend_entry, set_unit
+from tactile_bayes.plotting.labels import LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_in_rows
 from tactile_bayes.plotting.maps import draw_pivot, outline
+from tactile_bayes.plotting.marks import BASES, PALETTE, SWEEP_MARKERS
 from tactile_bayes.reconstruction import reconstruct
 
 if TYPE_CHECKING:
@@ -27,16 +28,9 @@ _Y = (-0.06, 1.0)
 
 def draw_reconstructed_points(profiles: Sequence[Profile], choice: Choice) -> Figure:
     """Points of a forward and a backward sweep, and the gap between them, in a panel for each profile."""
-    from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
-    columns = 1 if choice.is_column else 2
-    rows = -(-len(profiles) // columns)
-    wide = choice.width / columns - 0.4
-    high = wide * (_Y[1] - _Y[0]) / (_X[1] - _X[0]) + 0.3
-    figure = Figure(figsize=(choice.width, rows * high + 0.8), layout="compressed")
-    options: dict[str, Any] = {"xlim": _X, "ylim": _Y, "aspect": "equal"}
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
+    figure, grid = choice.map_panels(len(profiles), (_X, _Y), beside=0.4, between=0.3, above=0.8)
     grid[0, 0].xaxis.set_major_locator(MultipleLocator(0.5))
     for ax, profile in zip(grid.ravel(), profiles, strict=True):
         for distance in choice.distances:

@@ -6,7 +6,6 @@ made; its settings are left alone, and nothing is shown. `style` is a block in w
 for the screen.
 """
 
-from tactile_bayes.plotting.axes import PALETTE
 from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverage
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
 from tactile_bayes.plotting.contour_map import band_detail, contour
@@ -16,6 +15,7 @@ from tactile_bayes.plotting.error_lines import error_map
 from tactile_bayes.plotting.family_bars import families
 from tactile_bayes.plotting.gap_map import gap
 from tactile_bayes.plotting.inspection_panels import inspection
+from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.plotting.posteriors import pairs, trace
 from tactile_bayes.plotting.reach_map import posterior_contours, prior_contours
 from tactile_bayes.plotting.readings import information, noise_shares

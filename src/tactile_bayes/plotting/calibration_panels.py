@@ -10,17 +10,9 @@ import xarray as xr
 
 from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import (
-    PALETTE,
-    AxesArray,
-    Floats,
-    check_dataset,
-    check_panels,
-    new_panels,
-    number,
-    percent,
-    write_instead,
-)
+from tactile_bayes.plotting.axes import AxesArray, Floats, check_dataset, check_panels, new_panels, write_instead
+from tactile_bayes.plotting.labels import number, percent
+from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

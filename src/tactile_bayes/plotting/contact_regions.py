@@ -11,8 +11,11 @@ from scipy.special import chdtri
 
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, PHASES, legend_entry, percent, single_axes
-from tactile_bayes.plotting.maps import TRUTH, finish_map, fit_height, outline
+from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.labels import percent
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.maps import finish_map, fit_height, outline
+from tactile_bayes.plotting.marks import PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,11 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, legend_entry, percent, set_unit, single_axes
-from tactile_bayes.plotting.maps import CONTACT_MARKERS, TRUTH, draw_gap, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.labels import LABELS, percent, set_unit
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.maps import draw_gap, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

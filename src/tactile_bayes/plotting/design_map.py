@@ -7,21 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import (
-    BASES,
-    BEST,
-    PALETTE,
-    Floats,
-    check_dataset,
-    legend,
-    legend_above,
-    legend_entry,
-    number,
-    shown_unit,
-    single_axes,
-    tile_edges,
-)
+from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, tile_edges
+from tactile_bayes.plotting.labels import number, shown_unit
+from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, label_map
+from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -114,7 +104,7 @@ def _draw_lines(ax: Axes, found: xr.Dataset, pivots: Floats) -> None:
         if several[1]:
             words.append(f"steps of {np.degrees(of_step):.3g}°")
         colour, label = BASES[k % len(BASES)], ", ".join(words) or "Laplace's approximation"
-        look = {"color": colour, "marker": _MARKS[k % len(_MARKS)], "label": label}
+        look: dict[str, Any] = {"color": colour, "marker": _MARKS[k % len(_MARKS)], "label": label}
         ax.errorbar(x[here], values[here], 2.0 * np.nan_to_num(errors[here]), **look, **_BARS)
         if f"nested_{name}" in found:
             nested = scale * found[f"nested_{name}"].values[here]

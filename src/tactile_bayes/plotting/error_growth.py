@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import DRIVE_ANGLE, Floats, legend_above, legend_entry, single_axes
+from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.labels import DRIVE_ANGLE
+from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.planning_groups import METHOD_COLOURS, group_of, of_sweep, set_log_scale, sweep_in_words
 
 if TYPE_CHECKING:

@@ -8,18 +8,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_choice
-from tactile_bayes.plotting.axes import (
-    BASES,
-    Floats,
-    check_dataset,
-    legend_above,
-    legend_entry,
-    number,
-    percent,
-    shown_unit,
-    single_axes,
-    write_instead,
-)
+from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, write_instead
+from tactile_bayes.plotting.labels import number, percent, shown_unit
+from tactile_bayes.plotting.legends import legend_above, legend_entry
+from tactile_bayes.plotting.marks import BASES
 from tactile_bayes.plotting.planning_groups import check_among, set_log_scale
 
 if TYPE_CHECKING:
@@ -29,7 +21,7 @@ __all__ = ["error_map"]
 
 Quantity = Literal["across", "along", "touched", "gap"]
 
-_MARKERS = "osD^vP*X<>"
+_MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]
 _MOST_TICKS = 8
 _MOST_IN_LINE = 6
 """Entries of the legend."""
@@ -88,7 +80,6 @@ def error_map(
     seen, foretold = _seen_and_foretold(found, quantity, reconstruction)
     factor = found["noise_factor"].values
     contours, distances = found["contour"].values, found["distance"].values
-    marks = [{"marker": _MARKERS[j % len(_MARKERS)], "markersize": 5.0} for j in range(distances.size)]
     is_band = quantity in _BANDS
     drawn: list[Floats] = []
     missing: list[str] = []
@@ -96,20 +87,21 @@ def error_map(
     for i, j in np.ndindex(is_there.shape):
         there, first = seen.values[i, j], foretold.values[i, j]
         if not np.isfinite([*there, *first]).any():
-            missing.append(f"{contours[i]} at {number(distances[j])} L")
+            missing.append(f"{contours[i]} at {number(float(distances[j]))} L")
             continue
         is_there[i, j] = True
         drawn += [there, first]
         style: dict[str, Any] = {"color": BASES[i % len(BASES)], "linewidth": 1.3}
-        hollow: dict[str, Any] = marks[j] | {"markerfacecolor": "white"} if is_band or factor.size == 1 else {}
+        mark = _MARKS[j % len(_MARKS)]
+        hollow = mark | {"markerfacecolor": "white"} if is_band or factor.size == 1 else {}
         ax.plot(factor, first, linestyle="--", zorder=2, **style, **hollow)
-        ax.plot(factor, there, linestyle="none" if is_band else "-", zorder=3, **style, **marks[j])
+        ax.plot(factor, there, linestyle="none" if is_band else "-", zorder=3, **style, **mark)
     if not drawn:
         return write_instead(ax, "there is no gap" if quantity == "gap" else "no cell of this map has an answer")
     for i in np.flatnonzero(is_there.any(axis=1)):
         legend_entry(ax, str(contours[i]), color=BASES[i % len(BASES)], linewidth=2.5)
     for j in np.flatnonzero(is_there.any(axis=0)):
-        legend_entry(ax, f"at {number(distances[j])} L", color="0.35", linestyle="none", **marks[j])
+        legend_entry(ax, f"at {number(distances[j])} L", color="0.35", linestyle="none", **_MARKS[j % len(_MARKS)])
     legend_entry(ax, "first order", color="0.35", linestyle="--", linewidth=1.3)
     set_log_scale(ax.yaxis, _label(found, quantity), "contact_x", foretold.attrs, np.concatenate(drawn))
     set_log_scale(ax.xaxis, _noise_label(found), "sweep", {}, factor)

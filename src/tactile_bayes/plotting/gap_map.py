@@ -7,20 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import (
-    LABELS,
-    PALETTE,
-    Floats,
-    legend_above,
-    legend_entries,
-    number,
-    percent,
-    set_unit,
-    shown_unit,
-    single_axes,
-    write_instead,
-)
-from tactile_bayes.plotting.maps import TRUTH
+from tactile_bayes.plotting.axes import Floats, single_axes, write_instead
+from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
+from tactile_bayes.plotting.legends import legend_above, legend_entries
+from tactile_bayes.plotting.marks import PALETTE, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,17 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import (
-    DRIVE_ANGLE,
-    LABELS,
-    PALETTE,
-    AxesArray,
-    check_panels,
-    legend_entry,
-    new_panels,
-    set_unit,
-    write_not_measured,
-)
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.plotting.sweep_lines import finish_channels, reading_style
 from tactile_bayes.record import CHANNELS, present_channels
 

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import LABELS, PALETTE, Floats, legend, legend_above, legend_entries, set_unit
+from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.plotting.labels import LABELS, set_unit
+from tactile_bayes.plotting.legends import legend, legend_above, legend_entries
+from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,8 +19,6 @@ if TYPE_CHECKING:
     from tactile_bayes.contours.base import Contour
 
 __all__ = [
-    "CONTACT_MARKERS",
-    "TRUTH",
     "draw_gap",
     "draw_object",
     "draw_pivot",
@@ -29,15 +30,6 @@ __all__ = [
     "set_below",
     "write_on_top",
 ]
-
-CONTACT_MARKERS = {"tip": "o", "tangential": "s", "none": "o"}
-TRUTH: Mapping[str, Any] = {
-    "color": PALETTE["change"],
-    "linewidth": 1.0,
-    "linestyle": "--",
-    "label": "true contour",
-}
-"""The line of the true contour."""
 
 
 def limits_of(ax: Axes) -> Floats:

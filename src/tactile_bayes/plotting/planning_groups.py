@@ -9,7 +9,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import BASES, Floats, show_numbers, shown_unit
+from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.plotting.labels import show_numbers, shown_unit
+from tactile_bayes.plotting.marks import BASES
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis

@@ -10,7 +10,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, AxesArray, Floats, check_panels, new_panels, number
+from tactile_bayes.plotting.axes import AxesArray, Floats, check_panels, new_panels
+from tactile_bayes.plotting.labels import number
+from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

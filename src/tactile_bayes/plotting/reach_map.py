@@ -9,8 +9,10 @@ import xarray as xr
 
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, Floats, legend_entry, single_axes
-from tactile_bayes.plotting.maps import TRUTH, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
+from tactile_bayes.plotting.marks import PALETTE, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -207,6 +209,7 @@ def _median(posterior: xr.DataTree) -> tuple[Floats, Floats]:
 
     events = posterior["events"].to_dataset()
     ends = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
-    x = np.linspace(*np.quantile(ends, [0.05, 0.95]), 201)
+    left, right = np.quantile(ends, [0.05, 0.95])
+    x = np.linspace(left, right, 201)
     heights = contour_heights(posterior, x, _DRAWS)
     return x, np.median(np.where(np.isnan(heights), np.inf, heights), axis=0)  # beyond its ends a contour is upright

@@ -7,15 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import (
-    DRIVE_ANGLE,
-    LABELS,
-    SWEEP_LINES,
-    legend_above,
-    legend_entry,
-    number,
-    single_axes,
-)
+from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, number
+from tactile_bayes.plotting.legends import legend_above, legend_entry
+from tactile_bayes.plotting.marks import SWEEP_LINES
 from tactile_bayes.plotting.planning_groups import READING_COLOURS, check_among, group_of, of_sweep, sweep_in_words
 
 if TYPE_CHECKING:

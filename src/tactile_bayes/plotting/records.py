@@ -10,21 +10,10 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import (
-    DRIVE_ANGLE,
-    LABELS,
-    PALETTE,
-    PHASES,
-    SWEEP_LINES,
-    SWEEP_MARKERS,
-    AxesArray,
-    Floats,
-    channel_panels,
-    legend_entry,
-    new_panels,
-    set_unit,
-    write_not_measured,
-)
+from tactile_bayes.plotting.axes import AxesArray, Floats, channel_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
 from tactile_bayes.plotting.sweep_lines import draw_events, finish_channels, phase_runs, reading_style, with_events
 from tactile_bayes.record import CHANNELS, Frame, frame_of, validate
 

@@ -8,22 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import (
-    BEST,
-    PALETTE,
-    Floats,
-    check_dataset,
-    legend,
-    legend_above,
-    number,
-    percent,
-    set_unit,
-    show_numbers,
-    shown_unit,
-    single_axes,
-    tile_edges,
-    write_instead,
-)
+from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, tile_edges, write_instead
+from tactile_bayes.plotting.labels import number, percent, set_unit, show_numbers, shown_unit
+from tactile_bayes.plotting.legends import legend, legend_above
+from tactile_bayes.plotting.marks import BEST, PALETTE
 from tactile_bayes.plotting.planning_groups import group_of, set_log_scale
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ import numpy as np
 
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, single_axes
-from tactile_bayes.plotting.maps import CONTACT_MARKERS, draw_object, draw_pivot, finish_map
+from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.maps import draw_object, draw_pivot, finish_map
+from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.shape import rod_shape
 
@@ -98,8 +99,8 @@ def rods(
         if chosen.any():
             ax.plot(x[chosen].T, y[chosen].T, color=PALETTE[phase], linewidth=0.9, label=label)
             touched = (record[f"truth_contact_{axis}"].values[samples[chosen]] for axis in "xy")
-            style = {"linestyle": "none", "marker": CONTACT_MARKERS[phase], "markersize": 3.0}
-            ax.plot(*touched, color=PALETTE[phase], zorder=3, **style)
+            dots: dict[str, Any] = {"linestyle": "none", "marker": CONTACT_MARKERS[phase], "markersize": 3.0}
+            ax.plot(*touched, color=PALETTE[phase], zorder=3, **dots)
     marked: list[tuple[Event, str, str]] = [
         (events.first_contact, "first contact", ":"),
         *((event, "phase change", "-") for event in events.transitions),
@@ -112,7 +113,7 @@ def rods(
         ax.plot(x, y, color=PALETTE["change"], linestyle=style, linewidth=1.4, zorder=2.5, label=label)
         ax.plot(event.contact_x, event.contact_y, "o", color=PALETTE["change"], markersize=4.0, zorder=3.5)
     draw_pivot(ax, events.base)
-    draw_object(ax, scan.contour, *extent, room=0.05 * rod.length_unit)
+    draw_object(ax, scan.contour, extent[0], extent[1], room=0.05 * rod.length_unit)
     finish_map(ax, record["base_x"].attrs)
     return ax
 

@@ -10,18 +10,12 @@ import xarray as xr
 
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import (
-    DRIVE_ANGLE,
-    PALETTE,
-    SWEEP_LINES,
-    AxesArray,
-    check_panels,
-    legend_above,
-    legend_entry,
-    show_numbers,
-)
+from tactile_bayes.plotting.axes import AxesArray, check_panels
 from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, radius_of
-from tactile_bayes.plotting.maps import TRUTH, label_map, limits_of, outline
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, show_numbers
+from tactile_bayes.plotting.legends import legend_above, legend_entry
+from tactile_bayes.plotting.maps import label_map, limits_of, outline
+from tactile_bayes.plotting.marks import PALETTE, SWEEP_LINES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

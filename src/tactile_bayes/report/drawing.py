@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.plotting.axes import number
+from tactile_bayes.plotting.labels import number
 
 __all__ = ["WIDTH", "Plot", "Scale", "dots", "element", "figure", "legend", "outline_path"]
 

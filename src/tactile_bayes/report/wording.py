@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import number, shown_unit
+from tactile_bayes.plotting.labels import number, shown_unit
 
 __all__ = ["Shown", "chance", "fixed", "percent", "shown_as", "spread"]
 
