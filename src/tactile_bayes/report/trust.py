@@ -11,8 +11,7 @@ from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_words
-from tactile_bayes.report.table import Table
-from tactile_bayes.report.wording import chance, fixed, percent, shown_as
+from tactile_bayes.report.wording import Table, chance, fixed, percent, shown_as
 from tactile_bayes.uncertainty.record_check import DISCREPANCIES
 
 __all__ = ["check_table", "check_words", "contacts_words", "convergence"]

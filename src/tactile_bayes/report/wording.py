@@ -1,4 +1,4 @@
-"""Numbers and units as a page writes them."""
+"""Numbers, units and tables as a page writes them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,16 @@ import numpy as np
 
 from tactile_bayes.plotting.labels import number, shown_unit
 
-__all__ = ["Shown", "chance", "fixed", "percent", "shown_as", "spread"]
+__all__ = ["Shown", "Table", "chance", "fixed", "percent", "shown_as", "spread"]
+
+
+class Table(NamedTuple):
+    """A table: what it shows, its heads, its rows, and how many of the columns hold words rather than numbers."""
+
+    caption: str
+    heads: list[str]
+    rows: list[list[str]]
+    words: int = 1
 
 
 class Shown(NamedTuple):
