@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.marks import PALETTE
-from tactile_bayes.record import CHANNELS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
 __all__ = [
     "AxesArray",
     "Floats",
-    "channel_panels",
     "check_dataset",
     "check_panels",
     "new_panels",
@@ -53,13 +51,6 @@ def check_panels(axes: Any, shape: tuple[int, ...], meaning: str) -> AxesArray:
     if panels.shape != shape:
         raise ParameterError(f"axes have shape {panels.shape}, and {shape} is wanted: {meaning}")
     return panels
-
-
-def channel_panels(axes: Sequence[Axes] | None) -> tuple[AxesArray, bool]:
-    """Three panels, and whether they are of a figure of their own."""
-    if axes is None:
-        return new_panels(3, 1, 5.4, sharex=True)[:, 0], True
-    return check_panels(axes, (3,), f"give three, for {', '.join(CHANNELS)}"), False
 
 
 def check_dataset(found: Any, names: set[str], kind: str, source: str, attrs: Sequence[str] = ()) -> None:

@@ -180,11 +180,9 @@ def _draw_scale(ax: Axes, mesh: Any, label: str, power: int) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     is_low = abs(np.ptp(ax.get_ylim())) < 0.45 * abs(np.ptp(ax.get_xlim()))
-    bar = ax.figure.colorbar(mesh, ax=ax, orientation="horizontal" if is_low else "vertical")
-    bar.locator = MaxNLocator(5)
-    bar.formatter = FuncFormatter(lambda value, _: number(value, power))
-    bar.update_ticks()
-    bar.set_label(label)
+    written = FuncFormatter(lambda value, _: number(value, power))
+    place: dict[str, Any] = {"ax": ax, "orientation": "horizontal" if is_low else "vertical"}
+    ax.figure.colorbar(mesh, ticks=MaxNLocator(5), format=written, label=label, **place)
 
 
 def _fit_figure(ax: Axes) -> None:

@@ -1,4 +1,4 @@
-"""What figures of a plan have in common: which dataset they draw, whose colour is which, and logarithmic axes."""
+"""What figures of a plan have in common: which dataset they draw, and logarithmic axes."""
 
 from __future__ import annotations
 
@@ -11,28 +11,11 @@ import xarray as xr
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.plotting.labels import show_numbers, shown_unit
-from tactile_bayes.plotting.marks import BASES
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
-__all__ = [
-    "METHOD_COLOURS",
-    "READING_COLOURS",
-    "check_among",
-    "group_of",
-    "of_sweep",
-    "set_log_scale",
-    "sweep_in_words",
-]
-
-READING_COLOURS: Mapping[str, str] = {
-    "holding_moment": BASES[0],
-    "force_x": BASES[1],
-    "force_y": BASES[3],
-    "drive_angle": BASES[2],
-}
-METHOD_COLOURS: Mapping[str, str] = {"raw": "#D55E00", "constrained": "#0072B2"}
+__all__ = ["check_among", "group_of", "set_log_scale"]
 
 _TICKS = {0.9: (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0), 2.2: (1.0, 2.0, 5.0), np.inf: (1.0,)}
 """In a decade of a logarithmic axis, by how many decades it has at most."""
@@ -63,26 +46,6 @@ def check_among(name: str, value: str, found: xr.Dataset) -> None:
     """
     if value not in found[name].values:
         raise ParameterError(f"{name} is {value!r}: there are {', '.join(map(str, found[name].values))}")
-
-
-def of_sweep(found: xr.Dataset, sweep: int) -> xr.Dataset:
-    """Its samples in order of the drive angle.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such sweep.
-    """
-    numbers = found["sweep"].values
-    here = np.flatnonzero(numbers == sweep)
-    if isinstance(sweep, bool) or not here.size:
-        raise ParameterError(f"sweep is {sweep!r}: there are {', '.join(map(str, np.unique(numbers)))}")
-    return found.isel(sample=here[np.argsort(found["drive_angle"].values[here], kind="stable")])
-
-
-def sweep_in_words(chosen: xr.Dataset) -> str:
-    """Its direction."""
-    return f"{chosen['direction'].values[0]} sweep"
 
 
 def set_log_scale(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values: Floats) -> None:

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, Floats, channel_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.axes import AxesArray, Floats, check_panels, new_panels, write_not_measured
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
@@ -78,9 +78,9 @@ def observables(
     'drive angle $\\\\varphi_0$ [°]'
     """
     record = validate(record)
-    panels, own = channel_panels(axes)
+    panels = _panels(axes)
     _draw_observables(panels, record, events, with_truth=True)
-    _finish_panels(panels, own)
+    _finish_panels(panels, axes is None)
     return panels
 
 
@@ -150,7 +150,11 @@ def predictive(
         )
     if axes is None and residuals is not None:
         raise ParameterError("axes are given for the residuals only: give three for the channels, too")
-    panels, below, own = _panels_with_residuals(axes, residuals)
+    if axes is None:
+        both = new_panels(6, 1, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))[:, 0]
+        panels, below = both[::2], both[1::2]
+    else:
+        panels, below = _panels(axes), np.full(3, None) if residuals is None else _panels(residuals)
     _draw_observables(panels, record, None, with_truth=False)
     for channel, panel, ax in zip(CHANNELS, panels, below, strict=True):
         if f"{channel}_lower" not in predicted or np.isnan(record[channel].values).all():
@@ -167,19 +171,14 @@ def predictive(
         if ax is not None:
             _finish_residuals(ax)
     drawn = [ax for pair in zip(panels, below, strict=True) for ax in pair if ax is not None]
-    _finish_panels(np.array(drawn, dtype=object), own, columns=4 if below[0] is None else 3)
+    _finish_panels(np.array(drawn, dtype=object), axes is None, columns=4 if below[0] is None else 3)
     return panels
 
 
-def _panels_with_residuals(
-    axes: Sequence[Axes] | None, residuals: Sequence[Axes] | None
-) -> tuple[AxesArray, AxesArray, bool]:
-    """Panels of channels, those of their residuals or None for each, and whether they are of a figure of their own."""
-    if axes is not None:
-        panels, below = channel_panels(axes)[0], np.full(3, None)
-        return panels, below if residuals is None else channel_panels(residuals)[0], False
-    both = new_panels(6, 1, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))[:, 0]
-    return both[::2], both[1::2], True
+def _panels(axes: Sequence[Axes] | None) -> AxesArray:
+    if axes is None:
+        return new_panels(3, 1, 5.4, sharex=True)[:, 0]
+    return check_panels(axes, (3,), f"give three, for {', '.join(CHANNELS)}")
 
 
 def _draw_residuals(ax: Axes, sweep: xr.Dataset, channel: str) -> None:
