@@ -8,11 +8,10 @@ for the screen.
 
 from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverage
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
-from tactile_bayes.plotting.contour_map import band_detail, contour
+from tactile_bayes.plotting.contour_map import band_detail, contour, gap
 from tactile_bayes.plotting.design_map import design
 from tactile_bayes.plotting.error_lines import error_map
 from tactile_bayes.plotting.family_bars import families
-from tactile_bayes.plotting.gap_map import gap
 from tactile_bayes.plotting.inspection_panels import inspection
 from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.plotting.posteriors import pairs, trace

@@ -200,9 +200,8 @@ def _new_panels(calibration: xr.Dataset, drawn: list[_Ranks]) -> AxesArray:
     for ax in panels[-columns:]:
         ax.tick_params(labelbottom=True)
     figure.supxlabel(f"{_across()}: share of the draws that lie below it", fontsize="medium")
-    figure.supylabel(
-        (" " if rows > 2 else "\n").join(["share of ranks up to there", "− expected share"]), fontsize="medium"
-    )
+    gap = " " if rows > 2 else "\n"
+    figure.supylabel(f"share of ranks up to there{gap}− expected share", fontsize="medium")
     figure.suptitle(_heading(calibration, drawn), x=0.01, ha="left", fontsize="medium")
     return panels
 
@@ -288,19 +287,12 @@ def _draw_shares(ax: Axes, shown: xr.Dataset, probability: float) -> None:
     ax.set_xlim(least - 2.0 * margin, 1.0 + margin)
     is_left = probability < np.mean(ax.get_xlim())
     ax.axvline(probability, color="black", linewidth=1.0, linestyle="--", zorder=1)
-    ax.annotate(
-        f"stated: {percent(probability)}",
-        (probability, 0.0),
-        (4.0 if is_left else -4.0, 3.0),
-        xycoords=ax.get_xaxis_transform(),
-        textcoords="offset points",
-        ha="left" if is_left else "right",
-        va="bottom",
-        fontsize="small",
-    )
-    for place, (share, count) in enumerate(zip(shares, shown["coverage_replicates"].values, strict=True)):
-        if np.isfinite(errors[place]):
-            ax.plot([low[place], high[place]], [place, place], color=PALETTE["median"], linewidth=2.0, zorder=2)
-        ax.plot(share, place, "o", color=PALETTE["median"], markersize=6.0, zorder=3)
+    place: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points", "va": "bottom"}
+    place |= {"xytext": (4.0, 3.0), "ha": "left"} if is_left else {"xytext": (-4.0, 3.0), "ha": "right"}
+    ax.annotate(f"stated: {percent(probability)}", (probability, 0.0), fontsize="small", **place)
+    for row, (share, count) in enumerate(zip(shares, shown["coverage_replicates"].values, strict=True)):
+        if np.isfinite(errors[row]):
+            ax.plot([low[row], high[row]], [row, row], color=PALETTE["median"], linewidth=2.0, zorder=2)
+        ax.plot(share, row, "o", color=PALETTE["median"], markersize=6.0, zorder=3)
         words = f"{100.0 * share:.1f} % of {count}"
-        ax.text(1.02, place, words, transform=ax.get_yaxis_transform(), ha="left", va="center", fontsize="small")
+        ax.text(1.02, row, words, transform=ax.get_yaxis_transform(), ha="left", va="center", fontsize="small")

@@ -97,31 +97,14 @@ def draw_object(ax: Axes, contour: Contour, x: Floats, y: Floats, room: float) -
 
 
 def draw_pivot(ax: Axes, base: tuple[float, float], *, colour: str = "black", label: str = "pivot") -> None:
-    ax.plot(
-        *base,
-        linestyle="none",
-        marker="o",
-        markersize=6.0,
-        markerfacecolor="white",
-        markeredgecolor=colour,
-        markeredgewidth=1.2,
-        zorder=5,
-        label=label,
-    )
+    style: dict[str, Any] = {"marker": "o", "markersize": 6.0, "markerfacecolor": "white", "markeredgewidth": 1.2}
+    ax.plot(*base, linestyle="none", markeredgecolor=colour, zorder=5, label=label, **style)
 
 
 def draw_gap(ax: Axes, left: float, right: float, text: str, *, hatched: bool = True) -> Text:
     """A stretch in x from bottom to top, and what it is; the text is returned."""
-    ax.axvspan(
-        left,
-        right,
-        facecolor=PALETTE["gap"],
-        alpha=0.25,
-        edgecolor="0.5",
-        linewidth=0.0,
-        hatch="///" if hatched else None,
-        zorder=0.5,
-    )
+    style: dict[str, Any] = {"facecolor": PALETTE["gap"], "alpha": 0.25, "edgecolor": "0.5", "linewidth": 0.0}
+    ax.axvspan(left, right, hatch="///" if hatched else None, zorder=0.5, **style)
     return write_on_top(ax, 0.5 * (left + right), text)
 
 
