@@ -16,7 +16,7 @@ from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
 from tactile_bayes.report.trust import check_table, check_words, contacts_words, convergence
-from tactile_bayes.report.wording import Table, chance, fixed, percent, shown_as, spread
+from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as, spread
 
 __all__ = ["page_of"]
 
@@ -111,15 +111,14 @@ def _gap_words(findings: Findings) -> list[str]:
     middle, low, high = spread(values, values[2] - values[1])
     share = percent(findings.probability)
     would_be = "would be" if findings.is_rejected else "is"
-    of_such = "On such a contour" if findings.is_rejected else ""
+    of_such = "on such a contour " if findings.is_rejected else ""
     if gap_ends(findings) is None:
         overlap = f"{middle.removeprefix('−')} {unit.name}".rstrip()
-        said = [_sentence(f"{of_such} no gap {would_be} left: the sweeps overlap by {overlap}.")]
+        words = f"no gap {would_be} left: the sweeps overlap by {overlap}."
     else:
         wide, range_ = f"{middle} {unit.name}".rstrip(), f"{low} to {high} {unit.name}".rstrip()
-        said = [
-            _sentence(f"{of_such} the gap, which no sweep touches, {would_be} {wide} wide ({share} from {range_}).")
-        ]
+        words = f"the gap, which no sweep touches, {would_be} {wide} wide ({share} from {range_})."
+    said = [sentence(of_such + words)]
     if gap_ends(findings) is not None and not findings.is_rejected:
         certificate = float(np.max(edges["triangle_upper"].values - edges["triangle_lower"].values))
         band = float(edges["band_width"])
@@ -131,15 +130,10 @@ def _gap_words(findings: Findings) -> list[str]:
             )
     status = str(edges["status"].values)
     if status != "ok" and float(edges["share_open"]) > 0.0:
-        said.append(f"{status[0].upper()}{status[1:]}.")
+        said.append(sentence(f"{status}."))
     if edges.attrs["gaps"] > 1:
         said.append(f"There are {edges.attrs['gaps']} gaps; this is the widest.")
     return said
-
-
-def _sentence(words: str) -> str:
-    words = words.strip()
-    return words[0].upper() + words[1:]
 
 
 def _shapes(comparison: xr.Dataset | None) -> dict[str, Any] | None:

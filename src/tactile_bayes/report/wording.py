@@ -10,7 +10,7 @@ import numpy as np
 
 from tactile_bayes.plotting.labels import number, shown_unit
 
-__all__ = ["Shown", "Table", "chance", "fixed", "percent", "shown_as", "spread"]
+__all__ = ["Shown", "Table", "chance", "fixed", "percent", "sentence", "shown_as", "spread"]
 
 
 class Table(NamedTuple):
@@ -70,6 +70,11 @@ def spread(values: Iterable[float], width: float) -> list[str]:
     if decimals > 9 or decimals < -3:
         return [fixed(value, ".4g") for value in values]
     return [fixed(value, f".{max(0, decimals)}f") for value in values]
+
+
+def sentence(words: str) -> str:
+    """Words with a capital at their beginning."""
+    return words[0].upper() + words[1:]
 
 
 def fixed(value: float, form: str) -> str:
