@@ -191,7 +191,7 @@ def _finished(ax: Axes, labelled: xr.Dataset, phase: Any, label: str, truth: Con
     if truth is not None:
         low, high = ax.get_xlim()
         bottom, top = ax.get_ylim()
-        ax.plot(*outline(truth, low, high), **TRUTH)
+        ax.plot(*outline(truth, low, high), label="true contour", **TRUTH)
         ax.set_xlim(low, high)
         ax.set_ylim(bottom, top)
     finish_map(ax, labelled["contact_x"].attrs)

@@ -108,7 +108,7 @@ def contour(
         if "median" in inside:
             ax.plot(inside["x"].values, inside["median"].values, color=PALETTE["median"], linewidth=1.0, label="median")
     if truth is not None:
-        ax.plot(*outline(truth, low, high), **TRUTH)
+        ax.plot(*outline(truth, low, high), label="true contour", **TRUTH)
     if contacts is not None:
         attrs = contacts["contact_x"].attrs or attrs
         _draw_contacts(ax, contacts, low, high)
@@ -255,7 +255,8 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     ax.plot(x, median, color=PALETTE["median"], linewidth=1.2, zorder=2.2, label="median")
     if truth is not None:
         along = np.linspace(outside[0], outside[-1], 401)
-        ax.plot(along, above_chord(along, np.asarray(truth.height(along))), zorder=2.4, **TRUTH)
+        height = above_chord(along, np.asarray(truth.height(along)))
+        ax.plot(along, height, zorder=2.4, label="true contour", **TRUTH)
     _draw_ends(ax, found, above_chord)
 
     drawn = np.concatenate([drawn, lower, upper])

@@ -109,8 +109,8 @@ def _draw_lines(ax: Axes, found: xr.Dataset, pivots: Floats) -> None:
         if f"nested_{name}" in found:
             nested = scale * found[f"nested_{name}"].values[here]
             if np.isfinite(nested).any():
-                label = "" if k else "sampled posteriors"
-                ax.plot(x[here], nested, "x", color=colour, markersize=7.0, label=label or None)
+                crosses = None if k else "sampled posteriors"
+                ax.plot(x[here], nested, "x", color=colour, markersize=7.0, label=crosses)
     best = int(found.best)
     ax.plot(x[best], values[best], "o", markersize=12.0, markerfacecolor="none", color=PALETTE["change"], label="best")
     if name == "width":

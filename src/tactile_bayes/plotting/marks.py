@@ -32,5 +32,5 @@ SWEEP_MARKERS: Mapping[str, str] = {"forward": "o", "backward": "^"}
 PHASES = {"tip": "tip contact", "tangential": "tangential contact"}
 CONTACT_MARKERS = {"tip": "o", "tangential": "s", "none": "o"}
 
-TRUTH: Mapping[str, Any] = {"color": PALETTE["change"], "linewidth": 1.0, "linestyle": "--", "label": "true contour"}
+TRUTH: Mapping[str, Any] = {"color": PALETTE["change"], "linewidth": 1.0, "linestyle": "--"}
 """The line of the true contour."""

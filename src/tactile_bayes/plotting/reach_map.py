@@ -196,7 +196,7 @@ def _draw(
         style = {"color": PALETTE["tangential"], "linewidth": 2.2, "label": "posterior median, where touched"}
         ax.plot(*touched, zorder=3, **style)
     if truth is not None:
-        ax.plot(*outline(truth, *span), zorder=3, **TRUTH)
+        ax.plot(*outline(truth, *span), zorder=3, label="true contour", **TRUTH)
     for k, (x, y) in enumerate(pivots.tolist()):
         draw_pivot(ax, (x, y), label="" if k else "pivot")
     finish_map(ax, length_unit(posterior))
