@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-__all__ = ["answered", "going_on"]
+__all__ = ["acknowledge_interrupt", "resumable"]
 
 
 @contextmanager
-def going_on(have: Callable[[], str], *, then: str = "the same command goes on") -> Iterator[Callable[[], object]]:
+def resumable(have: Callable[[], str], *, then: str = "the same command goes on") -> Iterator[Callable[[], object]]:
     """A run that an interrupt ends with words that say what is there, and what the same command then does.
 
     What is yielded is to be called now and then: it raises an interrupt that was lost.
@@ -33,7 +33,7 @@ def going_on(have: Callable[[], str], *, then: str = "the same command goes on")
 
 
 @contextmanager
-def answered(words: str) -> Iterator[None]:
+def acknowledge_interrupt(words: str) -> Iterator[None]:
     """The first interrupt is answered at once, with words on stderr, as what comes of it takes a while."""
     import os
     import signal

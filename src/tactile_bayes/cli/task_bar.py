@@ -5,10 +5,37 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from tactile_bayes.cli.interrupts import resumable
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-__all__ = ["counted", "step_bar", "task_bar"]
+__all__ = ["counted", "resumable_bar", "step_bar", "task_bar"]
+
+
+@contextmanager
+def resumable_bar(
+    total: int,
+    noun: str,
+    quiet: bool,
+    have: Callable[[int | None], str],
+    *,
+    then: str = "the same command goes on",
+) -> Iterator[Callable[[int], object]]:
+    """A bar that is told how many are done; where an interrupt comes, `have` says what is there of this last number.
+
+    It is None before the first is told. `then` is what the same command does after the interrupt.
+    """
+    last: int | None = None
+    with resumable(lambda: have(last), then=then) as raise_lost, task_bar(total, noun, quiet) as show:
+
+        def note(done: int) -> None:
+            nonlocal last
+            last = done
+            show(done)
+            raise_lost()
+
+        yield note
 
 
 @contextmanager
