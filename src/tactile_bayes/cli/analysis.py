@@ -19,7 +19,7 @@ from tactile_bayes.cli.sampling_bar import sampling_bar
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from tactile_bayes.runs.contour import Run
+    from tactile_bayes.runs.contour import ContourRun
 
 __all__ = ["demo", "infer"]
 
@@ -124,7 +124,9 @@ def demo(
     return _answer(ctx, run, {"record": path, **run.files}, TRUTH, "the same command begins anew")
 
 
-def _answer(ctx: typer.Context, run: Run, files: Mapping[str, Path], truth: Mapping[str, float], go_on: str) -> Answer:
+def _answer(
+    ctx: typer.Context, run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float], go_on: str
+) -> Answer:
     """What came out; what is left out is among the verdicts, and with --debug its traceback is on stderr."""
     if run.left_out:
         _trace_back(run, in_full=ctx.find_root().params["debug"])
@@ -136,7 +138,7 @@ def _answer(ctx: typer.Context, run: Run, files: Mapping[str, Path], truth: Mapp
     )
 
 
-def _trace_back(run: Run, *, in_full: bool) -> None:
+def _trace_back(run: ContourRun, *, in_full: bool) -> None:
     import traceback
 
     if in_full:
@@ -147,7 +149,7 @@ def _trace_back(run: Run, *, in_full: bool) -> None:
         typer.echo(f"tactile-bayes: left out: {names}; tactile-bayes --debug ... shows where that comes from", err=True)
 
 
-def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float]) -> dict[str, Any]:
+def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> dict[str, Any]:
     attrs = run.posterior.attrs
     rows = columns_of(run.summary, "quantity")
     if truth:
@@ -171,7 +173,7 @@ def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float]) ->
     return answer
 
 
-def _words(run: Run, files: Mapping[str, Path], truth: Mapping[str, float]) -> Iterator[Any]:
+def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> Iterator[Any]:
     yield from run.verdicts
     share = f"{run.summary.attrs['probability']:.0%}"
     heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
@@ -193,7 +195,7 @@ def _words(run: Run, files: Mapping[str, Path], truth: Mapping[str, float]) -> I
     yield files
 
 
-def _rows(run: Run, truth: Mapping[str, float]) -> Iterable[list[str]]:
+def _rows(run: ContourRun, truth: Mapping[str, float]) -> Iterable[list[str]]:
     numbers = run.summary
     for name in numbers.quantity.values:
         if name.startswith("z_"):  # a direction of a random function, which says nothing by itself

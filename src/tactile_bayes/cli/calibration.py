@@ -145,11 +145,10 @@ def _table(found: xr.Dataset) -> Table:
     from tactile_bayes.calibration.summary import CLAIMS
 
     rows = []
-    for name in found.claim.values:
-        row = found.sel(claim=name)
-        share, error, count = float(row.coverage), float(row.coverage_error), int(row.coverage_replicates)
+    for row in columns_of(found, "claim"):
+        error, count = row["coverage_error"], row["coverage_replicates"]
         if count:
-            held = f"{share:.1%}" + (f" ± {error:.1%}" if error == error else "")
-            rows.append((CLAIMS[str(name)], held, f"{count:,}"))
+            held = f"{row['coverage']:.1%}" + (f" ± {error:.1%}" if error == error else "")
+            rows.append((CLAIMS[row["claim"]], held, f"{count:,}"))
     stated = f"stated with {found.attrs['probability']:.0%}"
     return table_of([stated, "holds in", "of replicates"], rows, left=[stated])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -105,14 +105,11 @@ def _table(found: xr.Dataset) -> Table:
     """No wider than 80 columns; errors of the evidence are in the files."""
     left_out = "elpd" in found
     rows = []
-    for name in found.family.values:
-        row: dict[str, Any] = {
-            str(column): values.item() for column, values in found.sel(family=name).items() if not values.ndim
-        }
+    for row in columns_of(found, "family"):
         cells = [_share(row["probability"]), _fixed(row["log_evidence"])]
         if left_out:
             cells += [_with_error(row["elpd_difference"], row["elpd_difference_error"]), _share(row["weight"])]
-        rows.append([str(name), *cells, _share(row["p_value"]), "yes" if row["fits"] else "no"])
+        rows.append([row["family"], *cells, _share(row["p_value"]), "yes" if row["fits"] else "no"])
     heads = ["family", "probability", "log evid.", *(["elpd diff.", "weight"] if left_out else []), "check p", "fits"]
     return table_of(heads, rows, left=["family", "fits"])
 

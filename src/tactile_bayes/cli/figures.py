@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -12,9 +12,6 @@ from tactile_bayes.cli.answer import Answer
 from tactile_bayes.cli.command import Out, Output, Seed
 from tactile_bayes.cli.rig_options import NoiseOptions
 from tactile_bayes.cli.task_bar import resumable_bar
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 __all__ = ["figures"]
 
@@ -77,11 +74,10 @@ def figures(
     ) as note:
         files = draw_all(out, only=numbers, formats=format or ("pdf", "png"), style=style, progress=note, **options)
     captions = {number: caption(number, **options) for number in files}
-
-    def words() -> Iterator[str]:
-        for number, of_formats in files.items():
-            yield f"Figure {number}: {captions[number]}"
-            yield from (f"    {path}" for path in of_formats.values())
-
+    words = [
+        line
+        for number, of_formats in files.items()
+        for line in (f"Figure {number}: {captions[number]}", *(f"    {path}" for path in of_formats.values()))
+    ]
     rows = [{"number": number, "caption": captions[number], "files": files[number]} for number in files]
-    return Answer(words(), lambda: {"figures": rows})
+    return Answer(words, lambda: {"figures": rows})

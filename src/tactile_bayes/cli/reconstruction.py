@@ -52,18 +52,18 @@ def reconstruct(
         measured, cell = reading.read(record)
         show(1, 2)
         run = reconstruct_into(measured, out, method=method, load_cell=cell, friction=friction)
-    words = reconstruction_in_words(run.contacts)
+    words = reconstruction_in_words(run.result)
     source = [_SOURCES[run.source]] if run.source in _SOURCES else []
     return Answer([*words, *source, "", run.files], lambda: _numbers(run, words))
 
 
 def _numbers(run: ReconstructionRun, words: tuple[str, ...]) -> dict[str, Any]:
-    attrs = run.contacts.attrs
+    attrs = run.result.attrs
     misfit = ("misfit_sum", "misfit_samples", "misfit_probability", "axial_score")
     return {
         "words": words,
         **{name: attrs[name] for name in ("method", "friction", "units")},
-        "samples": dict(Counter(run.contacts.status.values.tolist()).most_common()),
+        "samples": dict(Counter(run.result.status.values.tolist()).most_common()),
         **{name: attrs.get(name) for name in misfit},
         "load_cell": run.load_cell.entries() if run.load_cell is not None else None,
         "load_cell_source": run.source,

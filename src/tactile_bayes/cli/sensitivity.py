@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from tactile_bayes.cli.answer import Answer, table_of
+from tactile_bayes.cli.answer import Answer, columns_of, table_of
 from tactile_bayes.cli.command import Out, Output, Seed
 from tactile_bayes.cli.rig_options import NoiseOptions, RigOptions, UnknownOptions
 from tactile_bayes.cli.task_bar import counted, resumable_bar, task_bar
@@ -183,34 +183,32 @@ def _load_cell(rod: Rod | None, cell: LoadCell | None, drive_angle_noise: float)
 def _answer(run: SensitivityRun) -> Answer:
     from tactile_bayes.runs.sensitivity import rod_in_words
 
-    words = run.sensitivity.attrs["words"].splitlines()
+    words = run.result.attrs["words"].splitlines()
     if run.rods is not None:
         words.append(rod_in_words(run.rods))
-    table = _table(run.sensitivity["information"].to_dataset())
+    table = _table(run.result["information"].to_dataset())
     return Answer([*words, "", table, "", run.files], lambda: _numbers(run, words))
 
 
 def _table(told: xr.Dataset) -> Table:
     rows = []
-    for name in told.parameter.values:
-        row = told.sel(parameter=name)
-        unit = str(row.unit.item())
-        numbers = (f"{float(value):.3g}" for value in (row.value, row.bound_with_priors))
-        rows.append((str(name), *numbers, "" if unit == "1" else unit))
+    for row in columns_of(told, "parameter"):
+        numbers = (f"{row[name]:.3g}" for name in ("value", "bound_with_priors"))
+        rows.append((row["parameter"], *numbers, "" if row["unit"] == "1" else row["unit"]))
     return table_of(["parameter", "value", "known to ±", "unit"], rows, left=["parameter", "unit"])
 
 
 def _numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any]:
     """The main ones, as JSON can hold them."""
-    found = run.sensitivity
+    found = run.result
     told, needed = found["information"].to_dataset(), found["required_noise"].to_dataset()
     answer: dict[str, Any] = {
         "words": words,
         **{name: found.attrs[name] for name in ("contour", "units", "rod_length", "rod_flexural_rigidity")},
         **{name: float(found.attrs[name]) for name in ("force_noise", "moment_noise")},
         "parameters": {
-            name: {part: told[part].sel(parameter=name) for part in ("value", "bound", "bound_with_priors", "unit")}
-            for name in told.parameter.values
+            row["parameter"]: {name: row[name] for name in ("value", "bound", "bound_with_priors", "unit")}
+            for row in columns_of(told, "parameter")
         },
         "band": {
             "touched": told["touched_width"],
@@ -232,17 +230,7 @@ def _numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any]:
 
 def _cells(study: xr.Dataset) -> list[dict[str, Any]]:
     """Errors of constrained contacts and widths of bands, by cell."""
-    of_method = study.sel(reconstruction="constrained")
-    names = ("message", "rms_along", "rms_across", "ok", "expected_touched_width", "expected_gap_width")
-    return [
-        {
-            "contour": contour,
-            "distance": distance,
-            "noise_factor": factor,
-            **{name: cell[name] for name in names},
-        }
-        for contour in study.contour.values
-        for distance in study.distance.values
-        for factor in study.noise_factor.values
-        for cell in [of_method.sel(contour=contour, distance=distance, noise_factor=factor)]
-    ]
+    names = ["message", "rms_along", "rms_across", "ok", "expected_touched_width", "expected_gap_width"]
+    of_method = study[names].sel(reconstruction="constrained", drop=True)
+    table = of_method.to_dataframe(dim_order=["contour", "distance", "noise_factor"])
+    return table.reset_index().to_dict("records")

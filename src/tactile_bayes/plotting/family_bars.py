@@ -15,7 +15,7 @@ from tactile_bayes.uncertainty.family_verdict import NONE_FITS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["families", "panel_count", "panel_height"]
+__all__ = ["families"]
 
 _WIDTHS = {0.5: ("v", -0.26, "priors half as wide"), 2.0: ("^", 0.26, "priors twice as wide")}
 """Marker, place beside the bar's middle, and what it says."""
@@ -84,21 +84,12 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     return panels
 
 
-def panel_count(comparison: xr.Dataset) -> int:
-    return 2 if "elpd_difference" in comparison else 1
-
-
-def panel_height(comparison: xr.Dataset) -> float:
-    """Height of a figure that holds the panels [inches]."""
-    return 1.9 + 0.48 * comparison.sizes["family"]
-
-
 def _panels(comparison: xr.Dataset, axes: Any) -> AxesArray:
-    wanted = panel_count(comparison)
+    wanted = 2 if "elpd_difference" in comparison else 1
     if axes is None:
         from matplotlib import pyplot as plt
 
-        size = (7.0, panel_height(comparison))
+        size = (7.0, 1.9 + 0.48 * comparison.sizes["family"])
         axes = plt.subplots(1, wanted, figsize=size, layout="constrained", sharey=True, squeeze=False)[1][0]
     panels = np.atleast_1d(np.asarray(axes, dtype=object))
     if panels.shape != (wanted,):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,16 +20,14 @@ from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
-from tactile_bayes.inference.ensembles import Progress, SamplerSettings
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.found_rig import contact_points
-from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
-from tactile_bayes.runs.folder import Folder
+from tactile_bayes.runs.folder import Folder, panels
 from tactile_bayes.scanning import Scan, scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive import predictive_interval
@@ -37,11 +35,11 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 from tactile_bayes.uncertainty.suspicions import suspicions
 from tactile_bayes.uncertainty.verdicts import verdicts
 
-__all__ = ["Run", "analyse"]
+__all__ = ["ContourRun", "analyse"]
 
 
 @dataclass(frozen=True)
-class Run:
+class ContourRun:
     """What `analyse` made.
 
     Attributes
@@ -102,20 +100,15 @@ def analyse(
     measured: xr.Dataset,
     out: str | os.PathLike[str],
     *,
-    family: str = "parabola",
     load_cell: LoadCell | None = None,
     rod: Rod | None = None,
-    friction: float | None = None,
-    nuisances: Sequence[str] = STANDARD,
     probability: float = 0.95,
     seed: int = 1,
-    settings: SamplerSettings | None = None,
-    checkpoint: str | os.PathLike[str] | None = None,
     truth: Contour | None = None,
     record_file: str | os.PathLike[str] | None = None,
     command: Sequence[str] = (),
-    progress: Callable[[Progress], object] | None = None,
-) -> Run:
+    **options: Any,
+) -> ContourRun:
     """Contact points, contour posterior, band and figures of a record, written to a folder.
 
     The posterior is written as soon as it is drawn, and again with what it predicts. Whatever fails from then on is
@@ -129,7 +122,7 @@ def analyse(
         Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
         the figures; made if it is not there. Files of these names in it are replaced, and a report.html, which would
         be of the posterior that was there, is removed.
-    family, load_cell, rod, friction, nuisances, seed, settings, checkpoint, progress
+    load_cell, rod, seed, options
         As `infer_contour` takes them.
     probability : float
         Of the band and of the intervals in the summary.
@@ -142,7 +135,7 @@ def analyse(
 
     Returns
     -------
-    Run
+    ContourRun
 
     Raises
     ------
@@ -162,20 +155,7 @@ def analyse(
         drawn.append(posterior)
 
     try:
-        keep(
-            infer_contour(
-                measured,
-                family=family,
-                load_cell=load_cell,
-                seed=seed,
-                friction=friction,
-                nuisances=nuisances,
-                settings=settings,
-                checkpoint=checkpoint,
-                progress=progress,
-                keep=keep,
-            )
-        )
+        keep(infer_contour(measured, load_cell=load_cell, seed=seed, keep=keep, **options))
     except Exception as error:
         if not drawn and isinstance(error, InferenceError):
             raise type(error)(" ".join((str(error), *suspicions(measured, load_cell)))) from error
@@ -209,7 +189,7 @@ def analyse(
     _draw(_Figures(measured, result, contacts, band, edges, truth), folder)
     if len(folder.left_out) > before:
         write_summary()
-    return Run(result, contacts, band, numbers, (*found, *folder.words), folder.files, folder.left_out)
+    return ContourRun(result, contacts, band, numbers, (*found, *folder.words), folder.files, folder.left_out)
 
 
 def _origin(
@@ -281,11 +261,11 @@ class _Figures:
         )
 
     def observables(self) -> Any:
-        axes = _panels(3, 1, 7.0, 5.4, sharex=True)
+        axes = panels(3, 1, 7.0, 5.4, sharex=True)
         return plotting.observables(self.measured, events=self.fitted.events, axes=axes[:, 0])
 
     def predictive(self) -> Any:
-        axes = _panels(6, 1, 7.0, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))
+        axes = panels(6, 1, 7.0, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))
         probability = float(self.result.attrs["probability"])
         interval = predictive_interval(self.result, probability)
         label = f"{100 * probability:.6g} % predictive"
@@ -294,7 +274,7 @@ class _Figures:
         return axes
 
     def rods(self) -> Any:
-        axes = _panels(len(self.directions), 1, 7.0, 4.0 * len(self.directions))
+        axes = panels(len(self.directions), 1, 7.0, 4.0 * len(self.directions))
         for direction, ax in zip(self.directions, axes[:, 0], strict=True):
             plotting.rods(self.fitted, direction=direction, ax=ax)
         return axes
@@ -302,7 +282,7 @@ class _Figures:
     def contour(self) -> Any:
         if self.band is None:
             raise InferenceError("there is no band to be drawn")
-        above, below = _panels(2, 1, 7.0, 6.0, sharex=True, height_ratios=(2.6, 1.0))[:, 0]
+        above, below = panels(2, 1, 7.0, 6.0, sharex=True, height_ratios=(2.6, 1.0))[:, 0]
         known: dict[str, Any] = {"truth": self.truth, "gap": self.edges}
         plotting.contour(self.band.x.values, contacts=self.contacts, band=self.band, base=self.base, ax=above, **known)
         plotting.band_detail(self.band, ax=below, **known)
@@ -312,20 +292,13 @@ class _Figures:
 
     def gap(self) -> Any:
         assert self.edges is not None
-        return plotting.gap(self.edges, truth=self.truth, ax=_panels(1, 1, 7.0, 3.6)[0, 0])
+        return plotting.gap(self.edges, truth=self.truth, ax=panels(1, 1, 7.0, 3.6)[0, 0])
 
     def trace(self) -> Any:
-        axes = _panels(len(self.names), 2, 7.0, 1.6 * len(self.names))
+        axes = panels(len(self.names), 2, 7.0, 1.6 * len(self.names))
         return plotting.trace(self.result, names=self.names, axes=axes)
 
     def pairs(self) -> Any:
         count = len(self.names)
-        axes = _panels(count, count, 1.6 * count + 0.6, 1.6 * count + 0.6)
+        axes = panels(count, count, 1.6 * count + 0.6, 1.6 * count + 0.6)
         return plotting.pairs(self.result, names=self.names, axes=axes)
-
-
-def _panels(rows: int, columns: int, width: float, height: float, **options: Any) -> Any:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure.subplots(rows, columns, squeeze=False, **options)

@@ -16,7 +16,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.netcdf import write_netcdf
 
-__all__ = ["Folder", "Run", "posterior_in"]
+__all__ = ["Folder", "Run", "panels", "posterior_in"]
 
 Result = TypeVar("Result")
 
@@ -86,6 +86,14 @@ class Folder:
             with self.file(what, name) as temporary:
                 figure.savefig(temporary, dpi=200, format="png")
             plt.close(figure)
+
+
+def panels(rows: int, columns: int, width: float, height: float, **options: Any) -> Any:
+    """Axes of a new figure that pyplot does not know; shape (rows, columns)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def posterior_in(run: Path) -> Path:

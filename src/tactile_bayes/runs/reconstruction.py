@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -20,7 +18,7 @@ from tactile_bayes.inspection import CellSource, known_cell
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
 from tactile_bayes.record import validate
-from tactile_bayes.runs.folder import Folder
+from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.uncertainty.verdicts import doubtful_sides
 
 if TYPE_CHECKING:
@@ -33,24 +31,22 @@ _CONTRADICTION = 1e-4
 
 
 @dataclass(frozen=True)
-class ReconstructionRun:
+class ReconstructionRun(Run[xr.Dataset]):
     """What `reconstruct_into` made.
 
     Attributes
     ----------
-    contacts : xr.Dataset
+    result : xr.Dataset
         From `reconstruct`.
+    files : mapping of str to Path
+        By what they hold.
     load_cell : LoadCell or None
     source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
         What the load cell is known from; see `known_cell`.
-    files : mapping of str to Path
-        By what they hold.
     """
 
-    contacts: xr.Dataset
     load_cell: LoadCell | None
     source: CellSource
-    files: Mapping[str, Path]
 
 
 def reconstruct_into(
@@ -93,7 +89,7 @@ def reconstruct_into(
     >>> from tactile_bayes.contours import paper_profile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = reconstruct_into(scan(paper_profile("II", q=0.5), drive_step=0.05).record, folder)
-    >>> run.contacts.attrs["method"], sorted(run.files)
+    >>> run.result.attrs["method"], sorted(run.files)
     ('raw', ['contacts', 'map'])
     """
     measured = validate(measured)
@@ -107,7 +103,7 @@ def reconstruct_into(
     shown = contacts.contact_x.values[contacts.status.values == "ok"]
     if shown.size > 1 and np.ptp(shown) > 0.0:
         folder.draw("map", "contacts.png", _map, measured, contacts, shown)
-    return ReconstructionRun(contacts, cell, source, folder.files)
+    return ReconstructionRun(contacts, folder.files, cell, source)
 
 
 def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
@@ -168,11 +164,8 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
 
 
 def _map(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64]) -> Axes:
-    from matplotlib.figure import Figure
-
     pivots = np.unique(np.stack([measured.base_x.values, measured.base_y.values], axis=1), axis=0)
     base = (float(pivots[0, 0]), float(pivots[0, 1])) if len(pivots) == 1 else None
     low, high = (float(end) for end in np.quantile(shown, [0.01, 0.99]))
     ends = [low, high] if high > low else [shown.min(), shown.max()]
-    ax = Figure(figsize=(7.0, 4.0), layout="constrained").subplots()
-    return plotting.contour(ends, contacts=contacts, base=base, ax=ax)
+    return plotting.contour(ends, contacts=contacts, base=base, ax=panels(1, 1, 7.0, 4.0)[0, 0])

@@ -6,7 +6,6 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
-from tactile_bayes.runs.folder import Folder
+from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.outermost import outermost
 
 if TYPE_CHECKING:
@@ -44,25 +43,23 @@ class Material(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SensitivityRun:
+class SensitivityRun(Run[xr.DataTree]):
     """What `sensitivity_into` made.
 
     Attributes
     ----------
-    sensitivity : xr.DataTree
+    result : xr.DataTree
         From `sensitivity`.
+    files : mapping of str to Path
+        By what they hold.
     rods : xr.Dataset or None
         From `required_rod`, where a material was given.
     study : xr.Dataset or None
         From `error_map`, where one was asked for.
-    files : mapping of str to Path
-        By what they hold.
     """
 
-    sensitivity: xr.DataTree
     rods: xr.Dataset | None
     study: xr.Dataset | None
-    files: Mapping[str, Path]
 
 
 def sensitivity_into(
@@ -133,7 +130,7 @@ def sensitivity_into(
         inside.write_netcdf("study", "study.nc", studied)
         inside.draw("errors", "study.png", _draw_study, studied)
         folder.files |= inside.files
-    return SensitivityRun(found, rods, studied, folder.files)
+    return SensitivityRun(found, folder.files, rods, studied)
 
 
 def rod_in_words(rods: xr.Dataset) -> str:
@@ -174,21 +171,15 @@ def _rods(material: Material, options: Mapping[str, Any], progress: Callable[[Ta
     )
 
 
-def _two_panels() -> Any:
-    from matplotlib import pyplot as plt
-
-    return plt.subplots(2, 1, figsize=(7.0, 7.4), layout="constrained")[1]
-
-
 def _draw_noise_shares(found: xr.DataTree) -> Axes:
     """Of both methods."""
-    panels = _two_panels()
-    plotting.noise_shares(found, reconstruction="raw", ax=panels[0])
-    return plotting.noise_shares(found, reconstruction="constrained", ax=panels[1])
+    above, below = panels(2, 1, 7.0, 7.4)[:, 0]
+    plotting.noise_shares(found, reconstruction="raw", ax=above)
+    return plotting.noise_shares(found, reconstruction="constrained", ax=below)
 
 
 def _draw_study(studied: xr.Dataset) -> Axes:
     """Of contacts and of bands."""
-    panels = _two_panels()
-    plotting.error_map(studied, quantity="across", ax=panels[0])
-    return plotting.error_map(studied, quantity="touched", ax=panels[1])
+    above, below = panels(2, 1, 7.0, 7.4)[:, 0]
+    plotting.error_map(studied, quantity="across", ax=above)
+    return plotting.error_map(studied, quantity="touched", ax=below)
