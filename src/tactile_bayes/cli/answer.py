@@ -88,8 +88,9 @@ def table_of(
 
 def columns_of(dataset: Any, dim: str) -> list[dict[str, Any]]:
     """A row for every place along a dimension, of the coordinate and of all that lies along this dimension alone."""
-    names = [dim, *(str(name) for name, values in dataset.data_vars.items() if values.dims == (dim,))]
-    return [{name: dataset[name].values[i] for name in names} for i in range(dataset.sizes[dim])]
+    columns = {dim: dataset[dim], **dataset.data_vars, **dataset.coords}
+    table = {name: values.values for name, values in columns.items() if values.dims == (dim,)}
+    return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
 
 
 def _plain(value: Any) -> Any:

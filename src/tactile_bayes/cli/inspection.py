@@ -152,17 +152,15 @@ def _channels(channels: xr.Dataset) -> Table:
     from tactile_bayes.inspection.words import prefix_of
 
     rows = []
-    for i, name in enumerate(channels.channel.values):
-        row = channels.isel(channel=i)
-        unit = str(row.unit.values)
-        size, prefix = (1.0, "") if unit == "1" else prefix_of(max(abs(float(row.smallest)), abs(float(row.largest))))
+    for row in columns_of(channels, "channel"):
+        name, unit, like = row["channel"], row["unit"], row["neighbour_correlation"]
+        size, prefix = (1.0, "") if unit == "1" else prefix_of(max(abs(row["smallest"]), abs(row["largest"])))
         cells = []
         for column in ("smallest", "largest", "bias", "bias_uncertainty", "noise", "stated_noise", "resolution"):
-            value = float(row[column]) / size
+            value = row[column] / size
             none = value != value or (column == "resolution" and value == 0.0)
             cells.append("–" if none else f"{value:.2g}" if column == "bias_uncertainty" else f"{value:.3g}")
-        like = float(row.neighbour_correlation)
-        label = str(name) if unit == "1" else f"{name} [{prefix}{unit}]"
+        label = name if unit == "1" else f"{name} [{prefix}{unit}]"
         rows.append([label, *cells, "–" if like != like else f"{like:+.2f}"])
     heads = ["channel", "from", "to", "zero", "± s.e.", "noise", "stated", "step", "corr."]
     return table_of(heads, rows, left=["channel"])
@@ -177,8 +175,6 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
         sweeps, found.sweeps.onset_drive_angle.values, found.sweeps.snap_off_drive_angle.values, strict=True
     ):
         row |= {"onset_drive_angle": onset, "snap_off_drive_angle": snap}
-    units = found.channels.unit.values.tolist()
-    channels = columns_of(found.channels, "channel")
     return {
         "words": found.words,
         "is_suspect": found.is_suspect,
@@ -191,7 +187,7 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
         "load_cell": found.load_cell.entries() if found.load_cell is not None else None,
         "load_cell_source": found.load_cell_source,
         "sweeps": sweeps,
-        "channels": [{**row, "unit": unit} for row, unit in zip(channels, units, strict=True)],
+        "channels": columns_of(found.channels, "channel"),
         "suspicious_samples": _suspicious(found.samples),
         "raw_step_2": found.statuses,
         "next": again,
