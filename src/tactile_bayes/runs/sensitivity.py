@@ -104,7 +104,7 @@ def sensitivity_into(
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = sensitivity_into(folder, seed=1, parts=["information"])
-    ...     sorted(path.name for path in Path(folder).iterdir())
+    ...     sorted(path.name for path in run.files.values())
     ['information.png', 'sensitivity.nc', 'words.txt']
     """
     if material is not None and (options.get("rod") is None or options.get("load_cell") is None):
