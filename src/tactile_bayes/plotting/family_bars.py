@@ -17,7 +17,7 @@ from tactile_bayes.uncertainty.family_verdict import NONE_FITS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["families", "panel_count", "panel_height"]
+__all__ = ["families"]
 
 _WIDTHS = {0.5: ("v", -0.26, "priors half as wide"), 2.0: ("^", 0.26, "priors twice as wide")}
 """Marker, place beside the bar's middle, and what it says."""
@@ -86,19 +86,10 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     return panels
 
 
-def panel_count(comparison: xr.Dataset) -> int:
-    return 2 if "elpd_difference" in comparison else 1
-
-
-def panel_height(comparison: xr.Dataset) -> float:
-    """Height of a figure that holds the panels [inches]."""
-    return 1.9 + 0.48 * comparison.sizes["family"]
-
-
 def _panels(comparison: xr.Dataset, axes: Any) -> AxesArray:
-    wanted = panel_count(comparison)
+    wanted = 2 if "elpd_difference" in comparison else 1
     if axes is None:
-        return new_panels(1, wanted, panel_height(comparison), sharey=True)[0]
+        return new_panels(1, wanted, 1.9 + 0.48 * comparison.sizes["family"], sharey=True)[0]
     others = " and elpd differences" if wanted == 2 else "; there are no leave-one-out densities"
     return check_panels(axes, (wanted,), f"for probabilities{others}")
 
