@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.stats import rv_histogram
 
 from tactile_bayes.checks import check_mapping, check_optional, check_switch
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.families import Family, Prior, refuse_no_prior
+from tactile_bayes.inference.families import Family, Prior, refuse_wrong_priors
 from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import without_errors
 from tactile_bayes.inference.noise import noise_of
@@ -135,13 +135,8 @@ def _contour_problem(
     noise = noise_of(measured, load_cell)
     rig = nuisances_of(measured, nuisances, priors or {}, noise.cell, friction)
     chosen_priors = {**contour_priors(measured, chosen), **rig.priors, **noise.priors}
-    for name, prior in (priors or {}).items():
-        if name not in chosen_priors:
-            raise ParameterError(
-                f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}, and of what is "
-                "not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
-            )
-        refuse_no_prior(name, prior)
+    more = ", and of what is not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
+    refuse_wrong_priors(priors or {}, chosen_priors, more=more)
     data_sha256 = record_hash(measured)
     loaded = loaded_samples(measured, noise.stated_cell)
     if not loaded.any():

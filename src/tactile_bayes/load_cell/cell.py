@@ -17,8 +17,12 @@ from tactile_bayes.load_cell.correction import corrected
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance
 from tactile_bayes.load_cell.data_sheet import DataSheet
-from tactile_bayes.load_cell.left_out import log_density_left_out
-from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_likelihood
+from tactile_bayes.load_cell.likelihood import (
+    approximations,
+    checked_noise_scale,
+    log_density_left_out,
+    log_likelihood,
+)
 from tactile_bayes.load_cell.measurement import measured, stated_entries
 from tactile_bayes.load_cell.surprise import surprise
 from tactile_bayes.load_cell.zero_load import found_cell

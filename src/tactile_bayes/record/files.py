@@ -10,10 +10,8 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.checks import (
-    check_choice,
     check_kind,
     check_mapping,
-    check_names,
     check_optional,
     check_path,
     check_switch,
@@ -24,7 +22,7 @@ from tactile_bayes.record.conversion import in_units_of_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf_format import read_netcdf, write_netcdf
 from tactile_bayes.record.origin import renamed
-from tactile_bayes.record.schema import FRAMES, Frame
+from tactile_bayes.record.schema import Frame
 from tactile_bayes.record.stroke import split_at_turns
 from tactile_bayes.record.validation import validate
 from tactile_bayes.rod import Rod
@@ -125,16 +123,12 @@ def read_record(
     >>> record.attrs["units"]
     'SI'
     """
-    check_path("path", path)
+    path = check_path("path", path)
     check_mapping("columns", columns, "give names by column of a record, like {'force_x': 'Fx[mN]'}")
     for column, origin in (columns or {}).items():
         check_kind(f"columns[{column!r}]", origin, str, "give what stands for it, like 'Fx[mN]'")
     check_switch("split_sweeps", split_sweeps)
-    check_optional("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
-    missing = [missing] if isinstance(missing, str) else check_names("missing", missing)
-    if load_cell_frame is not None:
-        check_choice("load_cell_frame", load_cell_frame, FRAMES)
-    path = Path(path)
+    check_optional("the rod", rod, Rod)
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     if path.is_dir():
@@ -194,8 +188,7 @@ def write_record(record: xr.Dataset, path: str | os.PathLike[str]) -> None:
     0,forward,0.0,0.0,1.2,,0.0,0.1
     <BLANKLINE>
     """
-    check_path("path", path)
-    path = Path(path)
+    path = check_path("path", path)
     write = _WRITERS[_suffix(path)]
     record = validate(record)
     write(record, path)
