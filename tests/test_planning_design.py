@@ -223,7 +223,7 @@ def test_weighted_bands():
         ({"drive_steps": [0.0]}, "drive_steps is .*: give positive angles in radians"),
         ({"drive_steps": []}, "drive_steps is .*: give positive angles in radians"),
         ({"bases": [(0.0, 0.0), (0.0, 0.0)]}, "bases is .*: one of them is given twice"),
-        ({"bases": [0.0, 1.0]}, "bases is .*: give a pivot"),
+        ({"bases": [0.0, 1.0]}, "bases is .*: give a list of pivots"),
         ({"span": (1.0, 0.0)}, "span is .*: give two values of x"),
         ({"priors": {"b": stats.norm()}}, "there is a prior of b, which is no parameter: there are a, q, x_c"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -157,7 +158,7 @@ def correlated_density(residual: Floats, deviation: Floats, steps: Floats, corre
     if np.any(steps):
         between = _covariance(deviation, steps, correlation)
         known = np.isfinite(between).all(axis=(-2, -1), keepdims=True)
-        root = np.linalg.cholesky(np.where(known, between, np.eye(correlation.shape[0])))
+        root: NDArray[np.floating[Any]] = np.linalg.cholesky(np.where(known, between, np.eye(correlation.shape[0])))
         deviation = np.ones(1)
         white = (np.linalg.inv(root) @ residual[..., None])[..., 0]
     else:

@@ -16,7 +16,6 @@ from tactile_bayes.checks import (
     check_choice,
     check_numbers,
     check_path,
-    check_pivots,
     check_probability,
     check_seed,
     check_whole_number,
@@ -208,10 +207,10 @@ def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:
     if bases is None:
         x, y = told.bases[0] if told.bases else (0.0, 0.0)
         return [(float(x + told.length * dx), float(y + told.length * dy)) for dy in ABOVE for dx in ACROSS]
-    pivots = check_pivots("bases", bases)
-    if len(set(pivots)) < len(pivots):
+    pivots = check_numbers("bases", bases, "give a list of pivots, [(x, y), (x, y)]", shape=(None, 2))
+    if len(np.unique(pivots, axis=0)) < len(pivots):
         raise refused("bases", bases, "one of them is given twice")
-    return pivots
+    return [(x, y) for x, y in pivots.tolist()]
 
 
 def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, float]:

@@ -211,7 +211,7 @@ def _objects(contours: Mapping[str, Contour] | Sequence[str], rod: Rod) -> dict[
         for contour in contours.values():
             family_parameters(contour)  # or a refusal
         return dict(contours)
-    if not check_names("contours", contours):
+    if isinstance(contours, str) or not check_names("contours", contours):
         raise refused("contours", contours, remedy)
     if len(set(contours)) < len(contours):
         raise refused("contours", contours, "one of them is given twice")
