@@ -10,6 +10,7 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.checks import (
+    check_choice,
     check_kind,
     check_mapping,
     check_optional,
@@ -22,7 +23,7 @@ from tactile_bayes.record.conversion import in_units_of_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf_format import read_netcdf, write_netcdf
 from tactile_bayes.record.origin import renamed
-from tactile_bayes.record.schema import Frame
+from tactile_bayes.record.schema import FRAMES, Frame
 from tactile_bayes.record.stroke import split_at_turns
 from tactile_bayes.record.validation import validate
 from tactile_bayes.rod import Rod
@@ -129,6 +130,8 @@ def read_record(
         check_kind(f"columns[{column!r}]", origin, str, "give what stands for it, like 'Fx[mN]'")
     check_switch("split_sweeps", split_sweeps)
     check_optional("the rod", rod, Rod)
+    if load_cell_frame is not None:
+        check_choice("load_cell_frame", load_cell_frame, FRAMES)
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     if path.is_dir():
