@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
@@ -16,7 +16,7 @@ from tactile_bayes.checks import shown
 from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior", "refuse_no_prior", "support_of"]
+__all__ = ["FAMILIES", "FLANKS", "Family", "Flank", "Prior", "refuse_wrong_priors", "support_of"]
 
 _MOST_STEPS = 100
 
@@ -42,11 +42,17 @@ class Prior(Protocol):
     def std(self) -> Any: ...
 
 
-def refuse_no_prior(name: str, prior: Any) -> None:
-    """Refuse what is no distribution, or one whose parameters are not fixed."""
-    if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
+def refuse_wrong_priors(priors: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
+    """Refuse priors that are no distributions with fixed parameters, or of what is no parameter."""
+    for name, prior in priors.items():
+        if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
+            remedy = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            raise ParameterError(f"the prior of {name} is {shown(prior)}: {remedy}")
+    strangers = sorted(set(priors) - set(names))
+    if strangers:
         raise ParameterError(
-            f"the prior of {name} is {shown(prior)}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            f"there is a prior {whose}of {', '.join(strangers)}, which is no parameter: there are "
+            f"{', '.join(names)}{more}"
         )
 
 
