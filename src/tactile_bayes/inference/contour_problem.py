@@ -110,10 +110,10 @@ def contour_problem(measured: xr.Dataset, assumed: Assumptions) -> ContourProble
 def _of_sides(measured: xr.Dataset, assumed: Assumptions) -> ContourProblem:
     """The problem of a record whose sides of contact are those that it states."""
     measured = with_rod(validate(measured), assumed.rod)
-    given = assumed.priors or {}
     check_optional("load_cell", assumed.load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     check_switch("events", assumed.events)
     check_mapping("priors", assumed.priors, "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}")
+    given = assumed.priors or {}
     chosen = family_named(assumed.family)
     noise = noise_of(measured, assumed.load_cell)
     rig = nuisances_of(measured, assumed.nuisances, given, noise.cell, assumed.friction)
