@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from helpers.contour_posteriors import infer_as_stated
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.scanning import scan

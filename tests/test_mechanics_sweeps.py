@@ -13,8 +13,8 @@ import pytest
 from numba.core.errors import TypingError
 
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, Smooth
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler, sweeps

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from tactile_bayes.blank_record import blank_record
 from tactile_bayes.calibration.world import NUMBERS, World
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import ContourProblem, contour_priors, contour_problem, prior_in_words
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior, refuse_no_prior
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of

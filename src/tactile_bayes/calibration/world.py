@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from tactile_bayes.contours import Contour, ShapeFree
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import Prior, refuse_no_prior
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.load_cell import LoadCell
 

@@ -78,19 +78,18 @@ def contour_asked(
 
 
 def _of_family(name: str, options: Sequence[str]) -> Contour:
+    from tactile_bayes.contours.families import family_named
     from tactile_bayes.errors import ParameterError
-    from tactile_bayes.inference.families import FAMILIES
-    from tactile_bayes.inference.family_names import family_named
 
-    family = FAMILIES.get(name) or family_named(name)
-    if name not in FAMILIES:
+    family = family_named(name)
+    if family.roughness:
         raise ParameterError(f"--family {name}: such a contour is no few numbers, so give --points")
     values = {"x_c": 0.0, **_numbers(options, family.parameters)}
     absent = [parameter for parameter in family.parameters if parameter not in values]
     if absent:
         like = " ".join(f"--parameter {parameter}=..." for parameter in absent)
         raise ParameterError(f"--family {name} takes {', '.join(family.parameters)}: give {like} as well")
-    return family.build(*(values[parameter] for parameter in family.parameters))
+    return family.contour(values)
 
 
 def _numbers(options: Sequence[str], known: Sequence[str]) -> Mapping[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,9 @@ from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
 __all__ = ["PowerLaw"]
 
 _LEAST_EXPONENT, _GREATEST_EXPONENT = 1.1, 50.0
+
+_STEEPEST = 1e300
+"""Greatest factor that follows from a width: more is beyond what numbers hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +76,26 @@ class PowerLaw(Contour):
             n=self.n,
         )
         refuse_unless(finite(self.q, self.x_c), "PowerLaw", "q and x_c must be finite", q=self.q, x_c=self.x_c)
+
+    @classmethod
+    def of_width(cls, w: Parameter, n: Parameter, q: Parameter, x_c: Parameter = 0.0) -> Self:
+        """(y − q)/w = (|x − x_c|/w)ⁿ: as high above its vertex as it is wide at w > 0 [length].
+
+        Examples
+        --------
+        >>> PowerLaw.of_width(0.5, 3, q=0.3)
+        PowerLaw(a=4.0, n=3.0, q=0.3, x_c=0.0)
+        """
+        w = np.asarray(w, dtype=float)[()]
+        refuse_unless(np.greater(w, 0.0) & np.isfinite(w), "PowerLaw", "w must be positive and finite", w=w)
+        with np.errstate(over="ignore", divide="ignore"):  # where it is narrow, or wide, and n is large
+            a = np.clip(w ** (1.0 - n), 1.0 / _STEEPEST, _STEEPEST)
+        return cls(a, n, q, x_c)
+
+    @property
+    def w(self) -> Floats:
+        """The width of `of_width`."""
+        return np.asarray(np.asarray(self.a) ** (1.0 / (1.0 - np.asarray(self.n))))
 
     @property
     def domain(self) -> tuple[Floats, Floats]:

@@ -17,11 +17,11 @@ import xarray as xr
 
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.files import write_atomically
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.ensembles import Progress, SamplerSettings
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import posterior_draws, write_result

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from tactile_bayes.contours import Smooth
+from tactile_bayes.contours.base import Floats
+from tactile_bayes.contours.smooth import Smooth
 
 __all__ = ["Directions", "RandomRadius"]
-
-Floats = NDArray[np.float64]
 
 _PLACES = 200
 """Slope angles at which the process is cut into directions."""
