@@ -27,7 +27,7 @@ from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["FAMILIES", "FLANKS", "Flank", "FlankFamily", "family_named"]
+__all__ = ["FAMILIES", "FLANKS", "Flank", "FlankFamily", "family_named", "sides_of"]
 
 _FAR = 1e3
 """Widths from the vertex beyond which a power law is as high as here, or its height would overflow."""
@@ -178,14 +178,27 @@ FLANKS: dict[str, Flank] = {
 }
 """By name; any two make a joined family."""
 
+
+def sides_of(family: str) -> dict[str, str]:
+    """Names of the flanks of a family, by what stands before the names of their parameters.
+
+    Examples
+    --------
+    >>> sides_of("circle"), sides_of("circle/ellipse")
+    ({'': 'circle'}, {'left_': 'circle', 'right_': 'ellipse'})
+    """
+    names = family.split("/")
+    return dict(zip(("left_", "right_") if len(names) > 1 else ("",), names, strict=True))
+
+
+def _of_flanks(name: str) -> FlankFamily:
+    return FlankFamily(name, {side: FLANKS[flank] for side, flank in sides_of(name).items()})
+
+
 FAMILIES: dict[str, Family] = {
-    **{name: FlankFamily(name, {"": flank}) for name, flank in FLANKS.items()},
+    **{name: _of_flanks(name) for name in FLANKS},
     SHAPE_FREE.name: SHAPE_FREE,
-    **{
-        f"{left}/{right}": FlankFamily(f"{left}/{right}", {"left_": FLANKS[left], "right_": FLANKS[right]})
-        for left in FLANKS
-        for right in FLANKS
-    },
+    **{f"{left}/{right}": _of_flanks(f"{left}/{right}") for left in FLANKS for right in FLANKS},
 }
 """Families by name; "parabola/circle" is a parabola on the left of its vertex, and a circle on the right."""
 

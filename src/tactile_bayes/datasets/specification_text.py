@@ -30,7 +30,7 @@ def without(defaults: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, A
     found = {}
     for key, value in said.items():
         default = defaults.get(key)
-        if isinstance(default, Mapping):
+        if isinstance(default, Mapping) and isinstance(value, Mapping):
             value = without(default, value)
             default = {}
         if canonical(value) != canonical(default):

@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.optimize import brentq
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.contours.families import family_named
+from tactile_bayes.contours.families import family_named, sides_of
 from tactile_bayes.contours.family import Family
 from tactile_bayes.inference.families import Prior, own_priors
 
@@ -60,10 +60,9 @@ def matched_priors(family: str, length: float) -> dict[str, Prior]:
     >>> {name: round(float(p.median()), 3) for name, p in matched_priors("ellipse", 1.0).items()}
     {'a': 0.592, 'b': 0.592}
     """
-    names = family_named(family).name.split("/")
     return {
         f"{side}{parameter}": prior
-        for side, name in zip(("left_", "right_") if len(names) > 1 else ("",), names, strict=True)
+        for side, name in sides_of(family_named(family).name).items()
         for parameter, prior in _of_flank(name, length).items()
     }
 

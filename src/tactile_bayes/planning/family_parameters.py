@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tactile_bayes.contours import Contour, Joined
-from tactile_bayes.contours.families import FLANKS, family_named
+from tactile_bayes.contours.families import FLANKS, family_named, sides_of
 from tactile_bayes.errors import ParameterError
 
 __all__ = ["enlarged", "family_parameters"]
@@ -42,13 +42,13 @@ def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
             "or two of these joined at their vertex"
         )
     ((q, x_c),) = vertices
-    sides = ("left_", "right_") if len(halves) > 1 else ("",)
+    family = "/".join(names)
     own = {
         f"{side}{parameter}": float(getattr(half, parameter))
-        for side, half, name in zip(sides, halves, names, strict=True)
-        for parameter in FLANKS[name].table
+        for half, (side, flank) in zip(halves, sides_of(family).items(), strict=True)
+        for parameter in FLANKS[flank].table
     }
-    return "/".join(names), {**own, "q": q, "x_c": x_c}
+    return family, {**own, "q": q, "x_c": x_c}
 
 
 def enlarged(contour: Contour, factor: float) -> Contour:
