@@ -149,7 +149,8 @@ def _drawn(
     spec: Specification, uniform: list[np.random.Generator], turns: Mapping[str, Index], row: Index
 ) -> _Candidates:
     """The next draw of each of these records; one that is named more than once draws again."""
-    shares = np.array([_shares(uniform[i], 1 + len(spec.laws)) for i in row])
+    count = 1 + len(spec.laws)
+    shares = np.array([_shares(uniform[i], count) for i in row])
     if "contours" in turns:
         group = turns["contours"][row]
     else:
