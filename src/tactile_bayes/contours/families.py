@@ -11,8 +11,6 @@ import numpy as np
 
 from tactile_bayes.checks import shown
 from tactile_bayes.contours.base import Contour, Floats
-from tactile_bayes.contours.circle import Circle
-from tactile_bayes.contours.ellipse import Ellipse
 from tactile_bayes.contours.family import (
     VERTEX,
     Family,
@@ -22,6 +20,7 @@ from tactile_bayes.contours.family import (
     robust_least_squares,
 )
 from tactile_bayes.contours.joined import Joined
+from tactile_bayes.contours.oval import Circle, Ellipse
 from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, alike, finite, refuse_unless
+from tactile_bayes.contours.base import Floats, Locus, Parameter, Vertexed, alike, refuse_unless
 from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
 
 __all__ = ["PowerLaw"]
@@ -20,7 +20,7 @@ _STEEPEST = 1e300
 
 
 @dataclass(frozen=True, eq=False)
-class PowerLaw(Contour):
+class PowerLaw(Vertexed):
     """y = a |x − x_c|ⁿ + q.
 
     For n > 2 the curvature vanishes at the vertex, and only there. For n < 2 it grows beyond all bounds there: the
@@ -50,6 +50,8 @@ class PowerLaw(Contour):
     np.float64(0.0)
     """
 
+    sizes: ClassVar = {"a": "a must be positive, else the object is not strictly convex"}
+
     a: Parameter
     n: Parameter
     q: Parameter
@@ -57,12 +59,6 @@ class PowerLaw(Contour):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        refuse_unless(
-            np.greater(self.a, 0.0) & np.isfinite(self.a),
-            "PowerLaw",
-            "a must be positive, else the object is not strictly convex",
-            a=self.a,
-        )
         refuse_unless(
             np.greater_equal(self.n, _LEAST_EXPONENT),
             "PowerLaw",
@@ -75,7 +71,6 @@ class PowerLaw(Contour):
             f"n must be at most {_GREATEST_EXPONENT:g}: above, the bottom is as good as straight",
             n=self.n,
         )
-        refuse_unless(finite(self.q, self.x_c), "PowerLaw", "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
     @classmethod
     def of_width(cls, w: Parameter, n: Parameter, q: Parameter, x_c: Parameter = 0.0) -> Self:

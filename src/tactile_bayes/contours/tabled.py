@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from tactile_bayes.contours.base import Contour, Floats, Index
+from tactile_bayes.contours.base import Contour, Floats
 
 __all__ = ["Tabled"]
 
@@ -22,13 +22,7 @@ class Tabled(Contour):
     def shape(self) -> tuple[int, ...]:
         return np.shape(self.__dict__["_row"])
 
-    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
-        return self._each(lambda value: np.broadcast_to(value, (*shape, *value.shape[len(self.shape) :])))
-
-    def take(self, index: Index) -> Self:
-        return self._each(lambda value: value[index])
-
-    def _each(self, change: Callable[[Floats], Floats]) -> Self:
+    def _each(self, change: Callable[[Any], Floats]) -> Self:
         other = object.__new__(type(self))  # the tables stay one for all
         other.__dict__.update(self.__dict__)
         other.__dict__.update((name, change(self.__dict__[name])) for name in self._by_contour)

@@ -45,9 +45,10 @@ def card(spec: Specification, manifest: Manifest) -> str:
         share = "in turn" if spec.each_group else f"weight {group.weight:g}"
         lines.append(f"| **{name}** | {share if len(spec.groups) > 1 else 'always'} |")
         # Weights of a shape-free contour, of which there are many, have one row where they have one law.
-        for _, alike in groupby(group.laws, lambda p, laws=group.laws: laws[p].words if p.startswith("z_") else p):
-            first, *rest = alike
-            lines.append(f"| {name}: {f'{first} to {rest[-1]}' if rest else first} | {group.laws[first].words} |")
+        alike = groupby(group.laws.items(), lambda entry: entry[1].words if entry[0].startswith("z_") else entry[0])
+        for _, entries in alike:
+            (first, law), *others = entries
+            lines.append(f"| {name}: {f'{first} to {others[-1][0]}' if others else first} | {law.words} |")
     lines += [f"| rod: {name} | {law.words} |" for name, law in spec.rod.items()]
     for number, pair in enumerate(spec.bases, start=1):
         pivot = "pivot" if bases == 1 else f"pivot {number}"
