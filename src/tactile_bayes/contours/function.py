@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -120,7 +120,8 @@ def from_function(
     return contour
 
 
-class _Named(NamedTuple):
+@dataclass(frozen=True)
+class _Named:
     """A function with the name that refusals give it, of which all values must be finite."""
 
     function: Function
@@ -231,8 +232,8 @@ def _refuse_other_derivatives(contour: FunctionContour) -> None:
             at = float(np.round(found.right / width, 12) * width) + 0.0
             before, after = rate(np.array([found.left, found.right]))
             raise ContourError(
-                f"from_function: {rate.name} given jumps at x ≈ {at:.6g}, from {before:.3g} to {after:.3g}: the contour "
-                f"is not smooth there; join two functions there, Joined(left, right, x={at:.6g})"
+                f"from_function: {rate.name} given jumps at x ≈ {at:.6g}, from {before:.3g} to {after:.3g}: the "
+                f"contour is not smooth there; join two functions there, Joined(left, right, x={at:.6g})"
             )
         if found is not None:
             raise ContourError(
