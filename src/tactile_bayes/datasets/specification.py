@@ -49,13 +49,7 @@ _LARGEST_SEED = 2**63 - 1
 _AT_HAND = 2**14
 """Samples in a block: a column of them is 128 kB."""
 
-_SCAN = {
-    "bases": [[0.0, 0.0]],
-    "directions": ["forward", "backward"],
-    "samples": 180,
-    "margin": 0.1,
-    "friction": 0.0,
-}
+_SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1, "friction": 0.0}
 _DEFAULTS = {
     "name": UNNAMED,
     "description": "",
@@ -75,8 +69,6 @@ _TABLES: Mapping[str, Iterable[str]] = {
     "load_cell.": ("frame", *LOAD_CELL_UNITS),
 }
 """The keys of each table."""
-
-_PRECISIONS = ("double", "single")
 
 _REPLACED = {
     "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
@@ -300,7 +292,7 @@ def _specification(table: Mapping[str, Any], text: str) -> Specification:
     for key in ("name", "description"):
         check_kind(key, said[key], str, "give a text")
     scan, load_cell = _table(table, "scan"), {"frame": "fixed", **_table(table, "load_cell")}
-    frame = check_choice("load_cell.frame", load_cell.pop("frame"), FRAMES, "write 'fixed' or 'turning'")
+    frame = check_choice("load_cell.frame", load_cell.pop("frame"), FRAMES)
     found = Specification(
         text=text,
         name=said["name"],
@@ -317,7 +309,7 @@ def _specification(table: Mapping[str, Any], text: str) -> Specification:
         friction=_number((_SCAN | scan)["friction"], "scan.friction", 0.0, 0.84),
         load_cell=_load_cell(load_cell),
         frame=cast(Frame, frame),
-        single=check_choice("precision", said["precision"], _PRECISIONS, "write 'double' or 'single'") == "single",
+        single=check_choice("precision", said["precision"], ("double", "single")) == "single",
     )
     turns = found.combinations
     records = table.get("records", turns if found.lists else None)
@@ -458,8 +450,7 @@ def _drive(scan: Mapping[str, Any]) -> Drive:
     given = [name for name in names if name in scan]
     if not given:
         return Drive(samples, None, None, _number(scan.get("margin", _SCAN["margin"]), "scan.margin", 0.0, 1.0))
-    if len(given) == 1:
-        missing = names[1 - names.index(given[0])]
+    for missing in set(names) - set(given):
         raise SpecificationError(
             f"scan.{missing} is missing: give it beside {given[0]}, or neither, and sweeps go from contact to snap-off"
         )
