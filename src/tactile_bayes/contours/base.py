@@ -233,10 +233,7 @@ class Single(Contour):
     def shape(self) -> tuple[int, ...]:
         return ()
 
-    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
-        return self
-
-    def take(self, index: Index) -> Self:
+    def _each(self, change: Callable[[Any], Floats]) -> Self:
         return self
 
 

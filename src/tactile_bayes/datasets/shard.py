@@ -170,33 +170,26 @@ def _unit(spec: Specification, name: str, entries: list[FamilyParameter]) -> str
 
 
 def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    dims = ("record", "sweep")
     backward = np.array([direction == "backward" for _, direction in spec.sweeps], dtype=np.int8)
-    found: dict[str, Any] = {
-        "direction": ("sweep", backward, _flags("sense of the drive", ("forward", "backward"), np.int8))
-    }
+    attrs = _flags("sense of the drive", ("forward", "backward"), np.int8)
+    found: dict[str, Any] = {"direction": ("sweep", backward, attrs)}
     for name, values in sweep.items():
+        key = name if name in COLUMNS else f"truth_{name}"
         if name == "phases":
-            codes = np.array([[PHASE_SEQUENCES.index(word) for word in row] for row in values], dtype=np.int8)
-            long_name = "phases of the contact in their order: A tip, B tangential"
-            found["truth_phases"] = (dims, codes, _flags(long_name, PHASE_SEQUENCES, np.int8))
+            values = np.array([[PHASE_SEQUENCES.index(word) for word in row] for row in values], dtype=np.int8)
+            attrs = _flags("phases of the contact in their order: A tip, B tangential", PHASE_SEQUENCES, np.int8)
         elif name == "snap_off_kind":
-            kinds = [kind.name.lower() for kind in SnapOff]
-            found["truth_snap_off_kind"] = (
-                dims,
-                values.astype(np.int8),
-                _flags("kind of the snap-off", kinds, np.int8),
-            )
+            values = values.astype(np.int8)
+            attrs = _flags("kind of the snap-off", [kind.name.lower() for kind in SnapOff], np.int8)
         elif name == "largest_strain":
-            long_name = "largest bending strain of the rod up to snap-off"
-            found["truth_largest_strain"] = (dims, values, {"units": "1", "long_name": long_name})
+            attrs = {"units": "1", "long_name": "largest bending strain of the rod up to snap-off"}
         elif name in COLUMNS:
-            found[name] = (dims, values, _described(spec, name))
+            attrs = _described(spec, name)
         else:
             event = "first_contact" if name.startswith("first_contact") else "snap_off"
             attrs = _described(spec, name.removeprefix(f"{event}_"))
             attrs["long_name"] += f" at {event.replace('_', ' ').replace('snap off', 'snap-off')}"
-            found[f"truth_{name}"] = (dims, values, attrs)
+        found[key] = (("record", "sweep"), values, attrs)
     return found
 
 

@@ -131,7 +131,8 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
         elif variable.dims == () and name.startswith(("truth_contour_", "load_cell_")) and np.isfinite(variable.values):
             attrs[name] = float(variable)
     if spec.single:
-        _restore_limits(columns, LoadCell.from_entries(_entries(attrs)))
+        entries = {n.removeprefix("load_cell_"): v for n, v in attrs.items() if n.startswith("load_cell_")}
+        _restore_limits(columns, LoadCell.from_entries(entries))
     if spec.friction:
         attrs["truth_friction"] = spec.friction
     if not truth:
@@ -142,12 +143,6 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
     order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
     known = {name: columns[name] for name in order if column_of(name) is not None}
     return make_record(known, rod=rod, attrs=attrs, load_cell_frame=spec.frame)
-
-
-def _entries(attrs: Mapping[str, Any]) -> dict[str, float]:
-    """The data sheet in a record's attributes."""
-    prefix = "load_cell_"
-    return {name.removeprefix(prefix): value for name, value in attrs.items() if name.startswith(prefix)}
 
 
 def _restore_limits(columns: dict[str, Any], cell: LoadCell) -> None:

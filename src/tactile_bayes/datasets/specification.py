@@ -185,13 +185,13 @@ class Specification:
     @property
     def laws(self) -> tuple[tuple[str, Law], ...]:
         """Every law with its key, in the order in which numbers are drawn."""
-        found = [
-            (f"contours[{g}].{name}", law) for g, group in enumerate(self.groups) for name, law in group.laws.items()
-        ]
-        found += [(f"rod.{name}", law) for name, law in self.rod.items()]
-        for b, pair in enumerate(self.bases):
-            found += [(f"scan.bases[{b}][{axis}]", law) for axis, law in enumerate(pair)]
-        return (*found, *((f"load_cell.{name}", law) for name, law in self.load_cell.items()))
+        tables = {
+            **{f"contours[{g}].": group.laws for g, group in enumerate(self.groups)},
+            "rod.": self.rod,
+            **{f"scan.bases[{b}]": {"[0]": x, "[1]": y} for b, (x, y) in enumerate(self.bases)},
+            "load_cell.": self.load_cell,
+        }
+        return tuple((prefix + name, law) for prefix, laws in tables.items() for name, law in laws.items())
 
     @property
     def combinations(self) -> int:
