@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tactile_bayes.cli import app
-from tactile_bayes.contours import Circle, Parabola, PowerLaw, paper_profile
+from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, RecordError
 from tactile_bayes.record import present_channels, read_record, write_record
 from tactile_bayes.rod import Rod
@@ -199,6 +199,17 @@ def test_true_is_no_number_of_a_rod(build, message):
 def test_a_contour_out_of_reach_says_how_far_and_how_long(contour, base, rod, message):
     with pytest.raises(ReachError, match=re.escape(message)):
         scan(contour, base=base, rod=rod)
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+def test_a_contour_that_is_hardly_touched_is_refused(direction):
+    with pytest.raises(ReachError, match="rounding hides where contact ends"):
+        scan(Ellipse(0.25, 8e5, 1.0 - 2e-11), direction=direction, friction=0.3)
+
+
+def test_a_contour_at_the_end_of_reach_but_for_rounding_is_out_of_it():
+    with pytest.raises(ReachError, match="out of reach"):
+        scan(Parabola(2.0, np.nextafter(1.0, 0.0)))
 
 
 @pytest.mark.parametrize(

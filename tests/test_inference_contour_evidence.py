@@ -10,7 +10,7 @@ from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, contour_evidence
-from tactile_bayes.inference.contour_problem import contour_problem
+from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 
 NARROW = {
@@ -24,9 +24,7 @@ SETTINGS = SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.03)
 def problem_of(family, truth, noise=1.0):
     measured = CELL.measure(swept(TRUTHS[truth], step=0.15), seed=4)
     priors = NARROW[family] | {"noise_scale": stats.lognorm(s=0.1, scale=noise)}
-    return contour_problem(
-        measured, family=family, load_cell=CELL, priors=priors, rod=None, friction=0.0, nuisances=(), events=True
-    )
+    return contour_problem(measured, Assumptions(family, CELL, priors, friction=0.0, nuisances=()))
 
 
 @pytest.mark.slow

@@ -21,15 +21,6 @@ from tactile_bayes.sweeps import ManyUnits, phases_of, sweep_events, sweep_sampl
 
 __all__ = ["scan_many"]
 
-_FATES = {
-    Reach.TOUCHES: "ok",
-    Reach.TOO_FAR: "out of reach",
-    Reach.CUTS_PIVOT: "cuts the pivot",
-    Reach.ENDS: "first touched beyond its end",
-    Reach.TOO_CLOSE: "too close to the pivot",
-    Reach.RUNS_OUT: "still touched at its other end",
-}
-
 
 def scan_many(
     contours: Contour,
@@ -127,7 +118,7 @@ def scan_many(
     variables: dict[str, Any] = {"drive_angle": labelled(both, angles, "drive_angle")}
     variables |= {name: labelled(both, values, name) for name, values in samples.items()}
     variables["contact_phase"] = labelled(both, phase, "contact_phase")
-    fates = np.array([_FATES[Reach(fate)] for fate in range(len(_FATES))])
+    fates = np.array([fate.words for fate in Reach])
     variables["status"] = ("contour", fates[paths.reach])
     with np.errstate(invalid="ignore"):
         variables["clear"] = ("contour", paths.is_clear())

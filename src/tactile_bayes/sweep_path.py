@@ -70,6 +70,11 @@ def sweep_paths(
                 f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
                 "nothing is known of the object beyond: extend the contour, or move the pivot"
             )
+        case Reach.GRAZES:
+            raise ReachError(
+                f"{sweep} the rod touches the contour so slightly that rounding hides where contact ends: bring "
+                "contour and pivot closer together (are contour, pivot and rod in one unit?)"
+            )
     return paths
 
 

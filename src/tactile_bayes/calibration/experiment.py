@@ -18,7 +18,13 @@ from tactile_bayes.calibration.world import NUMBERS, World
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_priors, contour_problem, prior_in_words
+from tactile_bayes.inference.contour_problem import (
+    Assumptions,
+    ContourProblem,
+    contour_priors,
+    contour_problem,
+    prior_in_words,
+)
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior, refuse_no_prior
 from tactile_bayes.inference.likelihood import bases_of
@@ -116,16 +122,8 @@ class Experiment:
 
     def problem_of(self, measured: xr.Dataset) -> ContourProblem:
         """What is inferred from a record."""
-        return contour_problem(
-            measured,
-            family=self.family,
-            load_cell=self.load_cell,
-            priors=self.priors,
-            rod=None,
-            friction=self.friction,
-            nuisances=self.nuisances,
-            events=self.events,
-        )
+        given = self.family, self.load_cell, self.priors
+        return contour_problem(measured, Assumptions(*given, None, self.friction, self.nuisances, self.events))
 
     @property
     def words(self) -> dict[str, str]:

@@ -39,7 +39,7 @@ _APART = 2**20
 """Random numbers from where one draw of a record begins to where the next does: far more than there are laws, so that a
 contour is the same whatever is drawn after it."""
 
-_GOOD = ""
+_GOOD = Reach.TOUCHES.words
 
 
 @dataclass(frozen=True)
@@ -70,22 +70,18 @@ class Records:
         return int(np.count_nonzero(~np.any(self.sample["truth_contact_phase"], axis=2)))
 
 
-_CLOSER = "bring contours and pivots closer to one another (are contours, bases and rod in one unit?)"
+_NOT_CLEAR = "not clear after snap-off"
+_NO_CONTOUR = "no contour"
+
 _HIGHER = "raise the contours above the pivots, by a larger q or lower bases"
 _WIDER = "give wider contours, or bring the pivots nearer to them, or to their middle"
-_FATES = {
-    Reach.TOUCHES: (_GOOD, ""),
-    Reach.TOO_FAR: ("out of reach", _CLOSER),
-    Reach.CUTS_PIVOT: ("cuts the pivot", _HIGHER),
-    Reach.ENDS: ("first touched beyond its end", _WIDER),
-    Reach.TOO_CLOSE: ("too close to the pivot", _HIGHER),
-    Reach.RUNS_OUT: ("still touched at its other end", _WIDER),
-}
-"""Why a draw comes to nothing, and what to do if all do."""
-
-_NOT_CLEAR, _NO_CONTOUR = "not clear after snap-off", "no contour"
 _REMEDIES = {
-    **dict(list(_FATES.values())[1:]),
+    "out of reach": "bring contours and pivots closer to one another (are contours, bases and rod in one unit?)",
+    "cuts the pivot": _HIGHER,
+    "first touched beyond its end": _WIDER,
+    "too close to the pivot": _HIGHER,
+    "still touched at its other end": _WIDER,
+    "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the straight rod would still cut the object",
     _NO_CONTOUR: "change the law of that parameter",
 }
@@ -288,7 +284,7 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
         clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
-    reasons = np.array([_FATES[Reach(reach)][0] for reach in range(len(_FATES))], dtype=object)[fate]
+    reasons = np.array([reach.words for reach in Reach], dtype=object)[fate]
     return np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
 
 

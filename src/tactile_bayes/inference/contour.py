@@ -16,7 +16,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
-from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
+from tactile_bayes.inference.contour_problem import Assumptions, ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
@@ -175,16 +175,7 @@ def infer_contour(
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")
     check_function("progress", progress)
     seed_sequence(seed)
-    problem = contour_problem(
-        measured,
-        family=family,
-        load_cell=load_cell,
-        priors=priors,
-        rod=rod,
-        friction=friction,
-        nuisances=nuisances,
-        events=events,
-    )
+    problem = contour_problem(measured, Assumptions(family, load_cell, priors, rod, friction, nuisances, events))
     return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree
 
 

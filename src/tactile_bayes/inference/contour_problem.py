@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from itertools import product
 from typing import Any, NamedTuple
@@ -37,7 +37,7 @@ from tactile_bayes.reconstruction import (
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod
 
-__all__ = ["ContourProblem", "contour_priors", "contour_problem", "default_priors", "prior_in_words"]
+__all__ = ["Assumptions", "ContourProblem", "contour_priors", "contour_problem", "default_priors", "prior_in_words"]
 
 
 _MOST_DOUBTFUL = 2
@@ -45,6 +45,19 @@ _MOST_DOUBTFUL = 2
 
 _BELIEVED = float(np.log(10.0))
 """Logarithm of how much likelier a direction is to say the side than not, where the record leaves doubt."""
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """What is taken for known about a contour and the rig that met it, and what is not: see `infer_contour`."""
+
+    family: str
+    load_cell: LoadCell | None = None
+    priors: Mapping[str, Prior] | None = None
+    rod: Rod | None = None
+    friction: float | None = None
+    nuisances: Sequence[str] = STANDARD
+    events: bool = True
 
 
 class ContourProblem(NamedTuple):
@@ -76,32 +89,9 @@ class ContourProblem(NamedTuple):
         return ContourModel(measured, model.family, rig, model.noise, model.priors)
 
 
-def contour_problem(
-    measured: xr.Dataset,
-    *,
-    family: str,
-    load_cell: LoadCell | None,
-    priors: Mapping[str, Prior] | None,
-    rod: Rod | None,
-    friction: float | None,
-    nuisances: Sequence[str],
-    events: bool,
-) -> ContourProblem:
-    """What `infer_contour` is asked for, as it says; with the problems of other sides of contact beside it."""
-
-    def of_sides(record: xr.Dataset) -> ContourProblem:
-        return _contour_problem(
-            record,
-            family=family,
-            load_cell=load_cell,
-            priors=priors,
-            rod=rod,
-            friction=friction,
-            nuisances=nuisances,
-            events=events,
-        )
-
-    problem = of_sides(measured)
+def contour_problem(measured: xr.Dataset, assumed: Assumptions) -> ContourProblem:
+    """What is to be inferred from a record, with the problems of other sides of contact beside it."""
+    problem = _of_sides(measured, assumed)
     cell = problem.model.noise.cell
     doubtful = doubtful_sweeps(without_errors(problem.model.measured, cell), cell)[:_MOST_DOUBTFUL]
     if not doubtful:
@@ -114,36 +104,30 @@ def contour_problem(
             sweep: OTHER_SIDE[stated[sweep]] if turn else stated[sweep]
             for sweep, turn in zip(doubtful, turned, strict=True)
         }
-        every.append(of_sides(with_sides(measured, sides))._replace(log_prior_odds=-_BELIEVED * sum(turned)))
+        odds = -_BELIEVED * sum(turned)
+        every.append(_of_sides(with_sides(measured, sides), assumed)._replace(log_prior_odds=odds))
     return every[0]._replace(others=tuple(every[1:]))
 
 
-def _contour_problem(
-    measured: xr.Dataset,
-    *,
-    family: str,
-    load_cell: LoadCell | None,
-    priors: Mapping[str, Prior] | None,
-    rod: Rod | None,
-    friction: float | None,
-    nuisances: Sequence[str],
-    events: bool,
-) -> ContourProblem:
-    measured = with_rod(validate(measured), rod)
-    check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
-    check_switch("events", events)
-    check_mapping("priors", priors, "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}")
-    chosen = family_named(family)
-    noise = noise_of(measured, load_cell)
-    rig = nuisances_of(measured, nuisances, priors or {}, noise.cell, friction)
-    chosen_priors = {**contour_priors(measured, chosen), **rig.priors, **noise.priors}
-    for name, prior in (priors or {}).items():
-        if name not in chosen_priors:
+def _of_sides(measured: xr.Dataset, assumed: Assumptions) -> ContourProblem:
+    """The problem of a record whose sides of contact are those that it states."""
+    measured = with_rod(validate(measured), assumed.rod)
+    given = assumed.priors or {}
+    check_optional("load_cell", assumed.load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
+    check_switch("events", assumed.events)
+    check_mapping("priors", assumed.priors, "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}")
+    chosen = family_named(assumed.family)
+    noise = noise_of(measured, assumed.load_cell)
+    rig = nuisances_of(measured, assumed.nuisances, given, noise.cell, assumed.friction)
+    priors = {**contour_priors(measured, chosen), **rig.priors, **noise.priors}
+    for name, prior in given.items():
+        if name not in priors:
             raise ParameterError(
-                f"there is no parameter {name!r} to give a prior: there are {', '.join(chosen_priors)}, and of what is "
+                f"there is no parameter {name!r} to give a prior: there are {', '.join(priors)}, and of what is "
                 "not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
             )
         refuse_no_prior(name, prior)
+    priors.update(given)
     data_sha256 = record_hash(measured)
     loaded = loaded_samples(measured, noise.stated_cell)
     if not loaded.any():
@@ -151,18 +135,17 @@ def _contour_problem(
             "no sample carries a load that noise does not explain: was anything touched, and is the load cell's noise "
             "in the record's units?"
         )
-    if not events:
+    if not assumed.events:
         measured = measured.isel(sample=np.flatnonzero(loaded))
         rig = replace(rig, way=rig.way[loaded])
         loaded = loaded[loaded]
-    chosen_priors.update(priors or {})
     about = {
         "data_sha256": data_sha256,
-        "family": family,
+        "family": assumed.family,
         "friction": rig.friction,
         "nuisances": json.dumps(rig.names),
-        "events": int(events),
-        "priors": json.dumps({name: prior_in_words(prior) for name, prior in chosen_priors.items()}),
+        "events": int(assumed.events),
+        "priors": json.dumps({name: prior_in_words(prior) for name, prior in priors.items()}),
         "units": measured.attrs["units"],
         "load_cell_frame": frame_of(measured),
         **{name: measured.attrs[name] for name in (CONTACT_SIDES,) if name in measured.attrs},
@@ -170,7 +153,7 @@ def _contour_problem(
         "approximations": "; ".join(noise.cell.approximations),
         **{f"load_cell_{name}": value for name, value in noise.cell.entries().items() if name not in noise.inferred},
     }
-    return ContourProblem(ContourModel(measured, chosen, rig, noise, chosen_priors), about, loaded)
+    return ContourProblem(ContourModel(measured, chosen, rig, noise, priors), about, loaded)
 
 
 def default_priors(

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.outline import Outline, Place, frame, place
+from tactile_bayes.mechanics.outline import Place, frame, place
 from tactile_bayes.mechanics.series import Nodes, change_of, crossing, nodes_of, tail, value, value_and_slope, weighted
-from tactile_bayes.mechanics.states import State, exact_state, tabled_state
+from tactile_bayes.mechanics.states import Rig, Scene, State, exact_state, tabled_state
 from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
-from tactile_bayes.mechanics.tables import Room, Tables
 
 __all__ = [
     "ANGLE",
@@ -29,8 +28,6 @@ __all__ = [
     "WAY",
     "Course",
     "Curves",
-    "Rig",
-    "Scene",
     "angle_rate",
     "curves_of",
     "exact_at",
@@ -65,30 +62,6 @@ LOST = -1.0
 
 _LAST = 1e-13
 """Newton step, as a share of a stretch, below which there is only rounding of its interpolants."""
-
-
-class Rig(NamedTuple):
-    """What loads depend on beside rod and contour."""
-
-    friction_angle: float
-    """δ = arctan μ [rad]."""
-    compliance: float
-    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
-    offset: float
-    """What the encoder reads too much, as seen in forward sweeps [rad]."""
-    sign: float
-    """−1 in backward sweeps."""
-    rigidity: float
-    """Factor on loads: flexural rigidity over that of their unit."""
-
-
-class Scene(NamedTuple):
-    """One contour as one rod sees it from one pivot, and what is known of rods: all that a state depends on."""
-
-    outline: Outline
-    rig: Rig
-    known: Tables
-    states: Room
 
 
 class Curves(NamedTuple):
@@ -134,26 +107,26 @@ def curves_of(order: int) -> Curves:
 def exact_at(scene: Scene, stretch: Stretch, way: float) -> tuple[State, float]:
     """The exact state at a way along a stretch, and the drive angle's derivative by the way, of a stiff suspension."""
     at = place(scene.outline, along(stretch, way))
-    state = exact_state(at, scene.rig.friction_angle, stretch.tip, 0.0, scene.known, scene.states)
+    state = exact_state(scene, at, stretch.tip, 0.0)
     return state, angle_rate(at, state) * along_rate(stretch, way)
 
 
 @compiled
-def sample(scene: Scene, stretch: Stretch, exact: bool, curves: Curves) -> None:
+def sample(scene: Scene, stretch: Stretch, curves: Curves) -> None:
     """Series along the way of loads and drive angle."""
-    values, on, rig = curves.values, curves.on, scene.rig
+    values, on, exact = curves.values, curves.on, scene.exact
     for k in range(on.nodes.size):
         at = place(scene.outline, along(stretch, on.nodes[k]))
         if exact:
-            state = exact_state(at, rig.friction_angle, stretch.tip, MISS, scene.known, scene.states)
+            state = exact_state(scene, at, stretch.tip, MISS)
             values[0, k], values[1, k] = state.holding_moment, state.force_x
             values[2, k], values[ANGLE, k] = state.force_y, state.drive_angle
             values[REST, k] = state.tip_angle if stretch.tip else state.arclength
         else:
-            quick = tabled_state(at, rig.friction_angle, stretch.tip, scene.known, scene.states)
+            quick = tabled_state(scene, at, stretch.tip)
             values[0, k], values[1, k] = quick.holding_moment, quick.force_x
             values[2, k], values[ANGLE, k] = quick.force_y, quick.drive_angle
-        values[ANGLE, k] += rig.compliance * values[0, k]
+        values[ANGLE, k] += scene.rig.compliance * values[0, k]
     for c in range(5):
         if exact or c != REST:
             weighted(on.fit, values[c], curves.series[c])

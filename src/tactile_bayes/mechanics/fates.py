@@ -25,6 +25,24 @@ class Reach(IntEnum):
     """The pivot is nearer to the contour than `CLEARANCE`."""
     RUNS_OUT = 5
     """The rod would still touch at the other end of the contour."""
+    GRAZES = 6
+    """Contact is so slight that rounding hides how it ends."""
+
+    @property
+    def words(self) -> str:
+        """Why there is no path, in a few words."""
+        return _WORDS[self]
+
+
+_WORDS = {
+    Reach.TOUCHES: "ok",
+    Reach.TOO_FAR: "out of reach",
+    Reach.CUTS_PIVOT: "cuts the pivot",
+    Reach.ENDS: "first touched beyond its end",
+    Reach.TOO_CLOSE: "too close to the pivot",
+    Reach.RUNS_OUT: "still touched at its other end",
+    Reach.GRAZES: "hardly touched",
+}
 
 
 class SnapOff(IntEnum):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["Outline", "Place", "bearing", "ends", "frame", "mirrored", "place"]
+__all__ = ["Half", "Outline", "Place", "bearing", "ends", "frame", "mirrored", "place"]
 
 Floats = NDArray[np.float64]
 
@@ -24,18 +24,21 @@ _FAR = 1e3
 """Rod lengths beyond which an end is as good as none."""
 
 
+class Half(NamedTuple):
+    """One side of the vertex."""
+
+    kind: int
+    size: float
+    shape: float
+    unit: float
+    """What the contour's own parameter is one of in rod lengths, for a power law; 1 for others."""
+
+
 class Outline(NamedTuple):
     """One contour as one rod sees it."""
 
-    left_kind: int
-    left_size: float
-    left_shape: float
-    left_unit: float
-    """What the contour's own parameter is one of in rod lengths, for a power law; 1 for others."""
-    right_kind: int
-    right_size: float
-    right_shape: float
-    right_unit: float
+    left: Half
+    right: Half
     low: float
     high: float
     """Least and greatest parameter where there is a table, else of no meaning."""
@@ -66,32 +69,14 @@ class Place(NamedTuple):
 @compiled
 def mirrored(outline: Outline) -> Outline:
     """As the opposite sweep sees it."""
-    return Outline(
-        outline.right_kind,
-        outline.right_size,
-        outline.right_shape,
-        outline.right_unit,
-        outline.left_kind,
-        outline.left_size,
-        outline.left_shape,
-        outline.left_unit,
-        -outline.high,
-        -outline.low,
-        -outline.sign,
-        -outline.x,
-        outline.y,
-        outline.standoff,
-        outline.table,
-    )
+    left, right, low, high, sign, x, y, standoff, table = outline
+    return Outline(right, left, -high, -low, -sign, -x, y, standoff, table)
 
 
 @compiled
 def place(outline: Outline, p: float) -> Place:
     """The point at a parameter."""
-    if p < 0.0:
-        kind, size, shape, unit = outline.left_kind, outline.left_size, outline.left_shape, outline.left_unit
-    else:
-        kind, size, shape, unit = outline.right_kind, outline.right_size, outline.right_shape, outline.right_unit
+    kind, size, shape, unit = outline.left if p < 0.0 else outline.right
     if kind == PARABOLA:
         t = math.tan(p)
         square = 1.0 + t * t
@@ -210,13 +195,13 @@ def ends(outline: Outline) -> tuple[float, float]:
 
 @compiled
 def _end(outline: Outline, outward: float) -> float:
-    kind = outline.left_kind if outward < 0.0 else outline.right_kind
-    if kind == PARABOLA:
+    half = outline.left if outward < 0.0 else outline.right
+    if half.kind == PARABOLA:
         end = outward * np.nextafter(_UPRIGHT, 0.0)
-    elif kind == OVAL:
+    elif half.kind == OVAL:
         end = outward * _UPRIGHT
-    elif kind == POWER_LAW:
-        end = outward * (outline.left_unit if outward < 0.0 else outline.right_unit)
+    elif half.kind == POWER_LAW:
+        end = outward * half.unit
         while not outward * place(outline, end).x > 1.0:
             end *= 2.0
     else:
@@ -229,12 +214,9 @@ def _end(outline: Outline, outward: float) -> float:
 @compiled
 def _parameter_of_x(outline: Outline, x: float) -> float:
     offset = x - outline.x
-    if offset < 0.0:
-        kind, size, shape, unit = outline.left_kind, outline.left_size, outline.left_shape, outline.left_unit
-    else:
-        kind, size, shape, unit = outline.right_kind, outline.right_size, outline.right_shape, outline.right_unit
-    if kind == PARABOLA:
-        return math.atan(2.0 * size * offset)
-    if kind == OVAL:
-        return math.asin(offset / size)
-    return math.copysign(unit * abs(offset) ** (1.0 / max(1.0, 1.0 / (shape - 1.0))), offset)
+    half = outline.left if offset < 0.0 else outline.right
+    if half.kind == PARABOLA:
+        return math.atan(2.0 * half.size * offset)
+    if half.kind == OVAL:
+        return math.asin(offset / half.size)
+    return math.copysign(half.unit * abs(offset) ** (1.0 / max(1.0, 1.0 / (half.shape - 1.0))), offset)

@@ -27,7 +27,6 @@ from tactile_bayes.mechanics.curves import (
     LOST,
     Course,
     Curves,
-    Scene,
     curves_of,
     exact_at,
     first_fall,
@@ -42,6 +41,7 @@ from tactile_bayes.mechanics.outline import bearing
 from tactile_bayes.mechanics.reach import limits
 from tactile_bayes.mechanics.readings import (
     Asked,
+    Followed,
     Found,
     Samples,
     asked,
@@ -51,8 +51,8 @@ from tactile_bayes.mechanics.readings import (
     write_states,
 )
 from tactile_bayes.mechanics.series import tail, value
+from tactile_bayes.mechanics.states import Scene
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
-from tactile_bayes.mechanics.tables import MOST_FRICTION
 
 __all__ = ["MOST_CHANGES", "Ends", "Work", "follow", "work"]
 
@@ -80,7 +80,7 @@ _IN_A_DIP = 1e-5
 _NO_MOMENT = 1e-12
 """Holding moment [EI/L] that is none."""
 
-_TOUCHES, _RUNS_OUT = int(Reach.TOUCHES), int(Reach.RUNS_OUT)
+_TOUCHES, _RUNS_OUT, _GRAZES = int(Reach.TOUCHES), int(Reach.RUNS_OUT), int(Reach.GRAZES)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 
 
@@ -162,11 +162,11 @@ def _follow_stretch(
     if stop == 0.0:
         return _End(_CORNER, stretch.begin, Course(0.0, at_begin, at_begin, 0.0), 0.0)
     folds, stop = stop <= 1.0, min(stop, 1.0)
-    if folds and accuracy.exact and scene.rig.compliance == 0.0:
+    if folds and scene.exact and scene.rig.compliance == 0.0:
         stop = polished_fold(scene, stretch, stop, curves)
     parameter = along(stretch, stop)
     at_end, moment = value(curves.series[ANGLE], stop), 1.0
-    if accuracy.exact:
+    if scene.exact:
         state, _ = exact_at(scene, stretch, stop)
         driven, moment = state.drive_angle + scene.rig.compliance * state.holding_moment, state.holding_moment
         if math.isfinite(driven):
@@ -197,21 +197,19 @@ def follow(
     Parameters
     ----------
     scene : Scene
-        With the room for states prepared for its friction angle.
     knots : ndarray, shape (k,)
         Where the contour may not be smooth, decreasing.
     tolerance : ndarray, shape (3,)
         By how much loads may miss, of moment and forces [EI/L and EI/L²].
     """
-    outline, delta = scene.outline, scene.rig.friction_angle
-    limit = limits(outline, delta, accuracy.first_step)
+    outline = scene.outline
+    limit = limits(outline, scene.rig.friction_angle, accuracy.first_step)
     if limit.reach != _TOUCHES:
         return _nothing(limit.reach, limit.distance)
     pieces, waiting = room.pieces, room.waiting
     whole, full = limit.begin - limit.end, room.full
-    exact = accuracy.exact or delta > MOST_FRICTION
     miss = _FELT * min(tolerance[0], tolerance[1], tolerance[2])
-    count = cut(outline, limit, knots, delta, accuracy, exact, miss, full.on, scene.states, full.values, pieces)
+    count = cut(scene, limit, knots, accuracy, miss, full.on, full.values, pieces)
     most = count + _MOST_MORE
     for k in range(count):  # the first one is to be the last, where a stack ends
         row = waiting[count - 1 - k]
@@ -224,9 +222,9 @@ def follow(
     wants_states = found.changes.shape[0] > 0
     while count:
         row = waiting[count - 1]
-        stretch = Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
+        stretch = _stretch(row)
         curves = room.brief if stretch.brief else room.full
-        sample(scene, stretch, exact, curves)
+        sample(scene, stretch, curves)
         # What is shorter may be lost in rounding.
         halved = stretch.halvings < accuracy.halvings and stretches < most
         halved &= stretch.begin - stretch.end > BRIEF * whole
@@ -278,25 +276,33 @@ def follow(
         if limit.runs_out:
             return _nothing(_RUNS_OUT, limit.distance)
         fate = _THRUST
+    if not at_begin > first:
+        return _nothing(_GRAZES, limit.distance)
     if samples.relative:
         for j in range(samples.angles.size):
             room.asked.angles[j] = first + samples.angles[j] * (at_begin - first) + scene.rig.offset
         samples = Samples(room.asked.angles[: samples.angles.size], samples.rows, False)
     for k in range(done):
         row = room.followed[k]
-        stretch = Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
+        stretch = _stretch(row)
         curves = room.brief if stretch.brief else room.full
         _copy(room.curves[k], curves.series)
         _copy(room.curves[k, 6:], curves.values)
         course = Course(row[6], row[7], row[8], row[9])
-        there = find_samples(samples, scene.rig.offset, course, room.asked)
+        part = Followed(scene, stretch, accuracy, course, curves, room.asked)
+        there = find_samples(samples, part)
         if not wants_states:
-            write_loads(there, scene.rig, accuracy, course, curves, room.asked, found.loads)
+            write_loads(there, part, found.loads)
         elif accuracy.polished:
-            polish_states(there, scene, stretch, accuracy, course, curves, room.asked, found)
+            polish_states(there, part, found)
         else:
-            write_states(there, scene, stretch, accuracy, course, curves, room.asked, found)
+            write_states(there, part, found)
     return Ends(_TOUCHES, limit.distance, first, limit.begin, at_begin, snap_parameter, fate, changes, largest)
+
+
+@compiled
+def _stretch(row: Floats) -> Stretch:
+    return Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
 
 
 @compiled

@@ -28,6 +28,9 @@ _TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reach.TOUCHES), int(Reach.TOO_FAR), int(Re
 _ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reach.ENDS), int(Reach.TOO_CLOSE), int(Reach.RUNS_OUT)
 _CLEARANCE = CLEARANCE
 
+_ROUNDING = 1e-14
+"""Distance from the end of the rod's reach that is none."""
+
 
 class Limits(NamedTuple):
     """How far the path of an outline can run; parameters are the contour's own."""
@@ -143,7 +146,7 @@ def limits(outline: Outline, delta: float, last_step: float) -> Limits:
         reach = _RUNS_OUT if beyond_low and not beyond_high else _CUTS_PIVOT
     elif distance < _CLEARANCE:
         reach = _TOO_CLOSE
-    elif distance >= 1.0:
+    elif distance >= 1.0 - _ROUNDING:
         reach = _TOO_FAR
     elif beyond_high or open_end:
         reach = _ENDS

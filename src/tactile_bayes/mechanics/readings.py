@@ -9,28 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.curves import (
-    ANGLE,
-    MISS,
-    REST,
-    WAY,
-    Course,
-    Curves,
-    Rig,
-    Scene,
-    angle_rate,
-    lay_over_angle,
-    left_of,
-)
+from tactile_bayes.mechanics.curves import ANGLE, MISS, REST, WAY, Course, Curves, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import Place, place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
-from tactile_bayes.mechanics.states import exact_state
+from tactile_bayes.mechanics.states import Rig, Scene, exact_state
 from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
 
 __all__ = [
     "STATE_COLUMNS",
     "Asked",
+    "Followed",
     "Found",
     "Samples",
     "asked",
@@ -93,6 +82,17 @@ class Asked(NamedTuple):
     """Values of up to four series, shape (4, samples)."""
 
 
+class Followed(NamedTuple):
+    """A stretch that has been followed, with what its samples are found by."""
+
+    scene: Scene
+    stretch: Stretch
+    accuracy: Accuracy
+    course: Course
+    curves: Curves
+    room: Asked
+
+
 def asked(samples: int) -> Asked:
     """Room for so many at most."""
     angles, wanted, twice, now, before = np.empty((5, samples))
@@ -100,8 +100,9 @@ def asked(samples: int) -> Asked:
 
 
 @compiled
-def find_samples(samples: Samples, offset: float, course: Course, room: Asked) -> Samples:
+def find_samples(samples: Samples, part: Followed) -> Samples:
     """Those on a stretch; their drive angles go into the room."""
+    course, room, offset = part.course, part.room, part.scene.rig.offset
     first, last = _before(samples.angles, course.begin + offset), _before(samples.angles, course.end + offset)
     while last < samples.angles.size and samples.angles[last] - offset <= course.end:
         last += 1
@@ -125,11 +126,12 @@ def _before(angles: Floats, angle: float) -> int:
 
 
 @compiled
-def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, room: Asked) -> None:
+def _look_for(part: Followed, count: int) -> None:
     """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by Newton's method from between
     the nodes of the series, all side by side, or each by itself where that does not come near."""
+    course, curves, room = part.course, part.curves, part.room
     wanted, twice, found, stop = room.wanted, room.twice, room.found, course.stop
-    nodes, angles = curves.on.nodes, curves.values[ANGLE]
+    nodes, angles, angle, rate = curves.on.nodes, curves.values[ANGLE], curves.series[ANGLE], curves.series[ANGLE + 1]
     k, before, after, way_before, way_after = 0, -2.0, -2.0, 0.0, 0.0
     for j in range(count):
         while twice[j] > after and after < 2.0:
@@ -155,25 +157,15 @@ def _look_for(accuracy: Accuracy, course: Course, count: int, curves: Curves, ro
     for j in range(count):
         if abs(found[2, j]) > _NEAR * stop:
             way = 0.25 * (twice[j] + 2.0)
-            way = crossing(
-                curves.series[ANGLE], curves.series[ANGLE + 1], wanted[j], stop, 0.0, way, accuracy.last_step
-            )
+            way = crossing(angle, rate, wanted[j], stop, 0.0, way, part.accuracy.last_step)
             twice[j] = 4.0 * way - 2.0
 
 
 @compiled
-def write_loads(
-    samples: Samples,
-    rig: Rig,
-    accuracy: Accuracy,
-    course: Course,
-    curves: Curves,
-    room: Asked,
-    out: Floats,
-) -> None:
+def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
     """Loads of the samples on a stretch, from the series."""
-    count = samples.rows.size
-    _look_for(accuracy, course, count, curves, room)
+    count, rig, curves, room = samples.rows.size, part.scene.rig, part.curves, part.room
+    _look_for(part, count)
     sideward = rig.sign * rig.rigidity
     at_all(curves.series[:REST], room.twice, count, room.now, room.before, room.found)
     for j in range(count):
@@ -193,23 +185,15 @@ def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> Non
 
 
 @compiled
-def write_states(
-    samples: Samples,
-    scene: Scene,
-    stretch: Stretch,
-    accuracy: Accuracy,
-    course: Course,
-    curves: Curves,
-    room: Asked,
-    out: Found,
-) -> None:
+def write_states(samples: Samples, part: Followed, out: Found) -> None:
     """States of the samples on a stretch from the series, without derivatives."""
+    scene, stretch, course, curves, room = part.scene, part.stretch, part.course, part.curves, part.room
     count = samples.rows.size
     # Just before the end of contact it matters where the drive angle ends.
     off = value(curves.series[ANGLE], course.stop) - course.end
     for j in range(count):
         room.wanted[j] += off
-    _look_for(accuracy, course, count, curves, room)
+    _look_for(part, count)
     at_all(curves.series[:ANGLE], room.twice, count, room.now, room.before, room.found)
     for j in range(count):
         row = samples.rows[j]
@@ -225,19 +209,11 @@ def write_states(
 
 
 @compiled
-def polish_states(
-    samples: Samples,
-    scene: Scene,
-    stretch: Stretch,
-    accuracy: Accuracy,
-    course: Course,
-    curves: Curves,
-    room: Asked,
-    out: Found,
-) -> None:
+def polish_states(samples: Samples, part: Followed, out: Found) -> None:
     """Exact states at the drive angles of the samples on a stretch, by Newton in the stretched drive angle."""
+    scene, stretch, course, curves, room = part.scene, part.stretch, part.course, part.curves, part.room
     stop, steadiness, over_angle, rig = course.stop, course.steadiness, curves.over_angle, scene.rig
-    lay_over_angle(accuracy, course, curves)
+    lay_over_angle(part.accuracy, course, curves)
     weighted(curves.on.slopes, over_angle[WAY], curves.bend)
     for j in range(samples.rows.size):
         row, target = samples.rows[j], 0.25 * (room.twice[j] + 2.0)
@@ -247,7 +223,7 @@ def polish_states(
         for _ in range(100):
             p = along(stretch, way)
             at = place(scene.outline, p)
-            state = exact_state(at, rig.friction_angle, stretch.tip, MISS, scene.known, scene.states)
+            state = exact_state(scene, at, stretch.tip, MISS)
             driven = state.drive_angle + rig.compliance * state.holding_moment
             # But for rounding, which may undo the very first contact.
             turned = 1.0 - left_of(driven, course) if math.isfinite(driven) else 0.0

@@ -25,7 +25,7 @@ from tactile_bayes.mechanics.arc import (
 )
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import compiled, kept
-from tactile_bayes.mechanics.outline import Place, frame
+from tactile_bayes.mechanics.outline import Outline, Place, frame, place
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.tables import (
     AMPLITUDE,
@@ -41,15 +41,15 @@ from tactile_bayes.mechanics.tables import (
 )
 
 __all__ = [
-    "NOWHERE",
     "Found",
     "QuickState",
+    "Rig",
+    "Scene",
     "State",
     "contact",
     "contacts",
-    "exact_excess",
     "exact_state",
-    "tabled_excess",
+    "excess",
     "tabled_state",
     "wrenches",
 ]
@@ -60,6 +60,33 @@ _BEYOND = 1e-12
 """By how much rounding may turn a chord beyond where the line of force passes through the pivot [rad]."""
 
 _NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
+
+
+class Rig(NamedTuple):
+    """What loads depend on beside rod and contour."""
+
+    friction_angle: float
+    """δ = arctan μ [rad]."""
+    compliance: float
+    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
+    offset: float
+    """What the encoder reads too much, as seen in forward sweeps [rad]."""
+    sign: float
+    """−1 in backward sweeps."""
+    rigidity: float
+    """Factor on loads: flexural rigidity over that of their unit."""
+
+
+class Scene(NamedTuple):
+    """One contour as one rod sees it from one pivot, and what is known of rods: all that a state depends on."""
+
+    outline: Outline
+    rig: Rig
+    exact: bool
+    """Whether states are computed to rounding; else from tables."""
+    known: Tables
+    room: Room
+    """Prepared for the friction angle."""
 
 
 class State(NamedTuple):
@@ -85,7 +112,7 @@ class QuickState(NamedTuple):
     force_y: float
 
 
-NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+_NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
@@ -129,7 +156,7 @@ def _ending(x: float, y: float, alpha: float, delta: float, miss: float, known: 
     larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
     slack2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
     if not slack2 >= 0.0:
-        return NOWHERE
+        return _NOWHERE
     beta = alpha + delta
     sin, cos = math.sin(beta), math.cos(beta)
     u, v = x * cos + y * sin, y * cos - x * sin
@@ -150,19 +177,13 @@ def _ending(x: float, y: float, alpha: float, delta: float, miss: float, known: 
 
 
 @compiled
-def exact_state(at: Place, delta: float, tip: bool, miss: float, known: Tables, room: Room) -> State:
-    """A contact of known phase to rounding, in a room prepared for the friction angle; derivatives as in `_ending`."""
-    alpha = math.atan2(at.sin, at.cos)
+def exact_state(scene: Scene, at: Place, tip: bool, miss: float) -> State:
+    """A contact of known phase to rounding; derivatives as in `_ending`."""
+    alpha, delta = math.atan2(at.sin, at.cos), scene.rig.friction_angle
     if tip:
-        return _ending(at.x, at.y, alpha, delta, miss, known, room)
-    length, arc, by_chi = _touch(at.x, at.y, alpha, delta, room)
+        return _ending(at.x, at.y, alpha, delta, miss, scene.known, scene.room)
+    length, arc, by_chi = _touch(at.x, at.y, alpha, delta, scene.room)
     return _lying(at.x, at.y, alpha, delta, length, arc, by_chi)
-
-
-@compiled
-def exact_excess(at: Place, delta: float, room: Room) -> float:
-    """Arc length that tangential contact takes, less that of the rod, to rounding."""
-    return _touch(at.x, at.y, math.atan2(at.sin, at.cos), delta, room)[0] - 1.0
 
 
 @kept
@@ -262,8 +283,9 @@ def contacts(columns: Floats, out: Floats) -> None:
 
 
 @compiled
-def tabled_state(at: Place, delta: float, tip: bool, known: Tables, room: Room) -> QuickState:
-    """A contact of known phase from tables, in a room prepared for the friction angle, at most `MOST_FRICTION`."""
+def tabled_state(scene: Scene, at: Place, tip: bool) -> QuickState:
+    """A contact of known phase from tables, for a friction angle of at most `MOST_FRICTION`."""
+    delta, room = scene.rig.friction_angle, scene.room
     along, across = frame(at)
     sin, cos = at.sin, at.cos
     slope = math.atan2(sin, cos)
@@ -276,7 +298,7 @@ def tabled_state(at: Place, delta: float, tip: bool, known: Tables, room: Room) 
         return QuickState(math.nan, math.nan, math.nan, math.nan)
     if tip:
         lack, tilt = math.sqrt(1.0 - distance2), max(math.atan2(u, v), 0.0)
-        angle, _, force, turn = in_polar(known, lack, tilt, FORCE, room)
+        angle, _, force, turn = in_polar(scene.known, lack, tilt, FORCE, room)
         force *= angle
         drive_angle = slope + delta + 0.5 * math.pi + turn
     else:
@@ -288,8 +310,11 @@ def tabled_state(at: Place, delta: float, tip: bool, known: Tables, room: Room) 
 
 
 @compiled
-def tabled_excess(at: Place, delta: float, room: Room) -> float:
-    """Arc length that tangential contact takes, less that of the rod, from a table."""
+def excess(scene: Scene, p: float) -> float:
+    """Arc length that tangential contact takes at a parameter, less that of the rod."""
+    at, delta = place(scene.outline, p), scene.rig.friction_angle
+    if scene.exact:
+        return _touch(at.x, at.y, math.atan2(at.sin, at.cos), delta, scene.room)[0] - 1.0
     along, across = frame(at)
     level = min(math.atan2(max(across, 0.0), along) / (0.5 * math.pi + delta), 1.0)
-    return math.sqrt(at.x * at.x + at.y * at.y) * series(room, STRETCH, level) - 1.0
+    return math.sqrt(at.x * at.x + at.y * at.y) * series(scene.room, STRETCH, level) - 1.0

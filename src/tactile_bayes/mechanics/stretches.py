@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.outline import Outline, Place, place
 from tactile_bayes.mechanics.reach import Limits
 from tactile_bayes.mechanics.series import Nodes, change_of, crossing, tail, value, weighted
-from tactile_bayes.mechanics.states import exact_excess, tabled_excess
-from tactile_bayes.mechanics.tables import Room
+from tactile_bayes.mechanics.states import Scene, excess
 
 __all__ = ["BRIEF", "Accuracy", "Stretch", "along", "along_rate", "cut"]
 
@@ -31,8 +29,6 @@ _HALVINGS = 8
 class Accuracy(NamedTuple):
     """How accurately a path is followed."""
 
-    exact: bool
-    """Whether states and events are computed to rounding; else from tables, and as good as interpolation."""
     resolved: float
     """Share of the change of the drive angle on a stretch by which an interpolant may miss it."""
     sharp: float
@@ -75,25 +71,8 @@ def along_rate(stretch: Stretch, way: float) -> float:
 
 
 @compiled
-def _excess(at: Place, delta: float, exact: bool, room: Room) -> float:
-    if exact:
-        return exact_excess(at, delta, room)
-    return tabled_excess(at, delta, room)
-
-
-@compiled
 def cut(
-    outline: Outline,
-    limit: Limits,
-    knots: Floats,
-    delta: float,
-    accuracy: Accuracy,
-    exact: bool,
-    miss: float,
-    on: Nodes,
-    room: Room,
-    series: Floats,
-    out: Floats,
+    scene: Scene, limit: Limits, knots: Floats, accuracy: Accuracy, miss: float, on: Nodes, series: Floats, out: Floats
 ) -> int:
     """Cut a path at knots, and where tangential contact takes exactly the rod's length.
 
@@ -101,8 +80,6 @@ def cut(
     ----------
     knots : ndarray, shape (k,)
         Where the contour may not be smooth, decreasing.
-    exact : bool
-        Whether tables will not do.
     miss : float
         By how much, in rod lengths, the arc length of tangential contact may be off at most.
     series : ndarray, shape (3, order)
@@ -121,77 +98,62 @@ def cut(
         end = limit.end if k == knots.size else min(max(knots[k], limit.end), limit.begin)
         if not begin - end > _NOTHING * whole:
             continue
-        count += _cut_piece(outline, begin, end, whole, delta, accuracy, exact, miss, on, room, series, out[count:])
+        count += _cut_piece(scene, begin, end, whole, accuracy, miss, on, series, out[count:])
         begin = end
     return count
 
 
 @compiled
 def _cut_piece(
-    outline: Outline,
+    scene: Scene,
     first: float,
     last: float,
     whole: float,
-    delta: float,
     accuracy: Accuracy,
-    exact: bool,
     miss: float,
     on: Nodes,
-    room: Room,
     series: Floats,
     out: Floats,
 ) -> int:
     """Cut a smooth piece of a contour, in as large parts as polynomials follow the arc length of tangential contact."""
-    values, excess, slope = series[0], series[1], series[2]
+    values, lengths, slope = series[0], series[1], series[2]
     order, least = on.nodes.size, (first - last) * 0.5**_HALVINGS
     begin, end, count = first, last, 0
     while begin > last and count < out.shape[0] - order - 2:
         for k in range(order):
-            values[k] = _excess(place(outline, begin + (end - begin) * on.nodes[k]), delta, exact, room)
-        weighted(on.fit, values, excess)
+            values[k] = excess(scene, begin + (end - begin) * on.nodes[k])
+        weighted(on.fit, values, lengths)
         span = begin - end
-        rough = tail(excess) > min(accuracy.resolved * change_of(excess), miss)
+        rough = tail(lengths) > min(accuracy.resolved * change_of(lengths), miss)
         if rough and span > least and span > BRIEF * whole:
             end = begin - 0.5 * span
             continue
-        weighted(on.slopes, excess, slope)
-        count += _cut_smooth(
-            outline, begin, end, _NOTHING * whole, delta, accuracy, exact, on, room, series, out[count:]
-        )
+        weighted(on.slopes, lengths, slope)
+        count += _cut_smooth(scene, begin, end, _NOTHING * whole, accuracy, on, series, out[count:])
         begin, end = end, last
     return count
 
 
 @compiled
 def _cut_smooth(
-    outline: Outline,
-    begin: float,
-    end: float,
-    nothing: float,
-    delta: float,
-    accuracy: Accuracy,
-    exact: bool,
-    on: Nodes,
-    room: Room,
-    series: Floats,
-    out: Floats,
+    scene: Scene, begin: float, end: float, nothing: float, accuracy: Accuracy, on: Nodes, series: Floats, out: Floats
 ) -> int:
     """Cut where a polynomial changes its sign."""
-    values, excess, slope = series[0], series[1], series[2]
+    values, lengths, slope = series[0], series[1], series[2]
     span, order, started, old, count = end - begin, on.nodes.size, 0.0, 0.0, 0
-    beyond = value(excess, 0.0) > 0.0
+    beyond = value(lengths, 0.0) > 0.0
     for k in range(order + 1):
         new = 1.0 if k == order else on.nodes[k]
-        changes = ((value(excess, 1.0) if k == order else values[k]) > 0.0) != beyond
+        changes = ((value(lengths, 1.0) if k == order else values[k]) > 0.0) != beyond
         if not changes and 0 < k < order - 1:
             between = _nearest_zero(on.nodes, values, k)
-            if (value(excess, between) > 0.0) != beyond:  # a phase so brief that it lies between two nodes
+            if (value(lengths, between) > 0.0) != beyond:  # a phase so brief that it lies between two nodes
                 new, changes = between, True
         if changes:
             left, right = (old, new) if beyond else (new, old)
-            change = crossing(excess, slope, 0.0, left, right, 0.5 * (old + new), accuracy.last_step)
+            change = crossing(lengths, slope, 0.0, left, right, 0.5 * (old + new), accuracy.last_step)
             most = min(change - started, 1.0 - change)
-            change = _polished(outline, begin, span, change, most, delta, accuracy.first_step, exact, room)
+            change = _polished(scene, begin, span, change, most, accuracy.first_step)
             if abs(span) * (change - started) > nothing:  # else it is rounding where a piece begins
                 out[count, 0], out[count, 1], out[count, 2] = begin + span * started, begin + span * change, beyond
                 count += 1
@@ -213,21 +175,11 @@ def _nearest_zero(nodes: Floats, values: Floats, k: int) -> float:
 
 
 @compiled
-def _polished(
-    outline: Outline,
-    begin: float,
-    span: float,
-    change: float,
-    most: float,
-    delta: float,
-    last_step: float,
-    exact: bool,
-    room: Room,
-) -> float:
+def _polished(scene: Scene, begin: float, span: float, change: float, most: float, last_step: float) -> float:
     """A change of the phase beyond the interpolant's answer, by secants until a step is as small as given."""
     old, now = change + 1e-4 * most, change
-    at_old = _excess(place(outline, begin + span * old), delta, exact, room)
-    at_now = _excess(place(outline, begin + span * now), delta, exact, room)
+    at_old = excess(scene, begin + span * old)
+    at_now = excess(scene, begin + span * now)
     for _ in range(4):
         step = at_now * (now - old) / (at_now - at_old)
         if not abs(step) < 0.1 * most:
@@ -235,5 +187,5 @@ def _polished(
         old, at_old, now = now, at_now, now - step
         if abs(step) <= last_step:
             break
-        at_now = _excess(place(outline, begin + span * now), delta, exact, room)
+        at_now = excess(scene, begin + span * now)
     return now

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled, kept
-from tactile_bayes.mechanics.curves import Rig, Scene
 from tactile_bayes.mechanics.fates import Reach
-from tactile_bayes.mechanics.outline import Outline, mirrored
+from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.path import MOST_CHANGES, Work, follow, work
 from tactile_bayes.mechanics.reach import clear_angle
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
+from tactile_bayes.mechanics.states import Rig, Scene
 from tactile_bayes.mechanics.stretches import Accuracy
-from tactile_bayes.mechanics.tables import Room, Tables, prepare, room, tables
+from tactile_bayes.mechanics.tables import MOST_FRICTION, Room, Tables, prepare, room, tables
 
 __all__ = ["Answers", "Lanes", "Shapes", "Strokes", "answered"]
 
@@ -26,13 +26,13 @@ Index = NDArray[np.intp]
 
 _TOUCHES = int(Reach.TOUCHES)
 
-_EXACT = Accuracy(exact=True, resolved=1e-8, sharp=np.inf, halvings=8, first_step=4e-16, last_step=4e-16, polished=True)
+_EXACT = Accuracy(resolved=1e-8, sharp=np.inf, halvings=8, first_step=4e-16, last_step=4e-16, polished=True)
 """States and events to rounding."""
 
 _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
 """Events to rounding, and states from series."""
 
-_FAST = Accuracy(exact=False, resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, polished=True)
+_FAST = Accuracy(resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, polished=True)
 """As well as noise asks."""
 
 _EXACT_ORDER, _FAST_ORDER = 32, 16
@@ -124,35 +124,31 @@ _LANE, _EVENTS = _side_by_side(Lanes._fields), _side_by_side(Answers._fields[3:]
 
 
 @compiled
-def _in_rod_lengths(kind: int, size: float, shape: float, length: float) -> tuple[float, float, float]:
+def _half(kind: int, size: float, shape: float, length: float) -> Half:
+    """One in rod lengths."""
     if kind == PARABOLA:
-        return size * length, shape, 1.0
+        return Half(kind, size * length, shape, 1.0)
     if kind == OVAL:
-        return size / length, shape / length, 1.0
+        return Half(kind, size / length, shape / length, 1.0)
     if kind == POWER_LAW:
-        return size * length ** (shape - 1.0), shape, length ** min(1.0, shape - 1.0)
-    return size, shape, 1.0
+        return Half(kind, size * length ** (shape - 1.0), shape, length ** min(1.0, shape - 1.0))
+    return Half(kind, size, shape, 1.0)
 
 
 @compiled
 def _outline(shapes: Shapes, lane: Any, table: Floats) -> Outline:
     """As the rod of a lane sees it; the table is put where there is room for it."""
     c, length = lane.contour, lane.length
-    left, right = shapes.kinds
-    of = shapes.halves[c]
-    l_size, l_shape, l_unit = _in_rod_lengths(left, of[0], of[1], length)
-    r_size, r_shape, r_unit = _in_rod_lengths(right, of[2], of[3], length)
-    if left in (SLOPES, CELLS):
-        begin, end = (2, 2 + 2 * (table.shape[1] - 2) // 3) if left == CELLS else (0, table.shape[1])
+    kind, of = shapes.kinds[0], shapes.halves[c]
+    left, right = _half(kind, of[0], of[1], length), _half(shapes.kinds[1], of[2], of[3], length)
+    if kind in (SLOPES, CELLS):
+        begin, end = (2, 2 + 2 * (table.shape[1] - 2) // 3) if kind == CELLS else (0, table.shape[1])
         for r in range(table.shape[0]):
             for k in range(table.shape[1]):
                 table[r, k] = shapes.tables[c, r, k] / (length if begin <= k < end else 1.0)
     x, y = (of[4] - lane.base_x) / length, (of[5] - lane.base_y) / length
-    low, high = (-l_size if left == SLOPES else l_size), r_size
-    standoff = lane.standoff / length
-    outline = Outline(
-        left, l_size, l_shape, l_unit, right, r_size, r_shape, r_unit, low, high, 1.0, x, y, standoff, table
-    )
+    low = -left.size if kind == SLOPES else left.size
+    outline = Outline(left, right, low, right.size, 1.0, x, y, lane.standoff / length, table)
     return mirrored(outline) if lane.backward else outline
 
 
@@ -161,6 +157,7 @@ def _sweep(
     shapes: Shapes,
     lanes: Any,
     strokes: Strokes,
+    exact: bool,
     accuracy: Accuracy,
     tolerance: Floats,
     asks_clearance: bool,
@@ -179,6 +176,8 @@ def _sweep(
     ----------
     lanes : ndarray, shape (lanes,)
         As in `Lanes`, side by side.
+    exact : bool
+        Whether states are computed to rounding, also where there are tables.
     tolerance : ndarray, shape (3,)
         By how much loads may miss, of moment and forces [EI/L and EI/L²].
     states, room
@@ -202,7 +201,8 @@ def _sweep(
             prepare(known, prepared, states)
         rig = Rig(lane.friction_angle, lane.compliance, sign * lane.offset, sign, lane.rigidity)
         found = Found(loads[c], all_states[c], changes[i])
-        ends = follow(Scene(outline, rig, known, states), knots, samples, accuracy, tolerance, room, found)
+        scene = Scene(outline, rig, exact or prepared > MOST_FRICTION, known, states)
+        ends = follow(scene, knots, samples, accuracy, tolerance, room, found)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
         event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
@@ -258,6 +258,7 @@ def answered(
         shapes,
         lane,
         strokes,
+        tolerance is None,
         accuracy,
         _NEVER_MISSED if tolerance is None else tolerance,
         asks_clearance,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import contour_problem
+from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
 from tactile_bayes.inference.families import Prior
@@ -182,19 +183,11 @@ def compare_families(
     length = rod_of(measured).length
     seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
     tried: dict[str, _Tried] = {}
-    problems = {
-        name: contour_problem(
-            measured,
-            family=name,
-            load_cell=load_cell,
-            priors={**matched_priors(name, length), **(priors or {}).get(name, {})},
-            rod=None,
-            friction=friction,
-            nuisances=nuisances,
-            events=True,
-        )
-        for name in names
-    }
+    assumed = Assumptions(SHAPE_FREE.name, load_cell, friction=friction, nuisances=nuisances)
+    problems = {}
+    for name in names:
+        own = {**matched_priors(name, length), **(priors or {}).get(name, {})}
+        problems[name] = contour_problem(measured, replace(assumed, family=name, priors=own))
     # What fits anything comes first: others that are far from fitting need not be sampled then.
     for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
         best = max((one.evidence.log_evidence[_USUAL] for one in tried.values() if one.evidence), default=-np.inf)
