@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
+import pathlib
 import warnings
-from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -16,10 +16,19 @@ import tactile_bayes as tb
 from tactile_bayes.checks import (
     as_number,
     as_numbers,
+    check_choice,
+    check_function,
     check_mapping,
     check_names,
+    check_number,
+    check_numbers,
+    check_optional,
     check_path,
+    check_pivots,
+    check_positive,
     check_probability,
+    check_seed,
+    check_switch,
     check_whole_number,
     shown,
 )
@@ -498,44 +507,56 @@ def test_numbers_are_numbers(value):
     assert as_numbers(value) == float(value)
 
 
-@pytest.mark.parametrize("value", [None, True, np.bool_(True), "1", b"1", 1j, np.complex128(1), [1.0], np.ones(1)])
-def test_what_is_no_number(value):
-    assert as_number(value) is None
+REFUSALS = {
+    "number": (functools.partial(check_number, least=0.0), [0, np.int8(3)], [-1.0, math.nan, "1", True, [1.0], 1j]),
+    "positive": (check_positive, [math.ulp(0.0), np.array(2.0)], [0.0, math.inf, None, np.bool_(True), np.ones(1)]),
+    "probability": (check_probability, [0.4, np.float32(0.5)], [0.0, 1.0, math.nan, True, "0.5"]),
+    "share": (functools.partial(check_probability, below=0.5), [0.4], [0.5]),
+    "numbers": (check_numbers, [[1, 2.5], 3, []], [[1, "2"], [True, 1.0], [[1, 2], [3]], [math.inf], None, "12"]),
+    "list": (functools.partial(check_numbers, shape=(None,), most=2.0), [[1, 2], (0.5,)], [[], 1.0, [[1.0]], [3.0]]),
+    "lever": (functools.partial(check_numbers, shape=(2,)), [(0, 1)], [(0, 1, 2), (0,), [[0, 1]]]),
+    "base": (check_pivots, [(0, 1), [(0, 1), (2, 1)]], [(0, 1, 2), [], [(0, 1), (2,)], (0, math.nan), 1.0, "01"]),
+    "draws": (functools.partial(check_whole_number, least=2), [np.uint8(2), 3], [True, 2.0, "2", None, 1]),
+    "replicate": (lambda name, value: check_whole_number(name, value, 0, most=9), [9], [10, -1, False]),
+    "seed": (lambda name, value: check_seed(value), [0, 2**70], [-1, True, 1.5, None, "1"]),
+    "method": (
+        functools.partial(check_choice, choices=("raw", "constrained")),
+        ["raw"],
+        ["left", ["raw"], None, b"raw"],
+    ),
+    "rod": (functools.partial(check_optional, kind=tb.Rod), [None, tb.Rod()], [tb.Rod, 1.0, {}]),
+    "events": (check_switch, [True, np.bool_(False)], [0, 1, None, "True"]),
+    "progress": (check_function, [None, print], [1, "print"]),
+    "nuisances": (
+        check_names,
+        [["a", "b"], ("a",), np.array(["a"]), {"a": 1}.keys()],
+        ["a", b"ab", {"a": 1}, ["a", 1], None, iter("ab")],
+    ),
+    "priors": (
+        functools.partial(check_mapping, remedy="give names"),
+        [None, {}, {"q": 1}],
+        [{1: 2.0}, [], "q", xr.Dataset()],
+    ),
+    "path": (check_path, ["record.csv", pathlib.Path("out")], ["", "\0", b"record.csv", 3, None]),
+}
 
 
-def test_a_whole_number_is_neither_a_truth_value_nor_a_fraction():
+@pytest.mark.parametrize("name", REFUSALS)
+def test_a_check_takes_what_is_right_and_refuses_the_rest_by_name_and_with_a_remedy(name):
+    check, right, wrong = REFUSALS[name]
+    for value in right:
+        check(name, value)
+    for value in wrong:
+        with pytest.raises(ParameterError, match=rf"(?s)^{name} is .*: .*(give|choose) "):
+            check(name, value)
+
+
+def test_checks_return_what_they_checked_as_it_is_used():
     assert check_whole_number("draws", np.uint8(2), 2) == 2
-    for value in (True, 2.0, "2", None, 1):
-        with pytest.raises(ParameterError, match=r"draws is .*: give a whole number from 2 up"):
-            check_whole_number("draws", value, 2)
-
-
-def test_a_probability_is_none_of_its_ends():
-    assert check_probability("share", 0.4, below=0.5) == 0.4
-    for value in (0.0, 0.5, math.nan):
-        with pytest.raises(ParameterError, match="share is"):
-            check_probability("share", value, below=0.5)
-
-
-def test_names_in_any_order_and_form():
-    for values in (["a", "b"], ("a", "b"), np.array(["a", "b"]), {"a": 1, "b": 2}.keys()):
-        assert check_names("nuisances", values) == ["a", "b"]
-    for values in ("a", b"ab", {"a": 1}, ["a", 1], None, iter("ab")):
-        with pytest.raises(ParameterError, match=r"nuisances is .*: .*give a list of names"):
-            check_names("nuisances", values)
-
-
-def test_a_dataset_is_no_mapping_of_options():
-    assert isinstance(xr.Dataset(), Mapping)
-    with pytest.raises(ParameterError, match="columns is a Dataset"):
-        check_mapping("columns", xr.Dataset(), "give names")
-
-
-def test_a_path_has_letters(tmp_path):
-    check_path("path", tmp_path)
-    for value in ("", "\0", b"record.csv", 3, None):
-        with pytest.raises(ParameterError, match=r"path is .*: give a path"):
-            check_path("path", value)
+    assert check_numbers("span", (0, 1)).tolist() == [0.0, 1.0]
+    assert check_pivots("base", (0, 1)) == [(0.0, 1.0)]
+    assert check_names("nuisances", np.array(["a", "b"])) == ["a", "b"]
+    assert check_path("path", "record.csv") == pathlib.Path("record.csv")
 
 
 def test_what_is_long_is_shown_by_its_kind():

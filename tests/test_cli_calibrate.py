@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.cli.app import app
-from tactile_bayes.cli.interrupts import going_on
+from tactile_bayes.cli.interrupts import resumable
 
 making = importlib.import_module("tactile_bayes.calibration.replicate")
 
@@ -166,7 +166,7 @@ def test_a_termination_that_the_sampler_answers_is_still_one():
         except KeyboardInterrupt:
             raise KeyboardInterrupt("interrupted while sampling replicate 3") from None
 
-    with pytest.raises(typer.Exit) as ended, going_on(lambda: "3 of 5 replicates are there"):
+    with pytest.raises(typer.Exit) as ended, resumable(lambda: "3 of 5 replicates are there"):
         sampler()
     assert ended.value.exit_code == 143
 

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from helpers.report_pages import Page, analysed_quickly, coarse_record
 from tactile_bayes.cli import report as report_command
-from tactile_bayes.cli.answer import Json
 from tactile_bayes.cli.app import app
+from tactile_bayes.cli.command import Output
 from tactile_bayes.record import write_record
 
 
@@ -71,7 +71,7 @@ def test_json_for_scripts(folder, tmp_path, monkeypatch):
     monkeypatch.setattr("tactile_bayes.report.write_report", write)
     result = call(folder, "--out", out, "--json")
     assert json.loads(result.stdout) == {"report": str(out), "bytes": out.stat().st_size}
-    assert get_type_hints(report_command.report, include_extras=True)["json"] == Json
+    assert get_type_hints(report_command.report)["output"] is Output
 
 
 def test_what_is_wrong_is_said_in_a_line(folder, tmp_path):

@@ -67,7 +67,7 @@ def asked(monkeypatch, short):
         return CellOutcome({"constrained_rms_across": 0.01}, "ok")
 
     monkeypatch.setattr(sensitivity_run, "sensitivity", answer)
-    monkeypatch.setattr(sensitivity_run, "_write_figure", lambda *arguments: None)
+    monkeypatch.setattr(sensitivity_run.Folder, "draw", lambda *arguments: None)
     monkeypatch.setattr(error_map_module, "error_cell", cell)
     return given
 

@@ -315,7 +315,7 @@ def test_priors_of_which_little_is_within_reach(monkeypatch):
 
 def test_what_cannot_be_is_refused():
     record = coarse()
-    with pytest.raises(ParameterError, match="no parameter 'b' to give a prior: there are a, q, x_c, noise_scale"):
+    with pytest.raises(ParameterError, match="a prior of b, which is no parameter: there are a, q, x_c, noise_scale"):
         infer_as_stated(record, seed=1, priors={"b": stats.norm()})
     with pytest.raises(ParameterError, match=r"the prior of a is 0\.5: give a frozen distribution"):
         infer_as_stated(record, seed=1, priors={"a": 0.5})
@@ -399,7 +399,10 @@ def test_samples_without_load_tell_where_contact_begins_and_ends():
         ({"checkpoint": 3}, "checkpoint is 3: give the path of a folder"),
         ({"checkpoint": ""}, "checkpoint is '': give the path of a folder"),
         ({"friction": -0.1}, "friction is -0.1: give a coefficient from 0 to 0.84"),
-        ({"priors": {"gain": stats.norm(1.0, 0.1)}}, "there is no parameter 'gain' .* moment_gain, friction and so on"),
+        (
+            {"priors": {"gain": stats.norm(1.0, 0.1)}},
+            "a prior of gain, which is no parameter: .* moment_gain, friction and so on",
+        ),
     ],
 )
 def test_what_is_of_another_kind_is_refused(given, words):

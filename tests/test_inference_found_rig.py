@@ -10,9 +10,8 @@ import pytest
 import xarray as xr
 
 import tactile_bayes as tb
-from tactile_bayes.inference.found_rig import found_rig
+from tactile_bayes.inference.found_rig import contact_points, found_rig
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.runs.contour import contact_points
 
 CONTOUR = tb.contours.Parabola(0.5, q=0.5)
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)

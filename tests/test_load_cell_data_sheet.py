@@ -95,12 +95,13 @@ def test_three_numbers_are_wanted(name, value):
         LoadCell(**{name: value})
 
 
-@pytest.mark.parametrize("value", [1.01, (1.0, 1.0, 1.0), np.eye(2), "abc", None, [[1, 0, 0], [0, 1, 0], 1]])
+@pytest.mark.parametrize(
+    "value",
+    [1.01, (1.0, 1.0, 1.0), np.eye(2), "abc", None, [[1, 0, 0], [0, 1, 0], 1], ((1, 0, 0), (0, 1, 0), (0, 0, np.nan))],
+)
 def test_a_gain_that_is_no_matrix_is_refused(value):
     with pytest.raises(ParameterError, match=r"(?s)load cell's gain is .*: give three rows of three numbers, \(\(1"):
         LoadCell(gain=value)
-    with pytest.raises(ParameterError, match=r"row of gain is .*: give three finite numbers \(holding_moment, force_x"):
-        LoadCell(gain=((1, 0, 0), (0, 1, 0), (0, 0, np.nan)))
 
 
 @pytest.mark.parametrize("value", [np.zeros((3, 3)), ((1, 0, 0), (0, 1, 1), (0, 1, 1)), np.diag([1.0, 0.0, 1.0])])
@@ -117,7 +118,7 @@ def test_a_negative_uncertainty_is_refused():
 @pytest.mark.parametrize("value", [(1.0, 0.0, 0.0), (0.9, 0.9, -0.9), (-0.6, -0.6, -0.6), (0.0, 1.5, 0.0)])
 def test_a_correlation_that_nothing_has_is_refused(value):
     with pytest.raises(
-        ParameterError, match=r"no noise has these coefficients between holding moment .*: give smaller"
+        ParameterError, match=r"no noise has these coefficients between holding_moment .*: give smaller"
     ):
         LoadCell(correlation=value)
 

@@ -227,13 +227,13 @@ def test_posteriors_are_inferred_in_some_cells():
 @pytest.mark.parametrize(
     ("wrong", "match"),
     [
-        ({"distances": []}, r"distances are \[\]: give a list of positive numbers"),
-        ({"distances": 0.5}, "distances are 0.5: give a list of positive numbers"),
+        ({"distances": []}, r"distances is \[\]: give a list of positive numbers"),
+        ({"distances": 0.5}, "distances is 0.5: give a list of positive numbers"),
         ({"distances": ["near"]}, "give a list of positive numbers"),
         ({"distances": [[0.5]]}, "give a list of positive numbers"),
         ({"distances": [0.5, -0.1]}, "give a list of positive numbers"),
-        ({"noise_factors": [0.0]}, "noise_factors are .* give a list of positive numbers"),
-        ({"noise_factors": [np.inf]}, "noise_factors are"),
+        ({"noise_factors": [0.0]}, "noise_factors is .* give a list of positive numbers"),
+        ({"noise_factors": [np.inf]}, "noise_factors is"),
         ({"noise_factors": [1.0, 2.0, 1.0]}, "one of them is given twice"),
         ({"contours": "II"}, "contours is 'II': give names of the paper's profiles, or contours by name"),
         ({"contours": []}, "give names of the paper's profiles"),

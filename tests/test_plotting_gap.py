@@ -12,7 +12,7 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 
 from tactile_bayes.contours import Parabola
-from tactile_bayes.plotting.gap_map import gap as draw
+from tactile_bayes.plotting import gap as draw
 from tactile_bayes.uncertainty.gap import gap
 
 TRUTH = Parabola(5.0, q=0.03)

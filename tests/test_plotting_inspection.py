@@ -57,5 +57,5 @@ def test_a_missing_channel_is_said_to_be_so(measured):
 def test_axes_that_are_too_few(inspected):
     from matplotlib.figure import Figure
 
-    with pytest.raises(ParameterError, match=r"axes have shape \(3,\): give \(3, 2\)"):
+    with pytest.raises(ParameterError, match=r"axes have shape \(3,\), and \(3, 2\) is wanted: a row for each"):
         tb.plotting.inspection(inspected, axes=Figure().subplots(3, 1))

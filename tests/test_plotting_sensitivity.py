@@ -14,7 +14,7 @@ from matplotlib.colors import same_color
 
 from tactile_bayes import LoadCell, Rod, error_map, plotting, sensitivity
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.planning_groups import METHOD_COLOURS, READING_COLOURS
+from tactile_bayes.plotting.sweep_plans import METHOD_COLOURS, READING_COLOURS
 
 ROD = Rod(0.1, 1e-5)
 

@@ -11,9 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from tactile_bayes.errors import RecordError
-from tactile_bayes.record import csv_rows, read_record, text
+from tactile_bayes.record import csv_rows, parsing, read_record
 from tactile_bayes.record.csv_format import read_csv
-from tactile_bayes.record.csv_rows import Lines
 
 NAMES = ["sweep", "direction", "drive_angle", "force_x", "note", "count"]
 USUAL = {
@@ -127,7 +126,7 @@ def test_a_long_remark_among_many_short_ones(tmp_path, monkeypatch, where):
     values = read_csv(path, {}).columns["note"][0]
     assert values.dtype.kind == "U"
     assert values.tolist() == notes
-    monkeypatch.setattr(text, "FREE", 500)
+    monkeypatch.setattr(parsing, "FREE", 500)
     values = read_csv(path, {}).columns["note"][0]
     assert values.dtype.kind == "O"
     assert values.tolist() == notes
@@ -141,15 +140,6 @@ def test_a_refusal_far_down_names_its_line(tmp_path):
     path.write_text("\n".join(["# rig: bench", "sweep,direction,drive_angle,holding_moment,force_x,force_y", *rows]))
     with pytest.raises(RecordError, match="line 20005, column 'force_y': 'oops' is not a number"):
         read_record(path)
-
-
-def test_lines_are_remembered_in_runs():
-    lines = Lines()
-    for part in (range(3, 5), range(5, 8), np.array([9, 12]), range(13, 15), range(15, 15)):
-        lines.extend(part)
-    assert list(lines) == [3, 4, 5, 6, 7, 9, 12, 13, 14]
-    assert lines[1:3] == [4, 5]
-    assert len(lines._runs) == 3
 
 
 READING = """

@@ -17,11 +17,11 @@ from tactile_bayes.record import (
     FRAMES,
     column_of,
     make_record,
+    parsing,
     present_channels,
     read_record,
     record_hash,
     rod_of,
-    text,
     write_record,
 )
 from tactile_bayes.rod import Rod
@@ -120,7 +120,7 @@ def test_a_netcdf_file_loses_nothing(tmp_path, record):
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypatch, suffix):
-    monkeypatch.setattr(text, "FREE", 100)
+    monkeypatch.setattr(parsing, "FREE", 100)
     record = make_record(columns(note=np.array(["", "a,b", "", "x" * 100, "", "a,b"], dtype=object)))
     assert [record[name].dtype.kind for name in ("note", "direction")] == ["O", "U"]
     write_record(record, tmp_path / f"record{suffix}")

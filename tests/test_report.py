@@ -55,8 +55,8 @@ from tactile_bayes.report.page import page_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import hindrances
 from tactile_bayes.report.trust import contacts_words
-from tactile_bayes.runs.contour import summary
 from tactile_bayes.runs.reconstruction import reconstruction_in_words
+from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +187,7 @@ def assert_shows(cell, value):
 
 def test_the_parameters_are_those_of_the_posterior(page, posterior):
     rows = {row[0]: row for row in page.table("Estimates are medians")[1:]}
-    numbers = summary(posterior, 0.9)
+    numbers = summary(posterior, 0.9, gap_if_any(posterior, 0.9))
     assert list(rows) == numbers["quantity"].values.tolist()
     for name, row in rows.items():
         of_name = numbers.sel(quantity=name)

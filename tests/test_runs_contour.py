@@ -18,8 +18,9 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import to_dimensionless
 from tactile_bayes.runs import contour as module
-from tactile_bayes.runs.contour import analyse, reach, summary
+from tactile_bayes.runs.contour import analyse
 from tactile_bayes.scanning import scan
+from tactile_bayes.uncertainty.summary import summary
 
 FIGURES = ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs")
 
@@ -100,13 +101,6 @@ def test_the_estimate_is_near_the_truth(analysed):
         assert table["median"].sel(quantity=name) == pytest.approx(TRUTH[name], rel=0.2)
     assert abs(table["median"].sel(quantity="x_c")) < 0.01 * ROD.length
     np.testing.assert_allclose(run.band["median"], CONTOUR.height(run.band.x), atol=0.01 * ROD.length)
-
-
-def test_the_summary_has_the_probability_it_is_asked_for(analysed):
-    run, _ = analysed
-    wide, narrow = summary(run.posterior, 0.95), summary(run.posterior, 0.5)
-    assert (narrow["lower"] > wide["lower"]).all()
-    assert (narrow["upper"] < wide["upper"]).all()
 
 
 @pytest.mark.slow
@@ -217,7 +211,7 @@ def broken(*arguments, **options):
     [
         ("contact_points", "contacts", "contacts.csv"),
         ("contour_band", "band", "band.csv"),
-        ("gap", "gap", None),
+        ("gap_if_any", "gap", None),
         ("verdicts", "verdicts", None),
     ],
 )
@@ -276,17 +270,3 @@ def test_what_fails_before_a_posterior_is_drawn_is_passed_on(measured, tmp_path,
     with pytest.raises(RuntimeError, match="it broke"):
         analyse(measured, tmp_path)
     assert not any(tmp_path.iterdir())
-
-
-def test_the_band_is_where_events_are(analysed):
-    """Of draws whose contour is not touched, or ends before, there are none."""
-    posterior = analysed[0].posterior.copy(deep=True)
-    events = posterior["events"]
-    events["snap_off_contact_x"][:, ::3] = np.nan
-    x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
-    expected = np.quantile(x[np.isfinite(x)], [0.05, 0.95])
-    np.testing.assert_allclose(reach(posterior)[[0, -1]], expected, rtol=1e-13)
-    for when in ("first", "snap_off"):
-        events[f"{when}_contact_x"][:] = np.nan
-    with pytest.raises(InferenceError, match="touches none of the posterior's contours"):
-        reach(posterior)

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Collection, Mapping, Sequence, Set
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from tactile_bayes.errors import ParameterError
 
 __all__ = [
+    "TINY",
     "as_number",
     "as_numbers",
     "check_choice",
@@ -22,8 +24,10 @@ __all__ = [
     "check_mapping",
     "check_names",
     "check_number",
+    "check_numbers",
     "check_optional",
     "check_path",
+    "check_pivots",
     "check_positive",
     "check_probability",
     "check_seed",
@@ -32,6 +36,9 @@ __all__ = [
     "refused",
     "shown",
 ]
+
+TINY = math.ulp(0.0)
+"""The least positive number."""
 
 _SHOWN = 120
 """Characters of a value that a message shows."""
@@ -115,16 +122,64 @@ def check_number(
     return number
 
 
+def check_numbers(
+    name: str,
+    values: Any,
+    remedy: str = "give finite numbers",
+    *,
+    shape: Sequence[int | None] | None = None,
+    least: float = -math.inf,
+    most: float = math.inf,
+) -> NDArray[np.float64]:
+    """Return finite numbers from `least` to `most` as an array; a size None in its shape stands for one or more.
+
+    Examples
+    --------
+    >>> check_numbers("span", (0, 1), shape=(2,))
+    array([0., 1.])
+    >>> check_numbers("lever", [0.0, 0.1, 0.2], "give two finite numbers (x, y)", shape=(2,))
+    Traceback (most recent call last):
+    ...
+    tactile_bayes.errors.ParameterError: lever is [0.0, 0.1, 0.2]: give two finite numbers (x, y)
+    """
+    numbers = as_numbers(values)
+    if numbers is None or not (np.isfinite(numbers) & (least <= numbers) & (numbers <= most)).all():
+        raise refused(name, values, remedy)
+    if shape is not None and not _is_of(shape, numbers.shape):
+        raise refused(name, values, remedy)
+    return numbers
+
+
+def _is_of(shape: Sequence[int | None], sizes: Sequence[int]) -> bool:
+    return len(shape) == len(sizes) and all(
+        size > 0 if wanted is None else size == wanted for wanted, size in zip(shape, sizes, strict=True)
+    )
+
+
+def check_pivots(name: str, values: Any) -> list[tuple[float, float]]:
+    """Return pivots: one, or several, as pairs of finite numbers.
+
+    Examples
+    --------
+    >>> check_pivots("base", (0, 1)), check_pivots("base", [(0, 1), (2, 1)])
+    ([(0.0, 1.0)], [(0.0, 1.0), (2.0, 1.0)])
+    """
+    remedy = "give a pivot (x, y), or several: [(x, y), (x, y)]"
+    numbers = check_numbers(name, values, remedy)
+    pivots = check_numbers(name, numbers[None] if numbers.ndim == 1 else numbers, remedy, shape=(None, 2))
+    return [(float(x), float(y)) for x, y in pivots]
+
+
 def check_positive(name: str, value: Any, remedy: str = "give a positive number") -> float:
     """Return a finite number above zero."""
-    return check_number(name, value, remedy, least=math.ulp(0.0))
+    return check_number(name, value, remedy, least=TINY)
 
 
 def check_probability(
     name: str, value: Any, remedy: str = "give a number between 0 and 1, like 0.95", *, below: float = 1.0
 ) -> float:
     """Return a number between 0 and `below`, neither of which it is."""
-    return check_number(name, value, remedy, least=math.ulp(0.0), most=math.nextafter(below, 0.0))
+    return check_number(name, value, remedy, least=TINY, most=math.nextafter(below, 0.0))
 
 
 def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, most: float = math.inf) -> int:
@@ -167,10 +222,10 @@ def check_kind(name: str, value: Any, kind: type, remedy: str) -> None:
         raise refused(name, value, remedy)
 
 
-def check_optional(name: str, value: Any, kind: type, remedy: str) -> None:
+def check_optional(name: str, value: Any, kind: type, remedy: str = "") -> None:
     """Refuse what is neither an object of a class nor None."""
     if value is not None:
-        check_kind(name, value, kind, f"{remedy}, or None")
+        check_kind(name, value, kind, f"{remedy or f'give a {kind.__name__}'}, or None")
 
 
 def check_switch(name: str, value: Any) -> bool:
@@ -215,8 +270,8 @@ def check_mapping(name: str, values: Any, remedy: str) -> None:
         raise refused(name, values, remedy)
 
 
-def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.csv'") -> None:
-    """Refuse what names no file and no folder.
+def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.csv'") -> Path:
+    """Return what names a file or a folder.
 
     Examples
     --------
@@ -228,3 +283,4 @@ def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.c
     words = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
     if not isinstance(words, str) or not words or "\0" in words:
         raise refused(name, value, remedy)
+    return Path(value)

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.checks import as_numbers, check_choice, check_number, refused
+from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
 from tactile_bayes.mechanics.elastica import wrench_from_contact
@@ -122,7 +122,7 @@ def equilibria(
     alpha = np.atleast_1d(_floats(slope_angles))
     if alpha.ndim != 1 or not np.all(np.abs(alpha) < 0.5 * np.pi):
         raise ParameterError("slope_angles must be a list of angles in (−π/2, π/2) radians")
-    pivots = _pivots(base)
+    pivots = check_pivots("base", base)
     if len(pivots) > 1:
         raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
     units = Rod() if rod is None else rod
@@ -225,7 +225,7 @@ def scan(
 
     columns: list[dict[str, NDArray[np.generic]]] = []
     sweeps: list[SweepEvents] = []
-    for pivot, sense in product(_pivots(base), directions):
+    for pivot, sense in product(check_pivots("base", base), directions):
         paths = sweep_paths(contour, base=pivot, direction=sense, rod=rod, friction=friction)
         sweep = events_of(paths, sense, pivot, rod)
         _warn_of(sweep, rod)
@@ -255,15 +255,6 @@ def _floats(values: ArrayLike) -> Floats:
     """Numbers as an array, NaN if they are none."""
     numbers = as_numbers(values)
     return np.asarray(np.nan) if numbers is None else numbers
-
-
-def _pivots(base: tuple[float, float] | Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    pivots = _floats(base)
-    if pivots.shape == (2,):
-        pivots = pivots[None]
-    if pivots.ndim != 2 or pivots.shape[1] != 2 or not pivots.size or not np.all(np.isfinite(pivots)):
-        raise refused("base", base, "give a pivot (x, y), or several: [(x, y), (x, y)]")
-    return [(float(x), float(y)) for x, y in pivots]
 
 
 def _warn_of(sweep: SweepEvents, rod: Rod) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -17,8 +16,21 @@ from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.calibration.world import World
-from tactile_bayes.checks import check_seed, check_whole_number
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import (
+    check_choice,
+    check_mapping,
+    check_names,
+    check_number,
+    check_numbers,
+    check_optional,
+    check_path,
+    check_pivots,
+    check_probability,
+    check_seed,
+    check_switch,
+    check_whole_number,
+    refused,
+)
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
@@ -178,7 +190,7 @@ def calibrate(
         probability=probability,
         world=world,
     )
-    folder = None if out is None else Path(out).resolve()
+    folder = None if out is None else check_path("out", out).resolve()
     with open_ledger(experiment.words, folder, REPLICATES) as ledger:
         kept = keep_outcomes(
             ledger, replicate, experiment, int(replicates), workers=workers, scheduler=scheduler, progress=progress
@@ -222,10 +234,11 @@ def calibration_replicate(
     >>> list(again.truth), "posterior" in again.posterior
     (['a', 'q', 'x_c', 'noise_scale'], True)
     """
-    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 0:
-        raise ParameterError(f"number of the replicate is {number!r}: give a whole number from 0 up")
+    check_whole_number("number of the replicate", number, 0)
     experiment = experiment_of(**options)
-    Ledger(experiment.words, None if out is None else Path(out), REPLICATES)  # refuses that of another experiment
+    Ledger(
+        experiment.words, None if out is None else check_path("out", out), REPLICATES
+    )  # refuses that of another experiment
     return make_replicate(experiment, int(number), throw=throw)
 
 
@@ -247,52 +260,40 @@ def experiment_of(
     world: World | None = None,
 ) -> Experiment:
     """What `calibrate` is asked for, as it says, and by the same defaults."""
-    kinds = {"load_cell": LoadCell, "rod": Rod, "settings": SamplerSettings, "world": World, "priors": Mapping}
-    given = {"load_cell": load_cell, "rod": rod, "settings": settings, "world": world, "priors": priors}
-    for name, kind in kinds.items():
-        if given[name] is not None and not isinstance(given[name], kind):
-            wanted = "distributions by name" if kind is Mapping else f"a {kind.__name__}"
-            raise ParameterError(f"{name} is {given[name]!r}: give {wanted}, or None")
+    check_optional("load_cell", load_cell, LoadCell)
+    check_optional("rod", rod, Rod)
+    check_optional("settings", settings, SamplerSettings)
+    check_optional("world", world, World)
+    check_mapping("priors", priors, "give distributions by name, or None")
     rod_taken = rod or Rod()
     cell = load_cell or LoadCell(force_noise=0.05 * rod_taken.force_unit, moment_noise=0.02 * rod_taken.moment_unit)
     directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
-    if not isinstance(direction, str) or direction not in directions:
-        raise ParameterError(f"direction is {direction!r}: choose 'both', 'forward' or 'backward'")
-    angles = np.radians(_ANGLES) if drive_angles is None else _floats(drive_angles)
-    if angles.ndim != 1 or np.unique(angles).size < 3 or not np.all(np.isfinite(angles)):
-        raise ParameterError("drive_angles are not a list of at least 3 different finite numbers [rad]")
-    pivots = np.atleast_2d(_floats(base))
-    if pivots.ndim != 2 or pivots.shape[1] != 2 or not np.all(np.isfinite(pivots)):
-        raise ParameterError(f"base is {base!r}: give (x, y), or a list of such pairs")
-    if isinstance(nuisances, str):
-        raise ParameterError(f"nuisances is {nuisances!r}: give a list of names, like [{nuisances!r}]")
-    for name, value in {"probability": probability, "friction": 0.0 if friction is None else friction}.items():
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-            raise ParameterError(f"{name} is {value!r}: give a number")
+    check_choice("direction", direction, directions)
+    remedy = "give a list of at least 3 different finite numbers [rad]"
+    angles = np.unique(
+        np.radians(_ANGLES)
+        if drive_angles is None
+        else check_numbers("drive_angles", drive_angles, remedy, shape=(None,))
+    )
+    if angles.size < 3:
+        raise refused("drive_angles", drive_angles, remedy)
+    check_switch("events", events)
     check_seed(seed)
     experiment = Experiment(
         family=family,
         load_cell=cell,
-        drive_angles=tuple(np.unique(angles).tolist()),
+        drive_angles=tuple(angles.tolist()),
         rod=rod,
-        bases=tuple((float(x), float(y)) for x, y in pivots),
+        bases=tuple(check_pivots("base", base)),
         directions=directions[direction],
         priors=dict(priors or {}),
-        nuisances=tuple(nuisances),
-        friction=None if friction is None else float(friction),
+        nuisances=tuple(check_names("nuisances", nuisances)),
+        friction=None if friction is None else check_number("friction", friction),
         events=bool(events),
         settings=settings or _SETTINGS,
-        probability=float(probability),
+        probability=check_probability("probability", probability),
         seed=int(seed),
         world=world or World(),
     )
     default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))
     return replace(experiment, settings=default, again=_AGAIN) if settings in (None, default) else experiment
-
-
-def _floats(values: ArrayLike) -> Floats:
-    """Of what are no numbers an array of shape (0, 0, 0)."""
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        return np.empty((0, 0, 0))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.blank_record import blank_record
 from tactile_bayes.calibration.world import NUMBERS, World
+from tactile_bayes.checks import check_probability
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
@@ -26,7 +27,7 @@ from tactile_bayes.inference.contour_problem import (
     prior_in_words,
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
@@ -62,8 +63,7 @@ class Experiment:
     world: World = field(default_factory=World)
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.probability < 1.0:
-            raise ParameterError(f"probability is {self.probability!r}: give a number between 0 and 1, like 0.9")
+        check_probability("probability", self.probability)
         if not any(self.load_cell.standard_deviations.values()):
             raise ParameterError(
                 "the load cell has no noise, so that there is nothing to be calibrated: give "
@@ -71,14 +71,7 @@ class Experiment:
             )
         own = {*family_named(self.family).parameters, *self.model.nuisances.names, *self.model.noise.names}
         for whose, priors, names in (("", self.priors, own), ("of the world ", self.world.priors, self.model.names)):
-            for name, prior in priors.items():
-                refuse_no_prior(name, prior)
-            strangers = sorted(set(priors) - set(names))
-            if strangers:
-                raise ParameterError(
-                    f"there is a prior {whose}of {', '.join(strangers)}, which is no parameter: there are "
-                    f"{', '.join(sorted(names))}"
-                )
+            refuse_wrong_priors(priors, sorted(names), whose)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what follows from the rest, to travel lightly."""

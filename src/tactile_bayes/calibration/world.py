@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from tactile_bayes.checks import check_kind, check_number, check_numbers, check_optional
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.load_cell import LoadCell
 
@@ -91,19 +92,18 @@ class World:
         for name, size in NUMBERS.items():
             if name == "flat_spot" and self.flat_spot is None:
                 continue
-            object.__setattr__(self, name, _numbers(name, getattr(self, name), size))
-        if not self.friction >= 0.0:
-            raise ParameterError(f"friction of the world is {self.friction!r}: give a coefficient from 0 up")
+            remedy = f"give {size} finite numbers" if size > 1 else "give a finite number"
+            shape = (size,) if size > 1 else ()
+            numbers = check_numbers(f"{name} of the world", getattr(self, name), remedy, shape=shape).tolist()
+            object.__setattr__(self, name, tuple(numbers) if size > 1 else numbers)
+        check_number("friction of the world", self.friction, "give a coefficient from 0 up", least=0.0)
         if not self.rigidity_scale > 0.0 or (self.flat_spot is not None and not self.flat_spot[1] > 0.0):
             raise ParameterError("rigidity_scale and the factor of a flat spot are positive numbers")
-        if self.load_cell is not None and not isinstance(self.load_cell, LoadCell):
-            raise ParameterError(f"load_cell of the world is {self.load_cell!r}: give a LoadCell, or None")
+        check_optional("load_cell of the world", self.load_cell, LoadCell)
         if self.family is not None:
             family_named(self.family)
-        if not isinstance(self.priors, Mapping):
-            raise ParameterError(f"priors of the world are {self.priors!r}: give distributions by name")
-        for name, prior in self.priors.items():
-            refuse_no_prior(name, prior)
+        check_kind("priors of the world", self.priors, Mapping, "give distributions by name")
+        refuse_wrong_priors(self.priors, self.priors)
 
     def __repr__(self) -> str:
         return f"World({', '.join(f'{name}={value!r}' for name, value in self._given().items())})"
@@ -140,16 +140,3 @@ class World:
             drive_angle_backlash=drawn.drive_angle_backlash,
             base_shifts=shifts,
         )
-
-
-def _numbers(name: str, value: Any, size: int) -> Any:
-    """A number, or as many as there are to be."""
-    try:
-        numbers = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        numbers = np.full(1, np.nan)
-    if numbers.shape != ((size,) if size > 1 else ()) or not np.all(np.isfinite(numbers)):
-        raise ParameterError(
-            f"{name} of the world is {value!r}: give {f'{size} finite numbers' if size > 1 else 'a finite number'}"
-        )
-    return tuple(numbers.tolist()) if size > 1 else float(numbers)

@@ -2,39 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.answer import Json, columns_of, print_json
-from tactile_bayes.cli.interrupts import answered
-from tactile_bayes.cli.record_options import (
-    AsStated,
-    Columns,
-    Diameter,
-    FlexuralRigidity,
-    ForceNoise,
-    KnownFriction,
-    Length,
-    LoadCellFrame,
-    Missing,
-    MomentNoise,
-    Nuisances,
-    Out,
-    Quiet,
-    Record,
-    Seed,
-    SplitSweeps,
-    read_measurement,
-)
+from tactile_bayes.cli.answer import Answer, columns_of, table_of
+from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.interrupts import acknowledge_interrupt
+from tactile_bayes.cli.record_options import Record, RecordOptions
+from tactile_bayes.cli.rig_options import UnknownOptions
 from tactile_bayes.cli.sampling_bar import sampling_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
-    from tactile_bayes.runs.contour import Run
+    from tactile_bayes.runs.contour import ContourRun
 
 __all__ = ["demo", "infer"]
 
@@ -42,6 +27,7 @@ _STOPPING = "stopping; what has been drawn is judged, drawn and written now (Ctr
 
 
 def infer(
+    *,
     ctx: typer.Context,
     record: Record,
     out: Out,
@@ -52,18 +38,8 @@ def infer(
             "any smooth one."
         ),
     ] = "parabola",
-    column: Columns = None,
-    split_sweeps: SplitSweeps = False,
-    length: Length = None,
-    flexural_rigidity: FlexuralRigidity = None,
-    diameter: Diameter = 0.0,
-    force_noise: ForceNoise = None,
-    moment_noise: MomentNoise = None,
-    missing: Missing = None,
-    load_cell_frame: LoadCellFrame = None,
-    friction: KnownFriction = None,
-    nuisance: Nuisances = None,
-    as_stated: AsStated = False,
+    reading: RecordOptions,
+    unknown: UnknownOptions,
     probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
     max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
     max_seconds: Annotated[
@@ -81,34 +57,21 @@ def infer(
         ),
     ] = None,
     seed: Seed = 1,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """Infer the contour from a measured record: contact points, posterior, band and figures."""
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.contour import analyse
 
-    measured, cell, nuisances = read_measurement(
-        record,
-        column=column,
-        split_sweeps=split_sweeps,
-        length=length,
-        flexural_rigidity=flexural_rigidity,
-        diameter=diameter,
-        force_noise=force_noise,
-        moment_noise=moment_noise,
-        missing=missing,
-        load_cell_frame=load_cell_frame,
-        nuisance=nuisance,
-        as_stated=as_stated,
-    )
-    with answered(_STOPPING), sampling_bar(quiet or json, max_seconds=max_seconds) as progress:
+    nuisances = unknown.nuisances
+    measured, cell = reading.read(record)
+    with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent, max_seconds=max_seconds) as progress:
         run = analyse(
             measured,
             out,
             family=family,
             load_cell=cell,
-            friction=friction,
+            friction=unknown.friction,
             nuisances=nuisances,
             checkpoint=checkpoint,
             probability=probability,
@@ -121,23 +84,23 @@ def infer(
     go_on = "give --checkpoint FOLDER, and the same command can go on after an interrupt"
     if checkpoint is not None:
         go_on = f"the same command goes on with the steps in {checkpoint}"
-    _tell(ctx, run, {}, as_json=json, go_on=go_on)
+    return _answer(ctx, run, run.files, {}, go_on)
 
 
 def demo(
+    *,
     ctx: typer.Context,
     out: Out = Path("results/demo"),
     seed: Seed = 1,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """A steel wire sweeps along a parabola; its noisy record is turned into a contour with a band."""
     from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
     from tactile_bayes.record import read_record
     from tactile_bayes.runs.contour import analyse
 
     path = measure_demo(out, seed=seed)
-    if not (quiet or json):
+    if not output.is_silent:
         print(
             f"A wire of {ROD.length * 1e3:g} mm and {ROD.diameter * 1e3:g} mm diameter has swept forward and backward "
             f"along a parabola; a load cell\nwith {LOAD_CELL.force_noise * 1e3:g} mN and "
@@ -146,7 +109,7 @@ def demo(
             f"--out RUN\n",
             flush=True,
         )
-    with answered(_STOPPING), sampling_bar(quiet or json) as progress:
+    with acknowledge_interrupt(_STOPPING), sampling_bar(output.is_silent) as progress:
         run = analyse(
             read_record(path),
             out,
@@ -158,34 +121,24 @@ def demo(
             command=ctx.meta["words"],
             progress=progress,
         )
-    _tell(ctx, run, {"record": path}, TRUTH, as_json=json)
+    return _answer(ctx, run, {"record": path, **run.files}, TRUTH, "the same command begins anew")
 
 
-def _tell(
-    ctx: typer.Context,
-    run: Run,
-    files: Mapping[str, Path],
-    truth: Mapping[str, float] | None = None,
-    *,
-    as_json: bool = False,
-    go_on: str = "the same command begins anew",
-) -> None:
-    """Print what came out; an interrupted run ends with the exit code of an interrupt all the same.
-
-    What is left out is among the verdicts; with --debug its traceback is on stderr.
-    """
+def _answer(
+    ctx: typer.Context, run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float], go_on: str
+) -> Answer:
+    """What came out; what is left out is among the verdicts, and with --debug its traceback is on stderr."""
     if run.left_out:
         _trace_back(run, in_full=ctx.find_root().params["debug"])
-    if as_json:
-        print_json(_numbers(run, {**files, **run.files}, truth))
-    else:
-        _print_run(run, files, truth)
-    if "interrupted" in run.posterior.attrs["message"]:
-        typer.echo(f"tactile-bayes: interrupted, results are of what was drawn by then: {go_on}", err=True)
-        raise typer.Exit(130)
+    interrupted = "interrupted" in run.posterior.attrs["message"]
+    return Answer(
+        _words(run, files, truth),
+        lambda: _numbers(run, files, truth),
+        interrupted=f"interrupted, results are of what was drawn by then: {go_on}" if interrupted else "",
+    )
 
 
-def _trace_back(run: Run, *, in_full: bool) -> None:
+def _trace_back(run: ContourRun, *, in_full: bool) -> None:
     import traceback
 
     if in_full:
@@ -196,7 +149,7 @@ def _trace_back(run: Run, *, in_full: bool) -> None:
         typer.echo(f"tactile-bayes: left out: {names}; tactile-bayes --debug ... shows where that comes from", err=True)
 
 
-def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None) -> dict[str, Any]:
+def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> dict[str, Any]:
     attrs = run.posterior.attrs
     rows = columns_of(run.summary, "quantity")
     if truth:
@@ -220,16 +173,30 @@ def _numbers(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | N
     return answer
 
 
-def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] | None = None) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    numbers = run.summary
-    share = f"{numbers.attrs['probability']:.0%}"
-    table = Table(box=None, pad_edge=False)
+def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> Iterator[Any]:
+    yield from run.verdicts
+    share = f"{run.summary.attrs['probability']:.0%}"
     heads = ["quantity", *(["truth"] if truth else []), "estimate", f"{share} from", "to", "unit", "R̂", "eff. draws"]
-    for head in heads:
-        table.add_column(head, justify="left" if head in ("quantity", "unit") else "right")
+    yield ""
+    yield table_of(heads, _rows(run, truth), left=["quantity", "unit"], may_wrap=True)
+    attrs = run.posterior.attrs
+    if attrs["converged"]:  # else it is among the verdicts
+        yield attrs["message"]
+    if run.contacts is not None:
+        fates = Counter(run.contacts.status.values.tolist()).most_common()
+        words = "Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates)
+        chance = run.contacts.attrs.get("misfit_probability")
+        if chance is not None and chance == chance:
+            words += f"; noise of the size that was found explains their misfit with probability {chance:.2g}"
+        yield words
+    elif "contacts" not in run.left_out:  # else it is said above
+        yield "No contact points: Step 2 needs all three load channels."
+    yield ""
+    yield files
+
+
+def _rows(run: ContourRun, truth: Mapping[str, float]) -> Iterable[list[str]]:
+    numbers = run.summary
     for name in numbers.quantity.values:
         if name.startswith("z_"):  # a direction of a random function, which says nothing by itself
             continue
@@ -239,34 +206,10 @@ def _print_run(run: Run, files: Mapping[str, Path], truth: Mapping[str, float] |
         true = [f"{truth[name]:.{digits}f}" if name in truth else ""] if truth else []
         ess = min(float(row["ess_bulk"]), float(row["ess_tail"]))
         checks = ["", ""] if ess != ess else [f"{float(row['r_hat']):.3f}", f"{ess:.0f}"]
-        unit = "" if str(row["unit"].values) == "1" else str(row["unit"].values)
-        table.add_row(str(name), *true, *shown, unit, *checks)
-    console = Console()
-    for verdict in run.verdicts:
-        console.print(verdict, markup=False, highlight=False, soft_wrap=True)
-    console.print()
-    console.print(table)
-    attrs = run.posterior.attrs
-    if attrs["converged"]:  # else it is among the verdicts
-        console.print(attrs["message"], highlight=False, soft_wrap=True)
-    if "contacts" in run.left_out:
-        pass  # said above
-    elif run.contacts is None:
-        console.print("No contact points: Step 2 needs all three load channels.")
-    else:
-        fates = Counter(run.contacts.status.values.tolist()).most_common()
-        words = "Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates)
-        chance = run.contacts.attrs.get("misfit_probability")
-        if chance is not None and chance == chance:
-            words += f"; noise of the size that was found explains their misfit with probability {chance:.2g}"
-        console.print(words, highlight=False, soft_wrap=True)
-    console.print()
-    for what, path in {**files, **run.files}.items():
-        console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)
+        unit = str(row["unit"].values)
+        yield [str(name), *true, *shown, "" if unit == "1" else unit, *checks]
 
 
 def _digits(width: float) -> int:
     """Decimals that show an interval of this width to two figures."""
-    import math
-
     return max(0, min(12, 1 - math.floor(math.log10(width)))) if width > 0.0 else 6

@@ -1,72 +1,68 @@
-"""The answer of a command: sentences and files for people, or one JSON object for programs."""
+"""The answer of a command: sentences, tables and files for people, or one JSON object for programs."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable
 
     from rich.table import Table
 
-__all__ = ["Json", "columns_of", "plain", "print_files", "print_json", "print_sentences", "print_table", "table_of"]
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object in place of sentences.")]
+__all__ = ["Answer", "columns_of", "print_answer", "table_of"]
 
 
-def print_json(answer: Mapping[str, Any]) -> None:
-    """Print one JSON object; what is no finite number is null."""
-    import json
+@dataclass(frozen=True)
+class Answer:
+    """What a command has found.
 
-    typer.echo(json.dumps(plain(answer), ensure_ascii=False, indent=2, allow_nan=False))
+    Attributes
+    ----------
+    words : iterable of str, Table, or mapping of str to Path
+        For people: sentences, tables, and files by what they hold, in their order.
+    numbers : callable
+        Returns the object for programs.
+    interrupted : str
+        Where an interrupt has cut the work short: what to do, which goes to stderr, with the exit code of an interrupt.
+    """
 
-
-def plain(value: Any) -> Any:
-    """The same in what JSON has: no arrays, no paths, and null for what is no finite number."""
-    if isinstance(value, dict) or hasattr(value, "items"):
-        return {str(name): plain(part) for name, part in value.items()}
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "tolist"):  # arrays and numbers of NumPy and xarray
-        value = value.values.tolist() if hasattr(value, "values") else value.tolist()
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def columns_of(dataset: Any, dim: str) -> list[dict[str, Any]]:
-    """A row for every place along a dimension, of the coordinate and of all that lies along this dimension alone."""
-    names = [dim, *(str(name) for name, values in dataset.data_vars.items() if values.dims == (dim,))]
-    return [{name: dataset[name].values[i] for name in names} for i in range(dataset.sizes[dim])]
+    words: Iterable[str | Table | Mapping[str, Path]]
+    numbers: Callable[[], Mapping[str, Any]]
+    interrupted: str = ""
 
 
-def print_sentences(sentences: Iterable[str]) -> None:
-    """Print sentences, each on a line of its own, however long."""
-    for sentence in sentences:
-        typer.echo(sentence)
+def print_answer(answer: Answer, as_json: bool) -> None:
+    """Print an answer in words, or as one JSON object in which null stands for what is no finite number."""
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(_plain(answer.numbers()), ensure_ascii=False, indent=2, allow_nan=False))
+    else:
+        for part in answer.words:
+            _print_part(part)
+    if answer.interrupted:
+        typer.echo(f"tactile-bayes: {answer.interrupted}", err=True)
+        raise typer.Exit(130)
 
 
-def print_files(files: Mapping[str, Path], width: int = 12) -> None:
-    """Print what is in which file."""
-    for what, path in files.items():
-        typer.echo(f"{what:<{width}} {path}")
+def _print_part(part: str | Table | Mapping[str, Path]) -> None:
+    if isinstance(part, str):
+        typer.echo(part)
+    elif isinstance(part, Mapping):
+        width = max(12, *map(len, part))
+        for what, path in part.items():
+            typer.echo(f"{what:<{width}} {path}")
+    else:
+        _print_table(part)
 
 
-def table_of(heads: Iterable[str], *, left: Iterable[str] = ()) -> Table:
-    """An empty table without frame, with numbers to the right."""
-    from rich.table import Table
-
-    table, to_the_left = Table(box=None, pad_edge=False), set(left)
-    for head in heads:
-        table.add_column(head, justify="left" if head in to_the_left else "right", no_wrap=True)
-    return table
-
-
-def print_table(table: Table) -> None:
+def _print_table(table: Table) -> None:
     """Print a table, whole, also where no terminal says how wide it may be."""
     from rich.console import Console
 
@@ -74,3 +70,39 @@ def print_table(table: Table) -> None:
     if not console.is_terminal:
         console.width = max(console.width, 100)
     console.print(table, highlight=False)
+
+
+def table_of(
+    heads: Iterable[str], rows: Iterable[Iterable[str]], *, left: Iterable[str] = (), may_wrap: bool = False
+) -> Table:
+    """A table without frame, with numbers to the right."""
+    from rich.table import Table
+
+    table, to_the_left = Table(box=None, pad_edge=False), set(left)
+    for head in heads:
+        table.add_column(head, justify="left" if head in to_the_left else "right", no_wrap=not may_wrap)
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def columns_of(dataset: Any, dim: str) -> list[dict[str, Any]]:
+    """A row for every place along a dimension, of the coordinate and of all that lies along this dimension alone."""
+    columns = {dim: dataset[dim], **dataset.data_vars, **dataset.coords}
+    table = {name: values.values for name, values in columns.items() if values.dims == (dim,)}
+    return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
+
+
+def _plain(value: Any) -> Any:
+    """The same in what JSON has: no arrays, no paths, and null for what is no finite number."""
+    if hasattr(value, "items"):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "values"):  # of xarray
+        value = value.values
+    if hasattr(value, "tolist"):  # arrays and numbers of NumPy
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ from typer.core import TyperGroup
 
 from tactile_bayes.cli.analysis import demo, infer
 from tactile_bayes.cli.calibration import calibrate
+from tactile_bayes.cli.command import as_command
 from tactile_bayes.cli.comparison import compare
 from tactile_bayes.cli.dataset import dataset
 from tactile_bayes.cli.design import design
@@ -22,7 +24,9 @@ from tactile_bayes.cli.scanning import scan
 from tactile_bayes.cli.sensitivity import sensitivity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+    from tactile_bayes.cli.answer import Answer
 
 __all__ = ["app", "main"]
 
@@ -108,28 +112,29 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.command(epilog="Example: tactile-bayes scan --profile II --distance 0.5 --out ideal.csv")(scan)
-app.command(
-    epilog="Example: tactile-bayes measure ideal.csv --force-noise 0.05 --moment-noise 0.02 --out measured.csv"
-)(measure)
-app.command(
-    epilog="Example: tactile-bayes inspect rig.csv --length 0.2 --flexural-rigidity 0.0024 --split-sweeps "
-    "--column 'force_x=Fx[mN]' --out inspection/"
-)(inspect)
-app.command(epilog="Example: tactile-bayes reconstruct record.csv --out contacts/")(reconstruct)
-app.command(epilog="Example: tactile-bayes infer record.csv --family parabola --out run/")(infer)
-app.command(epilog="Example: tactile-bayes compare record.csv --out run/")(compare)
-app.command(epilog="Example: tactile-bayes calibrate --family parabola --replicates 200 --out calibration/")(calibrate)
-app.command(epilog="Example: tactile-bayes sensitivity --profile II --distance 0.5 --out sensitivity/")(sensitivity)
-app.command(epilog="Example: tactile-bayes design run/ --base 0.05,0 --base 0.1,0 --out design/")(design)
-app.command(epilog="Example: tactile-bayes figures --only 3 --distance 0.4 --format pdf --out figures/")(figures)
-app.command(epilog="Example: tactile-bayes report run/")(report)
-app.command(epilog="Example: tactile-bayes demo --out results/demo")(demo)
+_EXAMPLES: dict[Callable[..., Answer], str] = {
+    scan: "scan --profile II --distance 0.5 --out ideal.csv",
+    measure: "measure ideal.csv --force-noise 0.05 --moment-noise 0.02 --out measured.csv",
+    inspect: "inspect rig.csv --length 0.2 --flexural-rigidity 0.0024 --split-sweeps --column 'force_x=Fx[mN]' "
+    "--out inspection/",
+    reconstruct: "reconstruct record.csv --out contacts/",
+    infer: "infer record.csv --family parabola --out run/",
+    compare: "compare record.csv --out run/",
+    calibrate: "calibrate --family parabola --replicates 200 --out calibration/",
+    sensitivity: "sensitivity --profile II --distance 0.5 --out sensitivity/",
+    design: "design run/ --base 0.05,0 --base 0.1,0 --out design/",
+    figures: "figures --only 3 --distance 0.4 --format pdf --out figures/",
+    report: "report run/",
+    demo: "demo --out results/demo",
+}
+for _function, _example in _EXAMPLES.items():
+    app.command(epilog=f"Example: tactile-bayes {_example}")(as_command(_function))
 app.add_typer(dataset, name="dataset")
 
 
 def main() -> None:
     """Entry point."""
+    os.environ["MPLBACKEND"] = "agg"  # figures go to files, whether or not there is a screen
     app()
 
 

@@ -6,51 +6,35 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.answer import Json, columns_of, print_json, print_sentences, print_table, table_of
-from tactile_bayes.cli.interrupts import going_on
-from tactile_bayes.cli.numbers import load_cell_asked, numbers_asked
-from tactile_bayes.cli.record_options import (
-    AsStated,
-    KnownFriction,
-    Nuisances,
-    Out,
-    Quiet,
-    Seed,
-    nuisances_asked,
-    rod_asked,
-)
-from tactile_bayes.cli.simulated_rig_options import Bases, Diameter, FlexuralRigidity, ForceNoise, Length, MomentNoise
-from tactile_bayes.cli.task_bar import task_bar
-from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
+from tactile_bayes.cli.answer import Answer, columns_of, table_of
+from tactile_bayes.cli.command import Out, Output, Seed
+from tactile_bayes.cli.numbers import assigned, numbers_asked
+from tactile_bayes.cli.rig_options import NoiseOptions, RigOptions, UnknownOptions
+from tactile_bayes.cli.task_bar import resumable_bar
+from tactile_bayes.cli.worker_options import WorkerOptions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import xarray as xr
+    from rich.table import Table
 
     from tactile_bayes.calibration.replicate import Replicate
     from tactile_bayes.calibration.world import World
-    from tactile_bayes.ledger import TaskProgress
-    from tactile_bayes.runs.calibration import CalibrationRun
 
 __all__ = ["calibrate"]
 
 
 def calibrate(
+    *,
     ctx: typer.Context,
     out: Out,
     family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
     replicates: Annotated[int, typer.Option(help="How many records.", min=1)] = 200,
-    force_noise: ForceNoise = None,
-    moment_noise: MomentNoise = None,
-    length: Length = None,
-    flexural_rigidity: FlexuralRigidity = None,
-    diameter: Diameter = 0.0,
-    base: Bases = None,
+    noise: NoiseOptions,
+    rig: RigOptions,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 2.0,
-    friction: KnownFriction = None,
-    nuisance: Nuisances = None,
-    as_stated: AsStated = False,
+    unknown: UnknownOptions,
     world: Annotated[
         list[str] | None,
         typer.Option(
@@ -60,8 +44,7 @@ def calibrate(
         ),
     ] = None,
     probability: Annotated[float, typer.Option(help="Of the bands and regions that are judged.")] = 0.9,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    work: WorkerOptions,
     seed: Seed = 1,
     replicate: Annotated[
         int | None,
@@ -72,9 +55,8 @@ def calibrate(
     debug: Annotated[
         bool, typer.Option("--debug", help="Show where an error comes from; with --replicate, the one that lost it.")
     ] = False,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """Show whether intervals hold: simulate records, infer from each, and compare with the truth.
 
     A run that was stopped goes on by the same command; with more replicates it begins with those that are there. An
@@ -84,117 +66,89 @@ def calibrate(
 
     from tactile_bayes.runs.calibration import calibrate_into
 
-    refuse_both(workers, scheduler)
     common = ctx.find_root().params
     common["debug"] = common["debug"] or debug
     experiment: dict[str, Any] = {
         "family": family,
-        "load_cell": load_cell_asked(force_noise, moment_noise),
-        "rod": rod_asked(length, flexural_rigidity, diameter),
-        "base": [numbers_asked(pivot, "--base", 2) for pivot in base or ["0,0"]],
+        "load_cell": noise.load_cell,
+        "rod": rig.rod,
+        "base": rig.pivots,
         "drive_angles": np.radians(np.arange(-30.0, 210.0 + 0.5 * drive_step, drive_step)),
-        "friction": friction,
-        "nuisances": nuisances_asked(nuisance, as_stated),
-        "world": _world(world or []),
+        "friction": unknown.friction,
+        "nuisances": unknown.nuisances,
+        "world": _world(world),
         "probability": probability,
         "seed": seed,
     }
     if replicate is not None:
         from tactile_bayes.calibration.calibrate import calibration_replicate
 
-        _print_replicate(calibration_replicate(replicate, out=out, throw=common["debug"], **experiment), json)
-        return
-    last: TaskProgress | None = None
+        return _of_replicate(calibration_replicate(replicate, out=out, throw=common["debug"], **experiment))
 
-    def have() -> str:
-        return f"{last.done:,} of {replicates:,} replicates are in {out}" if last else "no further replicate was done"
-
-    with going_on(have) as raise_lost, task_bar(replicates, "replicate", quiet or json) as show:
-
-        def note(calibrating: TaskProgress) -> None:
-            nonlocal last
-            last = calibrating
-            show(calibrating.done)
-            raise_lost()
-
-        run = calibrate_into(
-            out,
-            replicates=replicates,
-            workers=workers,
-            scheduler=scheduler,
-            progress=note,
-            **experiment,
+    def have(done: int | None) -> str:
+        return (
+            "no further replicate was done" if done is None else f"{done:,} of {replicates:,} replicates are in {out}"
         )
-    if json:
-        found = run.calibration
-        names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
-        told = {"words": [found.attrs["verdict"]], **{name: found.attrs[name] for name in names}}
-        print_json({**told, "claims": columns_of(found, "claim"), "files": run.files})
-        return
-    _print_run(run)
+
+    with resumable_bar(replicates, "replicate", output.is_silent, have) as note:
+        run = calibrate_into(
+            out, replicates=replicates, progress=lambda calibrating: note(calibrating.done), **vars(work), **experiment
+        )
+    found = run.result
+    names = ("conclusion", "lost", "probability", "power", "noticed_shift", "noticed_narrow", "noticed_wide")
+    return Answer(
+        [found.attrs["verdict"], "", _table(found), "", run.files],
+        lambda: {
+            "words": [found.attrs["verdict"]],
+            **{name: found.attrs[name] for name in names},
+            "claims": columns_of(found, "claim"),
+            "files": run.files,
+        },
+    )
 
 
-def _world(options: Sequence[str]) -> World:
+def _world(options: Sequence[str] | None) -> World:
     from tactile_bayes.calibration.world import NUMBERS, World
-    from tactile_bayes.errors import ParameterError
 
     given: dict[str, Any] = {}
-    for option in options:
-        name, equals, value = (part.strip() for part in option.partition("="))
-        if not equals or name not in NUMBERS:
-            raise ParameterError(f"--world {option}: write NAME=VALUE, with one of {', '.join(NUMBERS)}")
+    for name, value in assigned("--world", options, known=NUMBERS).items():
         numbers = numbers_asked(value, f"--world {name}", NUMBERS[name])
         given[name] = numbers[0] if NUMBERS[name] == 1 else numbers
     return World(**given)
 
 
-def _print_run(run: CalibrationRun) -> None:
-    from rich.console import Console
-
-    console = Console()
-    found = run.calibration
-    console.print(found.attrs["verdict"], markup=False, highlight=False, soft_wrap=True)
-    console.print()
-    console.print(_table(found))
-    console.print()
-    for what, path in run.files.items():
-        console.print(f"{what:<12} {path}", highlight=False, soft_wrap=True)
-
-
-def _print_replicate(made: Replicate, json: bool) -> None:
+def _of_replicate(made: Replicate) -> Answer:
     outcome = made.outcome
-    if json:
-        print_json({"number": made.number, "lost": outcome.is_lost, "truth": made.truth, **outcome._asdict()})
-        return
-    how = f"was lost: {outcome.message}. --debug shows where" if outcome.is_lost else f"is done: {outcome.message}"
-    print_sentences([f"Replicate {made.number} {how}.", ""])
-    quantities = table_of(["quantity", "truth", "rank"], left=["quantity"])
-    for name in dict.fromkeys([*made.truth, *outcome.ranks]):
-        truth = f"{made.truth[name]:.6g}" if name in made.truth else ""
-        quantities.add_row(name, truth, str(outcome.ranks.get(name, "")))
-    numbers = table_of(["number", "value"], left=["number"])
-    for name, value in outcome.numbers.items():
-        if value == value:  # NaN is what could not be had
-            numbers.add_row(name, f"{value:.6g}")
-    for table in (quantities, numbers):
-        if table.row_count:
-            print_table(table)
-            print_sentences([""])
+
+    def words() -> Iterator[str | Table]:
+        how = f"was lost: {outcome.message}. --debug shows where" if outcome.is_lost else f"is done: {outcome.message}"
+        yield f"Replicate {made.number} {how}."
+        quantities = [
+            (name, f"{made.truth[name]:.6g}" if name in made.truth else "", str(outcome.ranks.get(name, "")))
+            for name in dict.fromkeys([*made.truth, *outcome.ranks])
+        ]
+        # NaN is what could not be had
+        numbers = [(name, f"{value:.6g}") for name, value in outcome.numbers.items() if value == value]
+        yield ""
+        if quantities:
+            yield from (table_of(["quantity", "truth", "rank"], quantities, left=["quantity"]), "")
+        if numbers:
+            yield from (table_of(["number", "value"], numbers, left=["number"]), "")
+
+    return Answer(
+        words(),
+        lambda: {"number": made.number, "lost": outcome.is_lost, "truth": made.truth, **outcome._asdict()},
+    )
 
 
-def _table(found: xr.Dataset) -> object:
-    from rich.table import Table
-
+def _table(found: xr.Dataset) -> Table:
     from tactile_bayes.calibration.summary import CLAIMS
 
-    table = Table(box=None, pad_edge=False)
-    table.add_column(f"stated with {found.attrs['probability']:.0%}", no_wrap=True)
-    table.add_column("holds in", justify="right", no_wrap=True)
-    table.add_column("of replicates", justify="right", no_wrap=True)
-    for name in found.claim.values:
-        row = found.sel(claim=name)
-        share, error, count = float(row.coverage), float(row.coverage_error), int(row.coverage_replicates)
+    rows = []
+    for row in columns_of(found, "claim"):
+        error, count = row["coverage_error"], row["coverage_replicates"]
         if count:
-            told = f"{share:.1%}" + (f" ± {error:.1%}" if error == error else "")
-            table.add_row(CLAIMS[str(name)], told, f"{count:,}")
-    return table
+            held = f"{row['coverage']:.1%}" + (f" ± {error:.1%}" if error == error else "")
+            rows.append((CLAIMS[row["claim"]], held, f"{count:,}"))
+    stated = f"stated with {found.attrs['probability']:.0%}"
+    return table_of([stated, "holds in", "of replicates"], rows, left=[stated])

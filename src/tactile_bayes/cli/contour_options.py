@@ -2,109 +2,100 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from tactile_bayes.cli.numbers import assigned, numbers_asked
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from tactile_bayes.contours import Contour
 
-__all__ = ["Distance", "Family", "Parameters", "Points", "Profile", "contour_asked"]
-
-Profile = Annotated[
-    Literal["I", "II", "III", "IV"] | None,
-    typer.Option(help="Profile of Merker et al. 2018, scaled to the rod; by default II."),
-]
-Distance = Annotated[
-    float | None, typer.Option(help="Of the profile's vertex above the x axis [rod lengths]; by default 0.5.")
-]
-Family = Annotated[
-    str | None,
-    typer.Option(
-        help="In place of a profile: parabola, circle, ellipse, power-law, or one for each flank: parabola/power-law."
-    ),
-]
-Parameters = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Of the family, by the names and in the units that infer prints: a=0.7, q=0.5; give it again for another. "
-        "x_c is 0 if it is left out."
-    ),
-]
-Points = Annotated[
-    Path | None,
-    typer.Option(
-        help="In place of both, measured points of a contour: a CSV file of x and y [m, or L], which may scatter.",
-        dir_okay=False,
-    ),
-]
+__all__ = ["ContourOptions"]
 
 
-def contour_asked(
-    profile: Literal["I", "II", "III", "IV"] | None,
-    distance: float | None,
-    family: str | None,
-    parameters: Sequence[str] | None,
-    points: Path | None,
-    *,
-    rod_length: float,
-) -> Contour:
-    """The contour that the options choose.
+@dataclass(frozen=True)
+class ContourOptions:
+    """A contour: a profile, one of a family, or measured points."""
 
-    Raises
-    ------
-    ParameterError
-        If they choose more than one, or not all of it.
-    ContourError
-        If there is no such contour.
-    """
-    from tactile_bayes.contours import from_points, paper_profile
-    from tactile_bayes.errors import ParameterError
-    from tactile_bayes.planning.family_parameters import enlarged
+    profile: Annotated[
+        Literal["I", "II", "III", "IV"] | None,
+        typer.Option(help="Profile of Merker et al. 2018, scaled to the rod; by default II."),
+    ] = None
+    distance: Annotated[
+        float | None, typer.Option(help="Of the profile's vertex above the x axis [rod lengths]; by default 0.5.")
+    ] = None
+    family: Annotated[
+        str | None,
+        typer.Option(
+            help="In place of a profile: parabola, circle, ellipse, power-law, or one for each flank: "
+            "parabola/power-law."
+        ),
+    ] = None
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Of the family, by the names and in the units that infer prints: a=0.7, q=0.5; give it again for "
+            "another. x_c is 0 if it is left out."
+        ),
+    ] = None
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            help="In place of both, measured points of a contour: a CSV file of x and y [m, or L], which may scatter.",
+            dir_okay=False,
+        ),
+    ] = None
 
-    of_profile = profile is not None or distance is not None
-    if of_profile + (family is not None) + (points is not None) > 1:
-        raise ParameterError("--profile with --distance, --family and --points exclude each other: give one of them")
-    if parameters and family is None:
-        raise ParameterError("--parameter is for a --family: give one, like --family parabola")
-    if points is not None:
-        return from_points(*_read_points(points))
-    if family is not None:
-        return _of_family(family, parameters or [])
-    return enlarged(paper_profile(profile or "II", q=0.5 if distance is None else distance), rod_length)
+    def contour(self, rod_length: float) -> Contour:
+        """The contour that the options choose.
+
+        Raises
+        ------
+        ParameterError
+            If they choose more than one, or not all of it.
+        ContourError
+            If there is no such contour.
+        """
+        from tactile_bayes.contours import from_points, paper_profile
+        from tactile_bayes.errors import ParameterError
+        from tactile_bayes.planning.family_parameters import enlarged
+
+        of_profile = self.profile is not None or self.distance is not None
+        if of_profile + (self.family is not None) + (self.points is not None) > 1:
+            raise ParameterError(
+                "--profile with --distance, --family and --points exclude each other: give one of them"
+            )
+        if self.parameter and self.family is None:
+            raise ParameterError("--parameter is for a --family: give one, like --family parabola")
+        if self.points is not None:
+            return from_points(*_read_points(self.points))
+        if self.family is not None:
+            return _of_family(self.family, self.parameter)
+        return enlarged(
+            paper_profile(self.profile or "II", q=0.5 if self.distance is None else self.distance), rod_length
+        )
 
 
-def _of_family(name: str, options: Sequence[str]) -> Contour:
+def _of_family(name: str, options: Sequence[str] | None) -> Contour:
     from tactile_bayes.contours.families import family_named
     from tactile_bayes.errors import ParameterError
 
     family = family_named(name)
     if family.roughness:
         raise ParameterError(f"--family {name}: such a contour is no few numbers, so give --points")
-    values = {"x_c": 0.0, **_numbers(options, family.parameters)}
+    values = {"x_c": 0.0}
+    for parameter, value in assigned("--parameter", options, known=family.parameters).items():
+        (values[parameter],) = numbers_asked(value, f"--parameter {parameter}", 1)
     absent = [parameter for parameter in family.parameters if parameter not in values]
     if absent:
         like = " ".join(f"--parameter {parameter}=..." for parameter in absent)
         raise ParameterError(f"--family {name} takes {', '.join(family.parameters)}: give {like} as well")
     return family.contour(values)
-
-
-def _numbers(options: Sequence[str], known: Sequence[str]) -> Mapping[str, float]:
-    from tactile_bayes.cli.numbers import numbers_asked
-    from tactile_bayes.errors import ParameterError
-
-    values: dict[str, float] = {}
-    for option in options:
-        name, equals, value = (part.strip() for part in option.partition("="))
-        if not equals or name not in known:
-            raise ParameterError(f"--parameter {option}: write NAME=VALUE, with one of {', '.join(known)}")
-        if name in values:
-            raise ParameterError(f"--parameter {name}= is given twice: keep one of them")
-        (values[name],) = numbers_asked(value, f"--parameter {name}", 1)
-    return values
 
 
 def _read_points(path: Path) -> tuple[list[float], list[float]]:

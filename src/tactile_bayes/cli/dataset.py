@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.answer import Json, print_json
-from tactile_bayes.cli.interrupts import going_on
-from tactile_bayes.cli.record_options import Quiet
-from tactile_bayes.cli.task_bar import counted, step_bar, task_bar
-from tactile_bayes.cli.worker_options import Scheduler, Workers, refuse_both
+from tactile_bayes.cli.answer import Answer
+from tactile_bayes.cli.command import Output, as_command
+from tactile_bayes.cli.task_bar import counted, resumable_bar, step_bar
+from tactile_bayes.cli.worker_options import WorkerOptions
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tactile_bayes.datasets import Production
     from tactile_bayes.datasets.manifest import Manifest
 
@@ -40,16 +41,16 @@ def example() -> None:
 
 
 @dataset.command(epilog="Example: tactile-bayes dataset generate set.toml --out set/")
+@as_command
 def generate(
+    *,
     specification: Annotated[
         Path, typer.Argument(metavar="SPEC.toml", help="What to draw, sweep and measure: see dataset example.")
     ],
     out: Annotated[Path, typer.Option(help="Folder for the data set; made if it is not there.", file_okay=False)],
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    work: WorkerOptions,
+    output: Output,
+) -> Answer:
     """Make a data set, or go on where a run stopped.
 
     The same specification gives the same numbers, however many workers there are.
@@ -57,73 +58,69 @@ def generate(
     from tactile_bayes import datasets
     from tactile_bayes.datasets.manifest import read_manifest
 
-    refuse_both(workers, scheduler)
     spec = datasets.read_specification(specification)
     last: Production | None = None
 
-    def have() -> str:
-        return f"{last.records:,} of {spec.records:,} records are in {out}" if last else "no further file was finished"
+    def have(done: int | None) -> str:
+        return "no further file was finished" if done is None else f"{done:,} of {spec.records:,} records are in {out}"
 
-    with going_on(have) as raise_lost, task_bar(spec.records, "record", quiet or json) as show:
+    with resumable_bar(spec.records, "record", output.is_silent, have) as note:
 
-        def note(production: Production) -> None:
+        def progress(production: Production) -> None:
             nonlocal last
             last = production
-            show(production.records)
-            raise_lost()
+            note(production.records)
 
-        datasets.generate(spec, out, workers=workers, scheduler=scheduler, progress=note)
-    if json:
-        print_json(_numbers(out, read_manifest(out)) | {"made": last.made if last else 0})
-        return
-    _print_result(out, read_manifest(out), last)
+        datasets.generate(spec, out, progress=progress, **vars(work))
+    manifest = read_manifest(out)
+    return Answer(_words(out, manifest, last), lambda: {**_numbers(out, manifest), "made": last.made if last else 0})
 
 
 @dataset.command(epilog="Example: tactile-bayes dataset verify set/ --regenerate 3")
+@as_command
 def verify(
+    *,
     folder: Folder,
     regenerate: Annotated[int, typer.Option(help="Files to be made again, and compared number by number.", min=0)] = 0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """Check every byte of a data set.
 
     Files are compared with the checksums in the manifest, which also says what the data set was made from.
     """
     from tactile_bayes import datasets
 
-    with step_bar(quiet or json, "file", at_first="files to be read") as show:
+    with step_bar(output.is_silent, "file", at_first="files to be read") as show:
         manifest = datasets.verify(folder, regenerate=regenerate, progress=lambda verified: show(*verified))
     count = len(manifest.shards)
-    if json:
-        print_json({**_numbers(folder, manifest), "verified": True, "made_again": min(regenerate, count)})
-        return
-    typer.echo(f"{folder}: {_records(manifest.records)} in {_files(count)}, every byte as it was written")
-    if regenerate:
-        typer.echo(f"{_files(min(regenerate, count))} made again: every number is the same")
+    again = min(regenerate, count)
+    read = f"{folder}: {counted(manifest.records, 'record')} in {counted(count, 'file')}, every byte as it was written"
+    compared = [f"{counted(again, 'file')} made again: every number is the same"] if regenerate else []
+    return Answer([read, *compared], lambda: {**_numbers(folder, manifest), "verified": True, "made_again": again})
 
 
 @dataset.command(epilog="Example: tactile-bayes dataset record set/ 0 --out record.csv")
+@as_command
 def record(
+    *,
     source: Annotated[Path, typer.Argument(help="Folder of the data set, or its specification, .toml.")],
     index: Annotated[int, typer.Argument(help="Number of the record; the first is 0.")],
     out: Annotated[Path, typer.Option(help="File for the record, .csv or .nc.", dir_okay=False)],
     truth: Annotated[
         bool, typer.Option("--truth/--no-truth", help="With the columns of the truth, or as a laboratory has it.")
     ] = True,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """Write one record to a file, as `infer` takes it."""
     from tactile_bayes import datasets, write_record
 
     found = datasets.record(source, index, truth=truth)
     write_record(found, out)
-    if json:
-        files = {"record": out}
-        print_json({"index": index, "samples": found.sizes["sample"], "units": found.attrs["units"], "files": files})
-        return
-    typer.echo(f"record {index} of {source}, {found.sizes['sample']} samples: {out}")
+    samples = found.sizes["sample"]
+    return Answer(
+        [f"record {index} of {source}, {samples} samples: {out}"],
+        lambda: {"index": index, "samples": samples, "units": found.attrs["units"], "files": {"record": out}},
+    )
 
 
 def _numbers(folder: Path, manifest: Manifest) -> dict[str, Any]:
@@ -138,33 +135,20 @@ def _numbers(folder: Path, manifest: Manifest) -> dict[str, Any]:
     }
 
 
-def _print_result(out: Path, manifest: Manifest, last: Production | None) -> None:
+def _words(out: Path, manifest: Manifest, last: Production | None) -> Iterator[str]:
     size = sum(shard.bytes for shard in manifest.shards)
     made = "all were there already, by their sizes; dataset verify compares every byte"
     if last is not None:
-        made = f"{last.made:,} made in {last.seconds:.3g} s, {_rate(last)} records/s"
-    typer.echo(f"{_records(manifest.records)} in {_files(len(manifest.shards))}, {size / 1e6:,.1f} MB: {made}")
-    redrawn = manifest.redrawn
-    if total := sum(redrawn.values()):
-        why = ", ".join(f"{count:,} {reason}" for reason, count in redrawn.most_common())
-        typer.echo(f"{total:,} contours were drawn again: {why}")
+        rate = last.made / max(last.seconds, 1e-9)
+        made = f"{last.made:,} made in {last.seconds:.3g} s, {rate:,.0f} records/s"
+    files = counted(len(manifest.shards), "file")
+    yield f"{counted(manifest.records, 'record')} in {files}, {size / 1e6:,.1f} MB: {made}"
+    if total := sum(manifest.redrawn.values()):
+        why = ", ".join(f"{count:,} {reason}" for reason, count in manifest.redrawn.most_common())
+        yield f"{total:,} contours were drawn again: {why}"
     if manifest.strained:
-        typer.echo(
-            f"{_records(manifest.strained)} with a rod strained beyond the model: their loads are not to be trusted"
-        )
+        strained = counted(manifest.strained, "record")
+        yield f"{strained} with a rod strained beyond the model: their loads are not to be trusted"
     if manifest.untouched:
-        sweeps = f"{manifest.untouched:,} sweep{'s' * (manifest.untouched != 1)}"
-        typer.echo(f"{sweeps} without a sample in contact")
-    typer.echo(f"{out / 'README.md'} says what is in the files")
-
-
-def _rate(production: Production) -> str:
-    return f"{production.made / max(production.seconds, 1e-9):,.0f}"
-
-
-def _records(count: int) -> str:
-    return counted(count, "record")
-
-
-def _files(count: int) -> str:
-    return counted(count, "file")
+        yield f"{counted(manifest.untouched, 'sweep')} without a sample in contact"
+    yield f"{out / 'README.md'} says what is in the files"

@@ -8,29 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_bayes.cli.answer import Json, columns_of, print_files, print_json, print_sentences, print_table, table_of
-from tactile_bayes.cli.record_options import (
-    Columns,
-    Diameter,
-    FlexuralRigidity,
-    ForceNoise,
-    Friction,
-    Length,
-    LoadCellFrame,
-    Missing,
-    MomentNoise,
-    Quiet,
-    Record,
-    SplitSweeps,
-    origins_asked,
-    read_measurement,
-)
+from tactile_bayes.cli.answer import Answer, columns_of, table_of
+from tactile_bayes.cli.command import Output
+from tactile_bayes.cli.record_options import Record, RecordOptions
+from tactile_bayes.cli.rig_options import Friction
 from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     import xarray as xr
+    from rich.table import Table
 
     from tactile_bayes.inspection import Inspection
 
@@ -46,91 +34,61 @@ _SOURCES = {
 
 
 def inspect(
+    *,
     record: Record,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for a picture, tables and these words; made if it is not there.", file_okay=False),
     ] = None,
-    column: Columns = None,
-    split_sweeps: SplitSweeps = False,
-    length: Length = None,
-    flexural_rigidity: FlexuralRigidity = None,
-    diameter: Diameter = 0.0,
-    force_noise: ForceNoise = None,
-    moment_noise: MomentNoise = None,
-    missing: Missing = None,
-    load_cell_frame: LoadCellFrame = None,
+    reading: RecordOptions,
     friction: Friction = 0.0,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """Look at a record before anything is inferred: what is in the file, and what looks wrong, first.
 
     It takes the options of infer that say how a file is read; the last line is the command to go on with.
     """
-    with step_bar(quiet or json) as show:
+    with step_bar(output.is_silent) as show:
         from tactile_bayes.inspection import inspect_record
 
-        measured, cell, _ = read_measurement(
-            record,
-            column=column,
-            split_sweeps=split_sweeps,
-            length=length,
-            flexural_rigidity=flexural_rigidity,
-            diameter=diameter,
-            force_noise=force_noise,
-            moment_noise=moment_noise,
-            missing=missing,
-            load_cell_frame=load_cell_frame,
-            nuisance=None,
-            as_stated=False,
-        )
+        measured, cell = reading.read(record)
         found = inspect_record(measured, load_cell=cell, friction=friction, progress=show)
-        contents = _contents(found, column)
+        contents = _contents(found, reading.origins)
         files: Mapping[str, Path] = {}
         if out is not None:
             from tactile_bayes.runs.inspection import write_inspection
 
             files = write_inspection(found, out, text=["", *contents])
-    taken = {
-        **{f"--column {shlex.quote(origin)}": True for origin in column or []},
-        "--split-sweeps": split_sweeps,
-        "--length": length,
-        "--flexural-rigidity": flexural_rigidity,
-        "--diameter": diameter or None,
-        "--force-noise": force_noise,
-        "--moment-noise": moment_noise,
-        **{f"--missing {name}": True for name in missing or []},
-        "--load-cell-frame": load_cell_frame,
-        "--friction": friction or None,
-    }
-    again = f"tactile-bayes infer {shlex.quote(str(record))}{_as_options(taken)} --out run/"
-    if json:
-        print_json(_numbers(found, again, files))
-        return
-    print_sentences([*found.words, "", *contents, ""])
-    print_table(_sweeps(found.sweeps))
-    print_sentences([""])
-    print_table(_channels(found.channels))
-    print_sentences(["", *_fates(found)])
+    again = f"tactile-bayes infer {shlex.quote(str(record))}{_as_options(reading, friction)} --out run/"
+    return Answer(_words(found, contents, again, files), lambda: _numbers(found, again, files))
+
+
+def _words(found: Inspection, contents: list[str], again: str, files: Mapping[str, Path]) -> Iterator[Any]:
+    yield from (*found.words, "", *contents, "", _sweeps(found.sweeps), "", _channels(found.channels), "")
+    if found.statuses:
+        yield "Raw Step 2: " + ", ".join(f"{count} {fate}" for fate, count in found.statuses.items())
+    else:
+        yield "No Step 2, which needs all three load channels; infer works without."
     if files:
-        print_sentences([""])
-        print_files(files)
-    first = "Once that is mended" if found.is_suspect else "Next"
-    print_sentences(["", f"{first}: {again}"])
+        yield from ("", files)
+    yield from ("", f"{'Once that is mended' if found.is_suspect else 'Next'}: {again}")
 
 
-def _as_options(given: Mapping[str, Any]) -> str:
-    words = (name if value is True else f"{name} {value}" for name, value in given.items() if value)
-    return "".join(f" {word}" for word in words)
+def _as_options(reading: RecordOptions, friction: float) -> str:
+    """The options that were given, as words of a command."""
+    words = ""
+    for name, value in {**vars(reading), "friction": friction}.items():
+        option = f" --{name.replace('_', '-')}"
+        for part in value if isinstance(value, list) else [value] if value else []:
+            words += option if part is True else f"{option} {shlex.quote(str(part))}"
+    return words
 
 
-def _contents(found: Inspection, column: Sequence[str] | None) -> list[str]:
-    """What is in the file, but for its sweeps and channels; `column` is what the option says."""
+def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
+    """What is in the file, except its sweeps and channels; origins are what the options say of columns."""
     from tactile_bayes.inspection.words import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
-    origins = origins_asked(column or [])
     record, rod = found.record, rod_of(found.record)
     sweeps = found.sweeps.sizes["sweep"]
     if record.attrs["units"] == "SI":
@@ -155,7 +113,7 @@ def _contents(found: Inspection, column: Sequence[str] | None) -> list[str]:
     ]
 
 
-def _sweeps(sweeps: xr.Dataset) -> Any:
+def _sweeps(sweeps: xr.Dataset) -> Table:
     """Angles in degrees; contact between the samples beside its ends."""
     import numpy as np
 
@@ -163,24 +121,24 @@ def _sweeps(sweeps: xr.Dataset) -> Any:
     with_pivots = set(pivots) != {"0,0"}
     unit = sweeps.base_x.attrs["units"]
     base = "base" if unit == "1" else f"base [{unit}]"
-    heads = ["sweep", *([base] if with_pivots else []), "samples", "drive [°]", "step", "touches", "lets go"]
-    table = table_of([*heads, "unloaded"], left=["sweep"])
+    rows = []
     for i, number in enumerate(sweeps.sweep.values):
         row = sweeps.isel(sweep=i)
         start, end, step = (np.degrees(float(row[f"drive_{name}"])) for name in ("angle_from", "angle_to", "step"))
         ends = [_place(np.degrees(row[f"{name}_drive_angle"].values)) for name in ("onset", "snap_off")]
-        if not bool(row.contact):
-            ends = ["never", "–"]
-        table.add_row(
-            f"{number} {row.direction.values}",
-            *([pivots[i]] if with_pivots else []),
-            str(int(row.samples)),
-            f"{start:.1f} to {end:.1f}",
-            f"{step:.3g}",
-            *ends,
-            str(int(row.unloaded)),
+        rows.append(
+            [
+                f"{number} {row.direction.values}",
+                *([pivots[i]] if with_pivots else []),
+                str(int(row.samples)),
+                f"{start:.1f} to {end:.1f}",
+                f"{step:.3g}",
+                *(ends if bool(row.contact) else ["never", "–"]),
+                str(int(row.unloaded)),
+            ]
         )
-    return table
+    heads = ["sweep", *([base] if with_pivots else []), "samples", "drive [°]", "step", "touches", "lets go"]
+    return table_of([*heads, "unloaded"], rows, left=["sweep"])
 
 
 def _place(beside: Any) -> str:
@@ -189,32 +147,23 @@ def _place(beside: Any) -> str:
     return "–" if middle != middle else f"{middle:.1f}"
 
 
-def _channels(channels: xr.Dataset) -> Any:
+def _channels(channels: xr.Dataset) -> Table:
     """Numbers of a channel all in one unit; the last is the correlation of unloaded neighbours."""
     from tactile_bayes.inspection.words import prefix_of
 
-    table = table_of(["channel", "from", "to", "zero", "± s.e.", "noise", "stated", "step", "corr."], left=["channel"])
-    for i, name in enumerate(channels.channel.values):
-        row = channels.isel(channel=i)
-        unit = str(row.unit.values)
-        size, prefix = (1.0, "") if unit == "1" else prefix_of(max(abs(float(row.smallest)), abs(float(row.largest))))
+    rows = []
+    for row in columns_of(channels, "channel"):
+        name, unit, like = row["channel"], row["unit"], row["neighbour_correlation"]
+        size, prefix = (1.0, "") if unit == "1" else prefix_of(max(abs(row["smallest"]), abs(row["largest"])))
         cells = []
         for column in ("smallest", "largest", "bias", "bias_uncertainty", "noise", "stated_noise", "resolution"):
-            value = float(row[column]) / size
+            value = row[column] / size
             none = value != value or (column == "resolution" and value == 0.0)
             cells.append("–" if none else f"{value:.2g}" if column == "bias_uncertainty" else f"{value:.3g}")
-        like = float(row.neighbour_correlation)
-        label = str(name) if unit == "1" else f"{name} [{prefix}{unit}]"
-        table.add_row(label, *cells, "–" if like != like else f"{like:+.2f}")
-    return table
-
-
-def _fates(found: Inspection) -> Iterator[str]:
-    if found.statuses:
-        fates = ", ".join(f"{count} {fate}" for fate, count in found.statuses.items())
-        yield f"Raw Step 2: {fates}"
-    else:
-        yield "No Step 2, which needs all three load channels; infer works without."
+        label = name if unit == "1" else f"{name} [{prefix}{unit}]"
+        rows.append([label, *cells, "–" if like != like else f"{like:+.2f}"])
+    heads = ["channel", "from", "to", "zero", "± s.e.", "noise", "stated", "step", "corr."]
+    return table_of(heads, rows, left=["channel"])
 
 
 def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[str, Any]:
@@ -226,8 +175,6 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
         sweeps, found.sweeps.onset_drive_angle.values, found.sweeps.snap_off_drive_angle.values, strict=True
     ):
         row |= {"onset_drive_angle": onset, "snap_off_drive_angle": snap}
-    units: Sequence[str] = found.channels.unit.values.tolist()
-    channels = columns_of(found.channels, "channel")
     return {
         "words": found.words,
         "is_suspect": found.is_suspect,
@@ -240,7 +187,7 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
         "load_cell": found.load_cell.entries() if found.load_cell is not None else None,
         "load_cell_source": found.load_cell_source,
         "sweeps": sweeps,
-        "channels": [{**row, "unit": unit} for row, unit in zip(channels, units, strict=True)],
+        "channels": columns_of(found.channels, "channel"),
         "suspicious_samples": _suspicious(found.samples),
         "raw_step_2": found.statuses,
         "next": again,

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +15,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-__all__ = ["answered", "going_on"]
+__all__ = ["acknowledge_interrupt", "resumable"]
+
+_USUAL: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 
 
 @contextmanager
-def going_on(have: Callable[[], str], *, then: str = "the same command goes on") -> Iterator[Callable[[], object]]:
+def resumable(have: Callable[[], str], *, then: str = "the same command goes on") -> Iterator[Callable[[], object]]:
     """A run that an interrupt ends with words that say what is there, and what the same command then does.
 
     What is yielded is to be called now and then: it raises an interrupt that was lost.
@@ -33,28 +39,16 @@ def going_on(have: Callable[[], str], *, then: str = "the same command goes on")
 
 
 @contextmanager
-def answered(words: str) -> Iterator[None]:
+def acknowledge_interrupt(words: str) -> Iterator[None]:
     """The first interrupt is answered at once, with words on stderr, as what comes of it takes a while."""
-    import os
-    import signal
-    import sys
-    import threading
-
-    usual = signal.default_int_handler
-    if signal.getsignal(signal.SIGINT) is not usual or threading.current_thread() is not threading.main_thread():
-        yield
-        return
 
     def answer(number: int, frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, usual)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"\ntactile-bayes: {words}\n".encode())
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGINT, answer)
-    try:
+    with _handled(answer, signal.SIGINT):
         yield
-    finally:
-        signal.signal(signal.SIGINT, usual)
 
 
 class _Terminated(KeyboardInterrupt):
@@ -64,14 +58,6 @@ class _Terminated(KeyboardInterrupt):
 @contextmanager
 def _interrupts_kept() -> Iterator[Callable[[], object]]:
     """Raises an interrupt that was lost: Python ignores one that comes in the callback of a weak reference."""
-    import signal
-    import threading
-
-    usual: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-    ours = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
-    if not ours or threading.current_thread() is not threading.main_thread():
-        yield lambda: None
-        return
     come: list[type[KeyboardInterrupt]] = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
@@ -82,13 +68,23 @@ def _interrupts_kept() -> Iterator[Callable[[], object]]:
         if come:
             raise come[0]
 
+    with _handled(interrupt, signal.SIGINT, signal.SIGTERM):
+        try:
+            yield raise_lost
+        except KeyboardInterrupt:  # it may be another that stands for the one that came
+            raise_lost()
+            raise
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], None], *signals: signal.Signals) -> Iterator[None]:
+    """Signals have this handler, those of them that nobody else handles, in the main thread."""
+    is_main = threading.current_thread() is threading.main_thread()
+    ours = [number for number in signals if is_main and signal.getsignal(number) is _USUAL[number]]
     for number in ours:
-        signal.signal(number, interrupt)
+        signal.signal(number, handler)
     try:
-        yield raise_lost
-    except KeyboardInterrupt:  # it may be another that stands for the one that came
-        raise_lost()
-        raise
+        yield
     finally:
         for number in ours:
-            signal.signal(number, usual[number])
+            signal.signal(number, _USUAL[number])

@@ -1,31 +1,13 @@
-"""Numbers in options, and load cells that options describe."""
+"""Numbers in options, and options of the form NAME=VALUE."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tactile_bayes.load_cell import LoadCell
+    from collections.abc import Collection, Sequence
 
-__all__ = ["load_cell_asked", "numbers_asked"]
-
-
-def load_cell_asked(force_noise: float | None, moment_noise: float | None) -> LoadCell | None:
-    """The load cell that is simulated, if one is given.
-
-    Raises
-    ------
-    ParameterError
-        If it is not given whole.
-    """
-    from tactile_bayes.errors import ParameterError
-    from tactile_bayes.load_cell import LoadCell
-
-    if force_noise is None and moment_noise is None:
-        return None
-    if not force_noise or not moment_noise:
-        raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
-    return LoadCell(force_noise=force_noise, moment_noise=moment_noise)
+__all__ = ["assigned", "numbers_asked"]
 
 
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
@@ -46,3 +28,27 @@ def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
         wanted = "a number" if count == 1 else f"{count} numbers with commas between them"
         raise ParameterError(f"{option} is {text!r}: give {wanted}")
     return numbers
+
+
+def assigned(
+    option: str, texts: Sequence[str] | None, form: str = "", *, known: Collection[str] = ()
+) -> dict[str, str]:
+    """Values by name, of an option that is given as NAME=VALUE, several times.
+
+    Raises
+    ------
+    ParameterError
+        If one is written otherwise, its name is not known, or it is given twice.
+    """
+    from tactile_bayes.errors import ParameterError
+
+    values: dict[str, str] = {}
+    like = form or f"NAME=VALUE, with one of {', '.join(known)}"
+    for text in texts or []:
+        name, _, value = (part.strip() for part in text.partition("="))
+        if not (name and value) or (known and name not in known):
+            raise ParameterError(f"{option} {text}: write {like}")
+        if name in values:
+            raise ParameterError(f"{option} {name}= is given twice: keep one of them")
+        values[name] = value
+    return values

@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from tactile_bayes.cli.answer import Json, print_json
-from tactile_bayes.cli.record_options import Quiet
+from tactile_bayes.cli.answer import Answer
+from tactile_bayes.cli.command import Output
 from tactile_bayes.cli.task_bar import step_bar
 
 __all__ = ["report"]
 
 
 def report(
+    *,
     run: Annotated[Path, typer.Argument(help="Folder of a run of infer.")],
     out: Annotated[
         Path | None, typer.Option(help="File for the page; report.html in that folder if left out.", dir_okay=False)
@@ -23,18 +24,13 @@ def report(
         Path | None,
         typer.Option(help="Folder of a run of compare on the same record; the run's own if left out.", file_okay=False),
     ] = None,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """Write a page on a run: what was found, whether it can be trusted, what was measured, how to make it again."""
-    with step_bar(quiet or json) as show:
+    with step_bar(output.is_silent) as show:
         from tactile_bayes.report import write_report
 
         path = write_report(run, out, compare=compare, progress=show)
     size = path.stat().st_size
-    if json:
-        print_json({"report": path, "bytes": size})
-    elif quiet:
-        typer.echo(str(path))
-    else:
-        typer.echo(f"{path} ({size / 1e3:.0f} kB): open it in a browser; it needs no network.")
+    words = str(path) if output.quiet else f"{path} ({size / 1e3:.0f} kB): open it in a browser; it needs no network."
+    return Answer([words], lambda: {"report": path, "bytes": size})

@@ -6,6 +6,8 @@ import math
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
+from tactile_bayes.cli.task_bar import moving_bar
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -29,17 +31,13 @@ class Show(Protocol):
 @contextmanager
 def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[Show | None]:
     """A bar that fills with the effective sample size; none where nobody sees it move."""
-    from rich.console import Console
-    from rich.progress import BarColumn, SpinnerColumn, TextColumn
-    from rich.progress import Progress as Bar
+    from rich.progress import BarColumn, TextColumn
 
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield None
-        return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(12), TextColumn("{task.fields[left]}"))
-    with Bar(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("looking for a start, then sampling", total=None, left="")
+    columns = (TextColumn("{task.description}"), BarColumn(12))
+    with moving_bar(quiet, "looking for a start, then sampling", *columns) as move:
+        if move is None:
+            yield None
+            return
 
         def show(progress: Progress, what: str = "", /) -> None:
             words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
@@ -49,7 +47,7 @@ def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[S
                 seconds = remaining_seconds(progress, max_seconds)
                 left = "" if seconds is None else f"about {_in_words(seconds)} left"
             done = min(progress.ess, _GOAL) if progress.ess == progress.ess else 0.0
-            bar.update(task, total=_GOAL, completed=done, description=f"{what}, {words}" if what else words, left=left)
+            move(total=_GOAL, completed=done, description=f"{what}, {words}" if what else words, left=left)
 
         yield show
 

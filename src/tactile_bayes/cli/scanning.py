@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from tactile_bayes.cli.answer import Json, print_files, print_json, print_sentences, print_table, table_of
-from tactile_bayes.cli.contour_options import Distance, Family, Parameters, Points, Profile, contour_asked
-from tactile_bayes.cli.numbers import numbers_asked
-from tactile_bayes.cli.record_options import Friction, Quiet, rod_asked
-from tactile_bayes.cli.simulated_rig_options import Bases, Diameter, FlexuralRigidity, Length
+from tactile_bayes.cli.answer import Answer, table_of
+from tactile_bayes.cli.command import Output
+from tactile_bayes.cli.contour_options import ContourOptions
+from tactile_bayes.cli.rig_options import Friction, RigOptions
 from tactile_bayes.cli.task_bar import step_bar
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rich.table import Table
+
     from tactile_bayes.rod import Rod
     from tactile_bayes.scanning import Scan
-    from tactile_bayes.sweep_events import SweepEvents
 
 __all__ = ["RecordFile", "refuse_other_suffix", "scan"]
 
@@ -28,16 +31,10 @@ RecordFile = Annotated[
 
 
 def scan(
+    *,
     out: RecordFile,
-    profile: Profile = None,
-    distance: Distance = None,
-    family: Family = None,
-    parameter: Parameters = None,
-    points: Points = None,
-    length: Length = None,
-    flexural_rigidity: FlexuralRigidity = None,
-    diameter: Diameter = 0.0,
-    base: Bases = None,
+    choice: ContourOptions,
+    rig: RigOptions,
     direction: Annotated[
         Literal["both", "forward", "backward"], typer.Option(help="Sense of the sweeps from each pivot.")
     ] = "both",
@@ -49,26 +46,23 @@ def scan(
             help="File for a picture of rod and loads along the sweeps, .png, .pdf or .svg; likewise.", dir_okay=False
         ),
     ] = None,
-    quiet: Quiet = False,
-    json: Json = False,
-) -> None:
+    output: Output,
+) -> Answer:
     """Sweep an ideal rod along a contour (Step 1): the record of its base, without noise, and its events."""
     refuse_other_suffix(out)
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
-    with step_bar(quiet or json) as show:
-        import numpy as np
-
+    with step_bar(output.is_silent) as show:
         from tactile_bayes.record import write_record
         from tactile_bayes.rod import Rod
         from tactile_bayes.scanning import scan as sweep
 
-        rod = rod_asked(length, flexural_rigidity, diameter) or Rod()
+        rod = rig.rod or Rod()
         made = sweep(
-            contour_asked(profile, distance, family, parameter, points, rod_length=rod.length),
+            choice.contour(rod.length),
             direction=direction,
-            base=[numbers_asked(pivot, "--base", 2) for pivot in base or ["0,0"]],  # type: ignore[misc]
-            drive_step=float(np.radians(drive_step)),
+            base=rig.pivots,  # type: ignore[arg-type]  # of two numbers each
+            drive_step=math.radians(drive_step),
             rod=rod,
             friction=friction,
         )
@@ -81,13 +75,7 @@ def scan(
             figure.parent.mkdir(parents=True, exist_ok=True)
             _draw(made, figure)
             files["figure"] = figure
-    if json:
-        print_json(_numbers(made, rod, files))
-        return
-    print_sentences([_headline(made, rod), ""])
-    print_table(_table(made, rod))
-    print_sentences([""])
-    print_files(files)
+    return Answer([_headline(made, rod), "", _table(made, rod), "", files], lambda: _numbers(made, rod, files))
 
 
 def refuse_other_suffix(path: Path, known: tuple[str, ...] = (".csv", ".nc"), what: str = "a record") -> None:
@@ -119,35 +107,27 @@ def _headline(made: Scan, rod: Rod) -> str:
     )
 
 
-def _events(sweep: SweepEvents) -> list[tuple[str, Any]]:
-    """First contact, changes and snap-off, in the order in which they happen."""
-    return [
-        ("first contact", sweep.first_contact),
-        *(("phase change", change) for change in sweep.transitions),
-        ("snap-off", sweep.snap_off),
-    ]
-
-
-def _table(made: Scan, rod: Rod) -> Any:
-    si = not rod.is_dimensionless
-    scale, units = (1e3, (" [mm]", " [mN m]", " [mN]")) if si else (1.0, ("", "", ""))
+def _table(made: Scan, rod: Rod) -> Table:
+    """First contact, changes and snap-off of every sweep, in the order in which they happen."""
+    scale, units = (1.0, ("", "", "")) if rod.is_dimensionless else (1e3, (" [mm]", " [mN m]", " [mN]"))
     length, moment, force = units
-    table = table_of(
-        ["sweep", "event", "at [°]", f"x{length}", f"y{length}", f"m0{moment}", f"force{force}"],
-        left=["sweep", "event"],
-    )
+    rows = []
     for number, sweep in enumerate(made.sweeps):
-        for what, event in _events(sweep):
-            size = (event.force_x**2 + event.force_y**2) ** 0.5
+        for event in (sweep.first_contact, *sweep.transitions, sweep.snap_off):
+            size = math.hypot(event.force_x, event.force_y)
             values = (scale * v for v in (event.contact_x, event.contact_y, event.holding_moment, size))
             numbers = [f"{value:z.4f}" if abs(value) < 1e3 else f"{value:.5g}" for value in values]
-            name = event.kind if what == "phase change" else f"{what} ({event.kind})"
-            first = f"{number} {sweep.direction}" if what == "first contact" else ""
-            table.add_row(first, name, f"{event.drive_angle * 57.29577951308232:.3f}", *numbers)
-    return table
+            sweeping, name = "", event.kind
+            if event is sweep.first_contact:
+                sweeping, name = f"{number} {sweep.direction}", f"first contact ({name})"
+            elif event is sweep.snap_off:
+                name = f"snap-off ({name})"
+            rows.append([sweeping, name, f"{math.degrees(event.drive_angle):.3f}", *numbers])
+    heads = ["sweep", "event", "at [°]", f"x{length}", f"y{length}", f"m0{moment}", f"force{force}"]
+    return table_of(heads, rows, left=["sweep", "event"])
 
 
-def _numbers(made: Scan, rod: Rod, files: dict[str, Path]) -> dict[str, Any]:
+def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
     from dataclasses import asdict
 
     return {
@@ -174,7 +154,6 @@ def _numbers(made: Scan, rod: Rod, files: dict[str, Path]) -> dict[str, Any]:
 
 def _draw(made: Scan, path: Path) -> None:
     """Rods of every sweep from the first pivot, and the loads below."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     from tactile_bayes import plotting
@@ -182,7 +161,6 @@ def _draw(made: Scan, path: Path) -> None:
 
     shown = [number for number, sweep in enumerate(made.sweeps) if sweep.base == made.sweeps[0].base]
     figure = Figure(figsize=(7.0, 5.0 + 3.4 * len(shown)), layout="constrained")
-    FigureCanvasAgg(figure)
     parts: Any = figure.subfigures(2, 1, height_ratios=(3.4 * len(shown), 5.0))
     for number, ax in zip(shown, parts[0].subplots(len(shown), 1, squeeze=False)[:, 0], strict=True):
         plotting.rods(made, sweep=number, ax=ax)

@@ -3,25 +3,59 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
+
+from tactile_bayes.cli.interrupts import resumable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-__all__ = ["counted", "step_bar", "task_bar"]
+    from rich.progress import ProgressColumn, Task
+    from rich.text import Text
+
+__all__ = ["counted", "moving_bar", "resumable_bar", "step_bar", "task_bar"]
+
+
+@contextmanager
+def resumable_bar(
+    total: int,
+    noun: str,
+    quiet: bool,
+    have: Callable[[int | None], str],
+    *,
+    then: str = "the same command goes on",
+) -> Iterator[Callable[[int], object]]:
+    """A bar that is told how many are done; where an interrupt comes, `have` says what is there of this last number.
+
+    It is None before the first is told. `then` is what the same command does after the interrupt.
+    """
+    last: int | None = None
+    with resumable(lambda: have(last), then=then) as raise_lost, task_bar(total, noun, quiet) as show:
+
+        def note(done: int) -> None:
+            nonlocal last
+            last = done
+            show(done)
+            raise_lost()
+
+        yield note
 
 
 @contextmanager
 def task_bar(total: int, noun: str, quiet: bool) -> Iterator[Callable[[int], object]]:
-    """A bar that is told how many are done; none where nobody sees it move."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
-    from rich.text import Text
+    """A bar that is told how many are done, and shows how fast; none where nobody sees it move."""
+    with step_bar(quiet, noun, at_first=f"{counted(total, noun)} to be made", has_rate=True) as show:
+        yield lambda done: show(done, total)
 
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield lambda done: None
-        return
+
+@contextmanager
+def step_bar(
+    quiet: bool, noun: str = "step", *, at_first: str = "beginning", has_rate: bool = False
+) -> Iterator[Callable[[int, int], object]]:
+    """A bar that is told how many of how many are done, and that moves before the first of them is."""
+    from rich.progress import BarColumn, ProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.text import Text
 
     class Rate(ProgressColumn):
         def render(self, task: Task) -> Text:
@@ -29,36 +63,31 @@ def task_bar(total: int, noun: str, quiet: bool) -> Iterator[Callable[[int], obj
                 return Text("")
             return Text(f"{task.speed:,.0f} {noun}s/s" if task.speed > 2.0 else f"{1.0 / task.speed:.2g} s a {noun}")
 
-    words = (TextColumn("{task.description}"), Rate(), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
-    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
-        task = bar.add_task(f"{counted(total, noun)} to be made", total=None, left="")
+    rate = (Rate(),) if has_rate else ()
+    columns = (BarColumn(), TextColumn("{task.description}"), *rate, TimeRemainingColumn())
+    with moving_bar(quiet, at_first, *columns) as move:
 
-        def show(done: int) -> None:
-            description = f"{done:,} of {counted(total, noun)}"
-            bar.update(task, total=total, completed=done, description=description, left="left")
+        def show(done: int, count: int) -> None:
+            if move is not None:
+                description = f"{done:,} of {counted(count, noun)}"
+                move(total=count, completed=done, description=description, left="left")
 
         yield show
 
 
 @contextmanager
-def step_bar(quiet: bool, noun: str = "step", *, at_first: str = "beginning") -> Iterator[Callable[[int, int], object]]:
-    """A bar that is told how many of how many are done, and that moves before the first of them is."""
+def moving_bar(quiet: bool, at_first: str, *columns: ProgressColumn) -> Iterator[Callable[..., object] | None]:
+    """A bar of a spinner, some columns, and what is left; what is yielded moves it, or is None where nobody sees it."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress, SpinnerColumn, TextColumn
 
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
-        yield lambda done, count: None
+        yield None
         return
-    words = (TextColumn("{task.description}"), TimeRemainingColumn(), TextColumn("{task.fields[left]}"))
-    with Progress(SpinnerColumn(), BarColumn(), *words, console=console, transient=True) as bar:
-        task = bar.add_task(at_first, total=None, left="")
-
-        def show(done: int, count: int) -> None:
-            description = f"{done:,} of {counted(count, noun)}"
-            bar.update(task, total=count, completed=done, description=description, left="left")
-
-        yield show
+    left = TextColumn("{task.fields[left]}")
+    with Progress(SpinnerColumn(), *columns, left, console=console, transient=True) as bar:
+        yield partial(bar.update, bar.add_task(at_first, total=None, left=""))
 
 
 def counted(count: int, noun: str) -> str:

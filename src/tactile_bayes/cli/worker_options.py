@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
-__all__ = ["Scheduler", "Workers", "refuse_both"]
-
-Workers = Annotated[int | None, typer.Option(help="Processes on this machine; by default one for each core.", min=1)]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(help="Address of a Dask scheduler in place of --workers, like tcp://10.0.0.1:8786."),
-]
+__all__ = ["WorkerOptions"]
 
 
-def refuse_both(workers: int | None, scheduler: str | None) -> None:
-    """Refuse two places for the work."""
-    from tactile_bayes.errors import ParameterError
+@dataclass(frozen=True)
+class WorkerOptions:
+    """Where the work is done; two places are refused."""
 
-    if workers is not None and scheduler is not None:
-        raise ParameterError("--workers and --scheduler exclude each other: give one of them")
+    workers: Annotated[
+        int | None, typer.Option(help="Processes on this machine; by default one for each core.", min=1)
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask scheduler in place of --workers, like tcp://10.0.0.1:8786."),
+    ] = None
+
+    def __post_init__(self) -> None:
+        from tactile_bayes.errors import ParameterError
+
+        if self.workers is not None and self.scheduler is not None:
+            raise ParameterError("--workers and --scheduler exclude each other: give one of them")

@@ -18,10 +18,10 @@ from scipy.stats import rv_histogram
 from tactile_bayes.checks import check_mapping, check_optional, check_switch
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.family import Family
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference import families
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.likelihood import without_errors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
@@ -120,13 +120,8 @@ def _of_sides(measured: xr.Dataset, assumed: Assumptions) -> ContourProblem:
     noise = noise_of(measured, assumed.load_cell)
     rig = nuisances_of(measured, assumed.nuisances, given, noise.cell, assumed.friction)
     priors = {**contour_priors(measured, chosen), **rig.priors, **noise.priors}
-    for name, prior in given.items():
-        if name not in priors:
-            raise ParameterError(
-                f"there is no parameter {name!r} to give a prior: there are {', '.join(priors)}, and of what is "
-                "not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
-            )
-        refuse_no_prior(name, prior)
+    more = ", and of what is not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
+    refuse_wrong_priors(given, priors, more=more)
     priors.update(given)
     data_sha256 = record_hash(measured)
     loaded = loaded_samples(measured, noise.stated_cell)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -11,7 +12,7 @@ from tactile_bayes.checks import shown
 from tactile_bayes.contours.family import Family, FamilyParameter
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["Prior", "default_priors", "own_priors", "refuse_no_prior", "support_of"]
+__all__ = ["Prior", "default_priors", "own_priors", "refuse_wrong_priors", "support_of"]
 
 
 @runtime_checkable
@@ -23,11 +24,17 @@ class Prior(Protocol):
     def std(self) -> Any: ...
 
 
-def refuse_no_prior(name: str, prior: Any) -> None:
-    """Refuse what is no distribution, or one whose parameters are not fixed."""
-    if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
+def refuse_wrong_priors(priors: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
+    """Refuse priors that are no distributions with fixed parameters, or of what is no parameter."""
+    for name, prior in priors.items():
+        if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
+            remedy = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            raise ParameterError(f"the prior of {name} is {shown(prior)}: {remedy}")
+    strangers = sorted(set(priors) - set(names))
+    if strangers:
         raise ParameterError(
-            f"the prior of {name} is {shown(prior)}: give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            f"there is a prior {whose}of {', '.join(strangers)}, which is no parameter: there are "
+            f"{', '.join(names)}{more}"
         )
 
 

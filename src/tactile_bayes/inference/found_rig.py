@@ -12,9 +12,10 @@ import xarray as xr
 from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.record import CHANNELS
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, present_channels
 
-__all__ = ["FoundRig", "found_rig"]
+__all__ = ["FoundRig", "contact_points", "found_rig"]
 
 _SHORT = ("moment", "force_x", "force_y")
 
@@ -83,4 +84,33 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
         cell,
         rig.get("friction", float(posterior.attrs["friction"])),
         rig.get("suspension_compliance", 0.0) * rig.get("rigidity_scale", 1.0),
+    )
+
+
+def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> xr.Dataset | None:
+    """Return contact points by Step 2, with the rig that was found: noise, biases, stiffness, offset, friction.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        The record.
+    load_cell : LoadCell or None
+        As `infer_contour` was given it.
+    posterior : xr.DataTree
+        What that made of the record.
+
+    Returns
+    -------
+    xr.Dataset or None
+        From `reconstruct`; None where a load channel is missing.
+    """
+    if set(present_channels(measured)) != set(CHANNELS):
+        return None
+    rig = found_rig(measured, load_cell, posterior)
+    return reconstruct(
+        rig.record,
+        method="constrained" if rig.load_cell.has_variances else "raw",
+        load_cell=rig.load_cell,
+        friction=rig.friction,
+        suspension_compliance=rig.suspension_compliance,
     )

@@ -25,6 +25,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from scipy.optimize import least_squares
 
+from tactile_bayes.checks import (
+    as_number,
+    as_numbers,
+    check_mapping,
+    check_number,
+    check_optional,
+    check_positive,
+    refused,
+)
 from tactile_bayes.clamped_rod import base_curvature
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
@@ -287,7 +296,12 @@ def _rms(residuals: Floats, fitted: int) -> float:
 
 def _checked(axial: ArrayLike, lateral: ArrayLike, reading: ArrayLike) -> tuple[Floats, Floats, Floats]:
     columns = {"axial": axial, "lateral": lateral, "reading": reading}
-    arrays = {name: np.array(values, dtype=float) for name, values in columns.items()}
+    arrays: dict[str, Floats] = {}
+    for name, values in columns.items():
+        numbers = as_numbers(values)
+        if numbers is None:
+            raise refused(name, values, "give a list of numbers")
+        arrays[name] = numbers
     sizes = {array.shape for array in arrays.values()}
     if len(sizes) != 1 or arrays["reading"].ndim != 1:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
@@ -308,6 +322,7 @@ def _split_priors(
     priors: Mapping[str, Prior | float] | None, defaults: Mapping[str, Prior]
 ) -> tuple[dict[str, Prior], dict[str, float]]:
     """Priors of what is unknown, and values of what is known."""
+    check_mapping("priors", priors, "give distributions, or numbers, by name")
     given = dict(priors or {})
     unheard = sorted(set(given) - set(defaults))
     if unheard:
@@ -315,16 +330,14 @@ def _split_priors(
     known: dict[str, float] = {}
     unknown: dict[str, Prior] = {}
     for name, default in defaults.items():
-        prior = given.get(name, default)
-        if isinstance(prior, int | float | np.number):
-            known[name] = float(prior)
+        prior: Any = given.get(name, default)
+        number = as_number(prior)
+        if number is not None:
+            known[name] = number
         else:
             unknown[name] = prior
-    for name in ("compliance", "noise_sd"):
-        if name in known and not (math.isfinite(known[name]) and known[name] >= 0.0):
-            raise ParameterError(f"{name} is {known[name]!r}: it cannot be negative")
-    if known.get("noise_sd") == 0.0:
-        raise ParameterError("noise_sd is 0: give the scatter of repeated readings, or a prior")
+    check_number("compliance", known.get("compliance", 0.0), "it cannot be negative", least=0.0)
+    check_positive("noise_sd", known.get("noise_sd", 1.0), "give the scatter of repeated readings, or a prior")
     if not unknown:
         raise ParameterError("every parameter is given as known: leave at least one to be inferred")
     return unknown, known
@@ -398,9 +411,9 @@ def infer_point_load(
     axial, lateral, reading = _checked(axial, lateral, reading)
     if full_scale is None:
         full_scale = 10.0 ** math.ceil(math.log10(np.abs(reading).max()))
-    elif not (math.isfinite(full_scale) and full_scale > 0.0):
-        raise ParameterError(f"full_scale is {full_scale!r}: give a positive reading")
-    settings = _SETTINGS if settings is None else settings
+    check_positive("full_scale", full_scale, "give a positive reading")
+    check_optional("settings", settings, SamplerSettings)
+    settings = settings or _SETTINGS
     unknown, known = _split_priors(priors, default_priors(axial, lateral, full_scale=full_scale))
     unit = 3.0 / _reach(axial, lateral)
     model = _Model(axial, lateral, reading, unit, _VAGUE * full_scale, unknown, known, small_deflection)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.checks import check_kind, check_path
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
@@ -107,6 +108,7 @@ def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
 
 def record_of(posterior: xr.DataTree) -> xr.Dataset:
     """The record that a contour was inferred from, with the rod and the load cell that were taken for it."""
+    refuse_no_contour(posterior, "constant_data", "observed_data")
     kept = {
         name: value
         for name, value in posterior.attrs.items()
@@ -127,8 +129,8 @@ def contact_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
 
 def contour_draws(result: xr.DataTree) -> xr.Dataset:
     """Return the posterior group of a result of `infer_contour`."""
-    is_tree = isinstance(result, xr.DataTree) and {"family", "units"} <= set(result.attrs)
-    if not is_tree or "posterior" not in result.children:
+    refuse_no_contour(result, "posterior")
+    if not {"family", "units"} <= set(result.attrs):
         raise InferenceError(_NO_CONTOUR)
     draws = posterior_draws(result)
     _refuse_absent(draws, family_named(result.attrs["family"]).parameters, ("chain", "draw"))
@@ -137,11 +139,16 @@ def contour_draws(result: xr.DataTree) -> xr.Dataset:
 
 def contour_events(result: xr.DataTree) -> xr.Dataset:
     """Return the group of first contacts and snap-offs of a result of `infer_contour`."""
-    if not isinstance(result, xr.DataTree) or "events" not in result.children:
-        raise InferenceError(_NO_CONTOUR)
+    refuse_no_contour(result, "events")
     events = result["events"].to_dataset()
     _refuse_absent(events, _EVENTS, ("chain", "draw", "stroke"))
     return events
+
+
+def refuse_no_contour(result: Any, *groups: str) -> None:
+    """Refuse what is no result of `infer_contour` with these groups."""
+    if not (isinstance(result, xr.DataTree) and set(groups) <= set(result.children)):
+        raise InferenceError(_NO_CONTOUR)
 
 
 def _refuse_absent(group: xr.Dataset, names: Sequence[str], dims: Sequence[str]) -> None:
@@ -188,7 +195,7 @@ def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
     InferenceError
         If the file is none, or damaged.
     """
-    path = Path(path)
+    path = check_path("path", path)
     try:
         result = read_netcdf(path, xr.open_datatree, lambda what: InferenceError(f"{path} {what}: infer again"))
     except FileNotFoundError:
@@ -220,6 +227,7 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     """
     import warnings
 
+    check_kind("posterior", posterior, xr.DataTree, "give a result of infer_contour or infer_contacts")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 announces its refactoring
         import arviz

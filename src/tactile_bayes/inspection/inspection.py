@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_probability
+from tactile_bayes.checks import check_optional, check_probability
 from tactile_bayes.errors import DriftWarning
 from tactile_bayes.inspection.channel_table import channel_table
 from tactile_bayes.inspection.fit import Fit, fit_of
@@ -139,6 +139,7 @@ def inspect_record(
     ...     print(sentence)
     1 reading of holding_moment stands out from its neighbours (sample 5): a knock? If there are more, ...
     """
+    check_optional("load_cell", load_cell, LoadCell)
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 0.5, such as 1e-3", below=0.5)
     record = validate(record)
     told = progress or (lambda done, count: None)

@@ -13,14 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.load_cell.correction import corrected
 from tactile_bayes.load_cell.corruption import corrupted_loads
-from tactile_bayes.load_cell.covariance import covariance
+from tactile_bayes.load_cell.covariance import covariance, surprise
 from tactile_bayes.load_cell.data_sheet import DataSheet
-from tactile_bayes.load_cell.left_out import log_density_left_out
-from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_likelihood
-from tactile_bayes.load_cell.measurement import measured, stated_entries
-from tactile_bayes.load_cell.surprise import surprise
+from tactile_bayes.load_cell.likelihood import (
+    approximations,
+    checked_noise_scale,
+    log_density_left_out,
+    log_likelihood,
+)
+from tactile_bayes.load_cell.measurement import corrected, measured, stated_entries
 from tactile_bayes.load_cell.zero_load import found_cell
 from tactile_bayes.record import CHANNELS, frame_of, validate
 

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.checks import as_number, shown
+from tactile_bayes.checks import as_number, check_choice, check_number, check_numbers, check_positive, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
@@ -41,14 +41,32 @@ _SCALARS = (
     "drive_angle_noise",
     "drive_angle_resolution",
 )
-_DRIFTS: dict[str, type[RandomWalk] | type[OrnsteinUhlenbeck]] = {
-    "random_walk": RandomWalk,
-    "ornstein_uhlenbeck": OrnsteinUhlenbeck,
-}
+_LAWS: dict[type[Drift], str] = {RandomWalk: "random_walk", OrnsteinUhlenbeck: "ornstein_uhlenbeck"}
 _PAIRS = tuple(combinations(CHANNELS, 2))
-_MEANING = {
-    **dict.fromkeys(("bias", "bias_uncertainty", "row of gain"), ", ".join(CHANNELS)),
-    "correlation": ", ".join(" with ".join(pair) for pair in _PAIRS),
+_SEVERAL: dict[str, tuple[str, ...]] = {
+    "bias": tuple(f"bias_{name}" for name in CHANNELS),
+    "bias_uncertainty": tuple(f"bias_uncertainty_{name}" for name in CHANNELS),
+    "gain": tuple(f"gain_{to}_{of}" for to, of in product(CHANNELS, CHANNELS)),
+    "lever": ("lever_x", "lever_y"),
+    "correlation": tuple(f"correlation_{one}_{other}" for one, other in _PAIRS),
+}
+"""Names of the numbers of each entry that has several."""
+
+_OF_CHANNELS = f"give three finite numbers ({', '.join(CHANNELS)})"
+_REMEDIES = {
+    "bias": _OF_CHANNELS,
+    "bias_uncertainty": _OF_CHANNELS,
+    "gain": "give three rows of three numbers, ((1, 0, 0), (0, 1, 0), (0, 0, 1)) being that of an ideal cell",
+    "lever": "give two finite numbers (x, y)",
+    "correlation": f"give three finite numbers ({', '.join(' with '.join(pair) for pair in _PAIRS)})",
+    **{
+        f"{channel}_{name}": f"give {what}, zero or positive [{unit}, or dimensionless]"
+        for name, what in (("noise", "a standard deviation"), ("resolution", "a step"))
+        for channel, unit in (("force", "N"), ("moment", "N m"), ("drive_angle", "rad"))
+    },
+    "relative_noise": "give a share, zero or positive",
+    **dict.fromkeys(("drive_angle_offset", "drive_angle_backlash"), "give an angle [rad]"),
+    **dict.fromkeys(("force_range", "moment_range", "degrees_of_freedom"), "give a positive number, inf for none"),
 }
 
 
@@ -78,27 +96,26 @@ class DataSheet:
 
     def __post_init__(self) -> None:
         for name in _SCALARS:
-            object.__setattr__(self, name, _scalar(name, getattr(self, name)))
-        for name in ("bias", "bias_uncertainty", "correlation"):
-            object.__setattr__(self, name, _triple(name, getattr(self, name)))
-        object.__setattr__(self, "gain", _rows(self.gain))
-        object.__setattr__(self, "lever", _pair("lever", self.lever))
+            object.__setattr__(self, name, self._number(name))
+        for name, names in _SEVERAL.items():
+            shape = (3, 3) if name == "gain" else (len(names),)
+            numbers = check_numbers(f"the load cell's {name}", getattr(self, name), _REMEDIES[name], shape=shape)
+            rows = map(tuple, numbers.tolist()) if name == "gain" else numbers.tolist()
+            object.__setattr__(self, name, tuple(rows))
         self._refuse_the_impossible()
         if self.drift is not None and not np.any(self.drift.sizes):
             object.__setattr__(self, "drift", None)
 
+    def _number(self, name: str) -> float:
+        """A number that stands alone; none is infinite but one of which that says that there is no end."""
+        value, what, remedy = getattr(self, name), f"the load cell's {name}", _REMEDIES[name]
+        if as_number(value) is None:
+            raise refused(what, value, "give a number")
+        if name.endswith(("_range", "_freedom")):
+            return math.inf if value == math.inf else check_positive(what, value, remedy)
+        return check_number(what, value, remedy, least=-math.inf if remedy.startswith("give an angle") else 0.0)
+
     def _refuse_the_impossible(self) -> None:
-        for name in ("noise", "resolution"):
-            for channel, unit in (("force", "N"), ("moment", "N m"), ("drive_angle", "rad")):
-                what = "a standard deviation" if name == "noise" else "a step"
-                self._need(f"{channel}_{name}", f"{what}, zero or positive [{unit}, or dimensionless]", at_least=0.0)
-        self._need("relative_noise", "a share, zero or positive", at_least=0.0)
-        for name in ("drive_angle_offset", "drive_angle_backlash"):
-            self._need(name, "an angle [rad]")
-        for name in ("force_range", "moment_range", "degrees_of_freedom"):
-            value = getattr(self, name)
-            if not value > 0.0:
-                raise ParameterError(f"the load cell's {name} is {value!r}: give a positive number, inf for none")
         for channel in ("force", "moment"):
             step, limit = getattr(self, f"{channel}_resolution"), getattr(self, f"{channel}_range")
             if not step <= limit:
@@ -107,36 +124,24 @@ class DataSheet:
                     "the step of a reading, and the largest reading, in the same unit"
                 )
         if min(self.bias_uncertainty) < 0.0:
-            raise ParameterError(
-                f"the load cell's bias_uncertainty is {self.bias_uncertainty!r}: give three standard deviations, each "
-                "zero or positive"
-            )
+            remedy = "give three standard deviations, each zero or positive"
+            raise refused("the load cell's bias_uncertainty", self.bias_uncertainty, remedy)
         if np.linalg.eigvalsh(self.correlation_matrix)[0] <= 1e-9:
-            raise ParameterError(
-                f"the load cell's correlation is {self.correlation!r}: no noise has these coefficients between holding "
-                "moment and force_x, holding moment and force_y, force_x and force_y: give smaller ones"
-            )
+            between = ", ".join(" and ".join(pair) for pair in _PAIRS)
+            remedy = f"no noise has these coefficients between {between}: give smaller ones"
+            raise refused("the load cell's correlation", self.correlation, remedy)
         if np.linalg.cond(np.array(self.gain)) > 1e9:
-            raise ParameterError(
-                f"the load cell's gain is {self.gain!r}: such a cell cannot tell three loads apart: give rows "
-                "that are independent, like ((1, 0, 0), (0, 1, 0), (0, 0, 1))"
-            )
+            remedy = "such a cell cannot tell three loads apart: give rows that are independent, like (1, 0, 0)"
+            raise refused("the load cell's gain", self.gain, remedy)
         if self.drift is not None and not isinstance(self.drift, RandomWalk | OrnsteinUhlenbeck):
-            raise ParameterError(
-                f"the load cell's drift is {shown(self.drift)}: give RandomWalk(...) or OrnsteinUhlenbeck(...)"
-            )
-        if self.frame is not None and not (isinstance(self.frame, str) and self.frame in FRAMES):
-            raise ParameterError(f"the load cell's frame is {shown(self.frame)}: choose 'fixed' or 'turning', or None")
+            raise refused("the load cell's drift", self.drift, "give RandomWalk(...) or OrnsteinUhlenbeck(...)")
+        if self.frame is not None:
+            check_choice("the load cell's frame", self.frame, FRAMES, "choose 'fixed' or 'turning', or None")
         if math.isfinite(self.degrees_of_freedom) and any(self.correlation):
             raise ParameterError(
                 "noise with outliers (degrees_of_freedom) and noise that is correlated between channels go together in "
                 "more than one way: leave one of the two out"
             )
-
-    def _need(self, name: str, what: str, at_least: float = -math.inf) -> None:
-        value = getattr(self, name)
-        if not (math.isfinite(value) and value >= at_least):
-            raise ParameterError(f"the load cell's {name} is {value!r}: give {what}")
 
     # ---- by channel, in the order of CHANNELS
 
@@ -218,9 +223,9 @@ class DataSheet:
         sense = np.where(np.asarray(direction) == "backward", -0.5, 0.5)
         return np.asarray(self.drive_angle_offset + self.drive_angle_backlash * sense)
 
-    def cuts_off(self, readings: Floats) -> NDArray[np.bool_]:
-        """Which readings, shape (..., 3), are at the end of the range, and stand for anything beyond."""
-        return np.asarray(np.abs(readings) >= self.limit * (1.0 - 1e-9) - 0.5 * self.resolution)
+    def cuts_off(self, readings: Floats, present: slice | NDArray[np.intp] = slice(None)) -> NDArray[np.bool_]:
+        """Which readings of the channels present are at the end of the range, and stand for anything beyond."""
+        return np.asarray(np.abs(readings) >= (self.limit * (1.0 - 1e-9) - 0.5 * self.resolution)[present])
 
     # ---- units and attributes
 
@@ -258,16 +263,11 @@ class DataSheet:
     def _all_entries(self) -> Iterator[tuple[str, Any]]:
         for name in _SCALARS:
             yield name, float(getattr(self, name))
-        for name in ("bias", "bias_uncertainty"):
-            yield from ((f"{name}_{c}", v) for c, v in zip(CHANNELS, getattr(self, name), strict=True))
-        for law, kind in _DRIFTS.items():
-            if isinstance(self.drift, kind):
-                yield from ((f"{law}_{field.name}", float(getattr(self.drift, field.name))) for field in fields(kind))
-        for i, j in product(range(3), range(3)):
-            yield f"gain_{CHANNELS[i]}_{CHANNELS[j]}", self.gain[i][j]
-        yield from zip(("lever_x", "lever_y"), self.lever, strict=True)
-        for (one, other), value in zip(_PAIRS, self.correlation, strict=True):
-            yield f"correlation_{one}_{other}", value
+        for name, names in _SEVERAL.items():
+            yield from zip(names, np.ravel(getattr(self, name)).tolist(), strict=True)
+            if name == "bias_uncertainty" and self.drift is not None:
+                law = _LAWS[type(self.drift)]
+                yield from ((f"{law}_{field.name}", getattr(self.drift, field.name)) for field in fields(self.drift))
         if self.frame is not None:
             yield "frame", self.frame
 
@@ -294,63 +294,15 @@ class DataSheet:
         if unknown:
             raise ParameterError(no_entry(unknown[0]))
 
-        def triple(stem: str, of: tuple[float, ...], names: tuple[str, ...] = CHANNELS) -> tuple[float, ...]:
-            return tuple(entries.get(f"{stem}_{name}", value) for name, value in zip(names, of, strict=True))
-
         options: dict[str, Any] = {name: entries[name] for name in (*_SCALARS, "frame") if name in entries}
-        for name in ("bias", "bias_uncertainty"):
-            options[name] = triple(name, (0.0, 0.0, 0.0))
-        options["gain"] = tuple(triple(f"gain_{c}", row) for c, row in zip(CHANNELS, _IDENTITY, strict=True))
-        options["lever"] = triple("lever", (0.0, 0.0), ("x", "y"))
-        options["correlation"] = triple("correlation", (0.0, 0.0, 0.0), tuple(f"{a}_{b}" for a, b in _PAIRS))
-        laws = [law for law in _DRIFTS if any(name.startswith(f"{law}_") for name in entries)]
+        ideal = dict(DataSheet()._all_entries())
+        for name, names in _SEVERAL.items():
+            numbers = [entries.get(one, ideal[one]) for one in names]
+            options[name] = [numbers[:3], numbers[3:6], numbers[6:]] if name == "gain" else numbers
+        laws = [kind for kind, law in _LAWS.items() if any(name.startswith(f"{law}_") for name in entries)]
         if len(laws) > 1:
             raise ParameterError("a load cell drifts by a random walk or an Ornstein-Uhlenbeck process, not by both")
-        for law in laws:
-            kind = _DRIFTS[law]
-            sizes = {field.name: entries.get(f"{law}_{field.name}") for field in fields(kind)}
-            options["drift"] = kind(**{name: value for name, value in sizes.items() if value is not None})
+        for kind in laws:
+            named = {field.name: f"{_LAWS[kind]}_{field.name}" for field in fields(kind)}
+            options["drift"] = kind(**{name: entries[entry] for name, entry in named.items() if entry in entries})
         return cls(**options)
-
-
-def _scalar(name: str, value: Any) -> float:
-    number = as_number(value)
-    if number is None:
-        raise ParameterError(f"the load cell's {name} is {shown(value)}: give a number")
-    return number
-
-
-def _triple(name: str, values: Any) -> Triple:
-    numbers = _finite(values)
-    if len(numbers) != 3:
-        raise ParameterError(f"the load cell's {name} is {shown(values)}: give three finite numbers ({_MEANING[name]})")
-    one, two, three = numbers
-    return one, two, three
-
-
-def _pair(name: str, values: Any) -> tuple[float, float]:
-    numbers = _finite(values)
-    if len(numbers) != 2:
-        raise ParameterError(f"the load cell's {name} is {shown(values)}: give two finite numbers (x, y)")
-    one, two = numbers
-    return one, two
-
-
-def _finite(values: Any) -> list[float]:
-    """Numbers; none if one of them is not finite."""
-    numbers = (
-        [as_number(value) for value in values] if np.iterable(values) and not isinstance(values, str | bytes) else []
-    )
-    finite = [number for number in numbers if number is not None and math.isfinite(number)]
-    return finite if len(finite) == len(numbers) else []
-
-
-def _rows(gain: Any) -> tuple[Triple, Triple, Triple]:
-    rows = tuple(gain) if np.iterable(gain) else ()
-    if len(rows) != 3 or not all(np.iterable(row) and not isinstance(row, str) for row in rows):
-        raise ParameterError(
-            f"the load cell's gain is {shown(gain)}: give three rows of three numbers, ((1, 0, 0), (0, 1, 0), "
-            "(0, 0, 1)) being that of an ideal cell"
-        )
-    one, two, three = (_triple("row of gain", row) for row in rows)
-    return one, two, three

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,12 +14,21 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["approximations", "checked_noise_scale", "filtered", "given_before", "log_likelihood", "refuse_silent"]
+__all__ = [
+    "approximations",
+    "checked_noise_scale",
+    "correlated_density",
+    "log_density_left_out",
+    "log_likelihood",
+    "normal_density",
+    "refuse_inexact",
+    "refuse_silent",
+]
 
 Floats = NDArray[np.float64]
 
 Given = Callable[[Floats, Floats, Floats, float, Floats, Floats], tuple[Floats, Floats]]
-"""What is new in each sample given others, and its variance, as `given_before`."""
+"""What is new in each sample given others, and its variance, as `_given_before`."""
 
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -41,7 +51,7 @@ def log_likelihood(
     given: Given | None = None,
 ) -> Floats:
     """Log-density of readings; see `LoadCell.log_likelihood`. Samples that know of others are `given` those before."""
-    given = given or given_before
+    given = given or _given_before
     readings, loads, scale = _checked(measured, predicted, noise_scale)
     present = _present(sheet, readings)
     if not present.size:
@@ -61,14 +71,14 @@ def log_likelihood(
     step, limit = sheet.resolution[present], sheet.limit[present]
     _refuse_beyond(readings, step, limit, present)
     if wanders or correlated:
-        _refuse_inexact(sheet, readings, step, limit, present, wanders, correlated)
+        refuse_inexact(sheet, readings, present, wanders, correlated)
         steps = step**2 / 12.0
         if not correlated:
             by_sample = _wandering(sheet, readings - expected, deviation**2 + steps, present, given)
         elif wanders:
             by_sample = _wandering_together(sheet, readings - expected, deviation, steps, present, correlation, given)
         else:
-            by_sample = _correlated(readings - expected, deviation, steps, correlation)
+            by_sample = correlated_density(readings - expected, deviation, steps, correlation)
     elif outliers or np.any(step) or np.any(np.isfinite(limit)):
         by_sample = np.zeros(np.broadcast_shapes(expected.shape[:-1], deviation.shape[:-1]))
         for c, (c_step, c_limit) in enumerate(zip(step.tolist(), limit.tolist(), strict=True)):
@@ -78,6 +88,13 @@ def log_likelihood(
     else:
         return _white(readings, expected, deviation, pointwise)
     return np.asarray(by_sample if pointwise else by_sample.sum(axis=-1))
+
+
+def log_density_left_out(
+    sheet: DataSheet, measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike = 1.0
+) -> Floats:
+    """Log-density of each sample given all the others; see `LoadCell.log_density_left_out`."""
+    return log_likelihood(sheet, measured, predicted, noise_scale, pointwise=True, given=_given_others)
 
 
 def _is_plain(sheet: DataSheet) -> bool:
@@ -136,9 +153,12 @@ def _white(readings: Floats, expected: Floats, deviation: Floats, pointwise: boo
     return np.asarray((np.ones(readings.shape[0]) @ squares * weight).sum(-1) + readings.shape[0] * offset)
 
 
-def _correlated(residual: Floats, deviation: Floats, steps: Floats, correlation: Floats) -> Floats:
+def correlated_density(residual: Floats, deviation: Floats, steps: Floats, correlation: Floats) -> Floats:
+    """Log-density of independent samples, whose channels share noise; NaN where a residual is."""
     if np.any(steps):
-        root = np.linalg.cholesky(_covariance(deviation, steps, correlation))
+        between = _covariance(deviation, steps, correlation)
+        known = np.isfinite(between).all(axis=(-2, -1), keepdims=True)
+        root: NDArray[np.floating[Any]] = np.linalg.cholesky(np.where(known, between, np.eye(correlation.shape[0])))
         deviation = np.ones(1)
         white = (np.linalg.inv(root) @ residual[..., None])[..., 0]
     else:
@@ -150,7 +170,8 @@ def _correlated(residual: Floats, deviation: Floats, steps: Floats, correlation:
 
 def _covariance(deviation: Floats, steps: Floats, correlation: Floats) -> Floats:
     """Between the channels of a reading: noise that they may share, and steps that they do not."""
-    return np.asarray(deviation[..., :, None] * correlation * deviation[..., None, :] + np.diag(steps))
+    own = steps[..., None] * np.eye(correlation.shape[0])
+    return np.asarray(deviation[..., :, None] * correlation * deviation[..., None, :] + own)
 
 
 def _channel(
@@ -220,9 +241,11 @@ def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: NDArr
     """Log-density of each sample given others, the noise of the channels being independent."""
     bias = np.array(sheet.bias_uncertainty)[present] ** 2
     if sheet.drift is None:
-        return _normal(*given(residual, noise, np.zeros_like(bias), 1.0, np.zeros_like(bias), bias))
+        return normal_density(*given(residual, noise, np.zeros_like(bias), 1.0, np.zeros_like(bias), bias))
     drift = sheet.drift.sizes[present] ** 2
-    return _normal(*given(residual, noise, sheet.drift.first * drift, sheet.drift.kept, sheet.drift.step * drift, bias))
+    return normal_density(
+        *given(residual, noise, sheet.drift.first * drift, sheet.drift.kept, sheet.drift.step * drift, bias)
+    )
 
 
 def _wandering_together(
@@ -246,28 +269,28 @@ def _wandering_together(
         (1.0, 1.0, 0.0) if sheet.drift is None else (sheet.drift.first, sheet.drift.kept, sheet.drift.step)
     )
     ones, none = np.ones(present.size), np.zeros(present.size)
-    return _normal(*given(residual, ones, first * share, kept, step * share, none)) - volume
+    return normal_density(*given(residual, ones, first * share, kept, step * share, none)) - volume
 
 
-def given_before(
+def _given_before(
     residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats, bias: Floats
 ) -> tuple[Floats, Floats]:
     """What is new in each sample given those before it, shape (..., samples, channels), and its variance.
 
-    What wanders is the zero of `filtered`, with a constant of variance `bias` beside it.
+    What wanders is the zero of `_filtered`, with a constant of variance `bias` beside it.
     """
     if kept == 1.0 or not np.any(bias):
-        return filtered(residual, noise, bias + first, kept, step)
+        return _filtered(residual, noise, bias + first, kept, step)
     # A bias beside a drift that forgets is regressed on: what the filter makes of 1 in every sample, it has that often.
     residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-    (new, of_one), total = filtered(np.stack([residual, ones]), noise, first, kept, step)
+    (new, of_one), total = _filtered(np.stack([residual, ones]), noise, first, kept, step)
     with np.errstate(divide="ignore"):
         known = 1.0 / bias + _sum_before(of_one**2 / total)
     new = new - of_one * _sum_before(of_one * new / total) / known
     return new, total + of_one**2 / known
 
 
-def filtered(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
+def _filtered(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
     """What is new in each sample, shape (..., samples, channels), and its variance: Kalman's filter by channel.
 
     What is filtered is a zero of variance `first` at the first sample, with white noise on top of it.
@@ -288,7 +311,48 @@ def filtered(residual: Floats, noise: Floats, first: Floats, kept: float, step: 
     return np.moveaxis(new, 0, -2), np.moveaxis(total, 0, -2)
 
 
-def _normal(deviation: Floats, variance: Floats) -> Floats:
+def _given_others(
+    residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats, bias: Floats
+) -> tuple[Floats, Floats]:
+    """What is new in each sample given all the others, and its variance; arguments as of `_given_before`.
+
+    With Q the inverse of the covariance of all samples r, they are (Q r)_i / Q_ii and 1 / Q_ii.
+    """
+    if kept == 1.0 or not np.any(bias):
+        weighed, precision = _weighed(residual, noise, bias + first, kept, step)
+    else:
+        # A bias beside a drift that forgets takes its share of one dimension from Q: Sherman and Morrison.
+        residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
+        (weighed, of_one), precision = _weighed(np.stack([residual, ones]), noise, first, kept, step)
+        with np.errstate(divide="ignore"):
+            known = 1.0 / bias + of_one.sum(axis=-2, keepdims=True)
+        weighed = weighed - of_one * weighed.sum(axis=-2, keepdims=True) / known
+        precision = precision - of_one**2 / known
+    return weighed / precision, 1.0 / precision
+
+
+def _weighed(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
+    """Q r and the diagonal of Q, by channel, of what is `_filtered`, back from the last sample.
+
+    The smoother of disturbances, which needs no matrices: Koopman 1993, doi 10.1093/biomet/80.1.117.
+    """
+    new, total = (np.moveaxis(values, -2, 0) for values in _filtered(residual, noise, first, kept, step))
+    noise = np.atleast_2d(noise)
+    white = np.broadcast_to(np.moveaxis(noise, -2, 0), (len(total), *noise.shape[:-2], noise.shape[-1]))
+    weighed, precision = np.empty(new.shape), np.empty(total.shape)
+    pull, weight = np.zeros(new.shape[1:]), np.zeros(total.shape[1:])
+    for i in reversed(range(len(total))):
+        left = kept * white[i] / total[i]
+        share = kept - left
+        own, certain = new[i] / total[i], 1.0 / total[i]
+        weighed[i] = own - share * pull
+        precision[i] = certain + share**2 * weight
+        pull = own + left * pull
+        weight = certain + left**2 * weight
+    return np.moveaxis(weighed, 0, -2), np.moveaxis(precision, 0, -2)
+
+
+def normal_density(deviation: Floats, variance: Floats) -> Floats:
     """Log-density of independent channels."""
     return np.asarray(-0.5 * (deviation**2 / variance + np.log(variance) + _LOG_2PI).sum(axis=-1))
 
@@ -350,14 +414,8 @@ def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: NDArr
         )
 
 
-def _refuse_inexact(
-    sheet: DataSheet,
-    readings: Floats,
-    step: Floats,
-    limit: Floats,
-    present: NDArray[np.intp],
-    wanders: bool,
-    correlated: bool,
+def refuse_inexact(
+    sheet: DataSheet, readings: Floats, present: NDArray[np.intp], wanders: bool, correlated: bool
 ) -> None:
     """Refuse combinations whose likelihood has no exact form, nor one that is nearly exact."""
     what = "drift or an unknown bias" if wanders else "correlated noise"
@@ -365,9 +423,9 @@ def _refuse_inexact(
         raise ParameterError(
             f"the likelihood of {what} with outliers (degrees_of_freedom) has no closed form: leave one of them out"
         )
-    at_limit = np.abs(readings) >= limit * (1.0 - _AT_LIMIT) - 0.5 * step
-    if np.any(at_limit):
-        sample, channel = np.argwhere(at_limit)[0]
+    at_limit = np.argwhere(sheet.cuts_off(readings, present))
+    if at_limit.size:
+        sample, channel = at_limit[0]
         raise ParameterError(
             f"sample {sample} of {CHANNELS[present[channel]]} is at the end of the load cell's range, and with {what} "
             "the likelihood of such a sample has no closed form: remove it, or leave one of the two out"

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.data_sheet import DataSheet
-from tactile_bayes.load_cell.likelihood import log_likelihood, refuse_silent
+from tactile_bayes.load_cell.likelihood import (
+    correlated_density,
+    log_likelihood,
+    normal_density,
+    refuse_inexact,
+    refuse_silent,
+)
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["LoneSamples"]
 
 Floats = NDArray[np.float64]
-
-_LOG_2PI = math.log(2.0 * math.pi)
 
 
 class LoneSamples:
@@ -47,19 +48,7 @@ class LoneSamples:
         for index in range(len(CHANNELS)):
             refuse_silent(sheet, index)
         if self._wanders:
-            if math.isfinite(sheet.degrees_of_freedom):
-                raise ParameterError(
-                    "drift or an unknown bias with outliers (degrees_of_freedom) has no closed form: leave one of them "
-                    "out"
-                )
-            cut_off = np.argwhere(sheet.cuts_off(readings))
-            if cut_off.size:
-                sample, channel = cut_off[0]
-                raise ParameterError(
-                    f"sample {sample} of {CHANNELS[channel]} is at the end of the load cell's range, and with drift or "
-                    "an unknown bias the likelihood of such a sample has no closed form: remove it, or leave drift and "
-                    "bias_uncertainty out"
-                )
+            refuse_inexact(sheet, readings, np.arange(len(CHANNELS)), wanders=True, correlated=False)
 
     def take(self, where: NDArray[np.intp]) -> LoneSamples:
         """Some of the samples."""
@@ -79,12 +68,5 @@ class LoneSamples:
         )
         own = sheet.resolution**2 / 12.0 + self._wandering**2
         if not any(sheet.correlation):
-            variance = deviation**2 + own
-            return np.asarray(-0.5 * (residual**2 / variance + np.log(variance) + _LOG_2PI).sum(axis=-1))
-        matrix = deviation[..., :, None] * sheet.correlation_matrix * deviation[..., None, :]
-        matrix = matrix + own[..., None] * np.eye(3)
-        known = np.isfinite(matrix).all(axis=(-2, -1), keepdims=True)
-        root = np.linalg.cholesky(np.where(known, matrix, np.eye(3)))
-        white = (np.linalg.inv(root) @ residual[..., None])[..., 0]
-        volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
-        return np.asarray(-0.5 * (white**2).sum(axis=-1) - volume - 1.5 * _LOG_2PI)
+            return normal_density(residual, deviation**2 + own)
+        return correlated_density(residual, deviation, own, sheet.correlation_matrix)

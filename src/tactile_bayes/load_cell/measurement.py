@@ -1,4 +1,4 @@
-"""The measurement of a record by a sensor: its columns as the sensor reads them, the truth beside them."""
+"""The measurement of a record by a sensor, the truth beside it; and what is known of its errors taken out again."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
-from tactile_bayes.load_cell.data_sheet import DataSheet
+from tactile_bayes.load_cell.data_sheet import CERTAIN, DataSheet
 from tactile_bayes.record import CHANNELS, column_of, frame_of, in_frame, present_channels, validate
 
-__all__ = ["measured", "stated_entries"]
+__all__ = ["corrected", "measured", "stated_entries"]
 
 _PREFIX = "load_cell_"
+_TAKEN_OUT = tuple(
+    f"{_PREFIX}{name}" for name in ("bias_h", "bias_f", "gain_", "lever_", "drive_angle_offset", "drive_angle_backlash")
+)
 
 
 def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
@@ -48,6 +51,28 @@ def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> 
         _put(made, "drive_angle", angles)
     made.attrs |= {_PREFIX + name: value for name, value in entries.items()}
     return validate(made)
+
+
+def corrected(sheet: DataSheet, record: xr.Dataset) -> xr.Dataset:
+    """The record without bias, gain, lever, and the encoder's offset and backlash; see `LoadCell.corrected`."""
+    ideal = DataSheet()
+    if all(getattr(sheet, name) == getattr(ideal, name) for name in CERTAIN):
+        return record
+    corrected = validate(record)
+    present = [CHANNELS.index(name) for name in present_channels(corrected)]
+    if np.any(np.delete(sheet.gain_matrix, present, axis=1)[present]):
+        raise ParameterError(
+            "the load cell has cross-talk from a channel that the record misses: its gain and lever cannot be taken "
+            "out; infer_contour works without"
+        )
+    loads = np.stack([corrected[CHANNELS[i]].values for i in present], axis=-1) - np.array(sheet.bias)[present]
+    if (sheet.gain, sheet.lever) != (ideal.gain, ideal.lever):
+        loads = loads @ np.linalg.inv(sheet.gain_matrix[np.ix_(present, present)]).T
+    for values, index in zip(loads.T, present, strict=True):
+        corrected[CHANNELS[index]].values = values
+    corrected["drive_angle"].values = corrected["drive_angle"].values - sheet.misread(corrected["direction"].values)
+    corrected.attrs = {k: v for k, v in corrected.attrs.items() if not str(k).startswith(_TAKEN_OUT)}
+    return validate(corrected)
 
 
 def stated_entries(record: xr.Dataset) -> dict[str, Any]:

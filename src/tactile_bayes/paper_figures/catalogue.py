@@ -124,15 +124,8 @@ def figure(
     >>> len(made.axes)
     3
     """
-    entry, choice = _chosen(
-        number,
-        distances=distances,
-        drive_step=drive_step,
-        rods=rods,
-        load_cell=load_cell,
-        seed=seed,
-        width=width,
-    )
+    options = {"drive_step": drive_step, "rods": rods, "load_cell": load_cell, "seed": seed, "width": width}
+    entry, choice = _chosen(number, distances=distances, **options)
     return entry.draw(choice)
 
 

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Real
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tactile_bayes.checks import check_whole_number
+from tactile_bayes.checks import as_numbers, check_number, check_optional, check_whole_number
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.plotting.axes import AxesArray
 from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
 from tactile_bayes.scanning import Scan, scan
 
-__all__ = ["Choice", "Direction", "Profile", "choice_of"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Choice", "Direction", "Limits", "Profile", "choice_of"]
 
 Profile = Literal["I", "II", "III", "IV"]
 Direction = Literal["both", "forward", "backward"]
+Limits = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,20 @@ class Choice:
         """Whether panels have to stand below one another."""
         return self.width < 0.5 * (COLUMN_WIDTH + PAGE_WIDTH)
 
+    def map_panels(
+        self, count: int, limits: Limits, *, beside: float, between: float, above: float, widest: float = np.inf
+    ) -> tuple[Figure, AxesArray]:
+        """A figure of maps of one scale, shape (rows, columns), with room for labels, titles and legend [inches]."""
+        from matplotlib.figure import Figure
+
+        columns = 1 if self.is_column else min(2, count)
+        rows = -(-count // columns)
+        (left, right), (bottom, top) = limits
+        high = min(self.width / columns - beside, widest) * (top - bottom) / (right - left) + between
+        figure = Figure(figsize=(self.width, rows * high + above), layout="compressed")
+        options: dict[str, Any] = {"xlim": limits[0], "ylim": limits[1], "aspect": "equal"}
+        return figure, figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
+
     def scan(self, profile: Profile, distance: float, direction: Direction = "both") -> Scan:
         """Of a profile of the paper at a distance.
 
@@ -69,13 +87,7 @@ class Choice:
 
 
 def choice_of(
-    distances: Sequence[float],
-    *,
-    drive_step: float,
-    rods: int,
-    load_cell: LoadCell | None,
-    seed: int,
-    width: float,
+    distances: Sequence[float], *, drive_step: float, rods: int, load_cell: LoadCell | None, seed: int, width: float
 ) -> Choice:
     """The same, if it can be drawn.
 
@@ -84,15 +96,11 @@ def choice_of(
     ParameterError
         If it cannot.
     """
-    try:
-        q = np.asarray(distances, dtype=float)
-    except (TypeError, ValueError):
-        q = np.empty(0)
-    if q.ndim != 1 or not q.size or not np.all(np.isfinite(q) & (q > 0.0)):
+    q = as_numbers(distances)
+    if q is None or q.ndim != 1 or not q.size or not np.all(np.isfinite(q) & (q > 0.0)):
         raise ParameterError(f"distances are {distances!r}: give rod lengths above 0, like [0.3, 0.5]")
-    check_whole_number("rods", rods, 1, "give a whole number from 1 up, like 15")
-    if not (isinstance(width, Real) and 3.0 <= width <= 12.0):
-        raise ParameterError(f"width is {width!r}: give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}")
-    if load_cell is not None and not isinstance(load_cell, LoadCell):
-        raise ParameterError(f"load_cell is {load_cell!r}: give a LoadCell, or None for records without noise")
-    return Choice(tuple(np.unique(q).tolist()), drive_step, int(rods), load_cell, seed, float(width))
+    rods = check_whole_number("rods", rods, 1, "give a whole number from 1 up, like 15")
+    inches = f"give inches from 3 to 12, like {COLUMN_WIDTH} or {PAGE_WIDTH}"
+    width = check_number("width", width, inches, least=3.0, most=12.0)
+    check_optional("load_cell", load_cell, LoadCell, "give a LoadCell")
+    return Choice(tuple(np.unique(q).tolist()), drive_step, rods, load_cell, seed, width)

@@ -9,8 +9,9 @@ import xarray as xr
 
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.paper_figures.choice import Choice, Profile
-from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, Floats, set_unit
-from tactile_bayes.plotting.maps import draw_object, draw_pivot
+from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.plotting.maps import draw_object, draw_pivot, label_map
+from tactile_bayes.plotting.marks import PALETTE, PHASES
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.scanning import Scan
 from tactile_bayes.shape import rod_shape
@@ -112,8 +113,7 @@ def _draw_state(ax: Axes, made: Scan, state: dict[str, float], phase: str) -> No
     _draw_moment(ax, state["holding_moment"])
     if phase == "tangential":
         _write(ax, "tip", (float(x[-1]), float(y[-1])), 0.02 * along, ha="left", va="center", bbox=_CLEAR)
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", {}, np.zeros(1))
-    set_unit(ax.yaxis, LABELS["contact_y"] + " ", "contact_y", {}, np.zeros(1))
+    label_map(ax, {}, np.zeros(1))
 
 
 def _write(ax: Axes, words: str, at: Any, away: Any, **style: Any) -> None:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.paper_figures.choice import Choice, Direction, Profile
-from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
-from tactile_bayes.plotting.axes import PHASES
+from tactile_bayes.paper_figures.choice import Choice, Direction, Limits, Profile
+from tactile_bayes.plotting.legends import legend_entries, legend_in_rows
+from tactile_bayes.plotting.marks import PHASES
 from tactile_bayes.plotting.rod_map import rods
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.shape import rod_shape
@@ -25,34 +25,20 @@ _LEGEND = ([*PHASES.values(), "contour", "pivot"], ["first contact", "phase chan
 _ROOM = 0.05
 """Around the rods [L]."""
 
-_ABOVE = 0.7
-"""Height of what is above the panels: the legend [inches]."""
-
-_AROUND = (0.45, 0.38)
-"""Width and height of labels and title around a panel [inches]."""
-
 
 def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -> Figure:
     """Deformed rods in a panel for each distance and sweep, all at one scale."""
-    from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
     scans = [choice.scan(profile, distance, direction) for distance in choice.distances]
     sweeps = [(made, number) for made in scans for number in range(len(made.sweeps))]
-    columns = 1 if choice.is_column else min(2, len(sweeps))
-    rows = -(-len(sweeps) // columns)
-    limits = _limits(sweeps)
-    (left, right), (bottom, top) = limits
-    wide = min(choice.width / columns - _AROUND[0], 3.6)
-    high = wide * (top - bottom) / (right - left) + _AROUND[1]
-    figure = Figure(figsize=(choice.width, rows * high + _ABOVE), layout="compressed")
-    options: dict[str, Any] = {"xlim": limits[0], "ylim": limits[1]}
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
+    figure, grid = choice.map_panels(len(sweeps), _limits(sweeps), beside=0.45, between=0.38, above=0.7, widest=3.6)
+    columns = grid.shape[1]
     found: dict[str, Any] = {}
     grid[0, 0].xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))  # sparse: panels are neighbours
     for ax, (made, number) in zip(grid.ravel(), sweeps, strict=False):
         rods(made, sweep=number, count=choice.rods, ax=ax)
-        found |= entries_of([ax])
+        found |= legend_entries(ax)
         ax.get_legend().remove()
         ax.set_title(f"{made.sweeps[number].direction}, $q$ = {_distance(made):g} $L$")
     for place, ax in enumerate(grid.ravel()):
@@ -69,7 +55,7 @@ def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -
     return figure
 
 
-def _limits(sweeps: list[tuple[Scan, int]]) -> tuple[tuple[float, float], tuple[float, float]]:
+def _limits(sweeps: list[tuple[Scan, int]]) -> Limits:
     """In x and in y, in which all the rods of all sweeps have room."""
     corners = []
     for made, number in sweeps:
@@ -81,11 +67,8 @@ def _limits(sweeps: list[tuple[Scan, int]]) -> tuple[tuple[float, float], tuple[
         states = [np.append(a, b) for a, b in zip(wrench, at_ends, strict=True)]
         x, y = rod_shape(*states, side=1 if events.direction == "forward" else -1)
         corners.append([x.min(), x.max(), y.min(), y.max()])
-    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-    return (
-        (float(low[0]) - _ROOM, float(high[1]) + _ROOM),
-        (float(low[2]) - _ROOM, float(high[3]) + _ROOM),
-    )
+    (left, _, bottom, _), (_, right, _, top) = np.min(corners, axis=0), np.max(corners, axis=0)
+    return (float(left) - _ROOM, float(right) + _ROOM), (float(bottom) - _ROOM, float(top) + _ROOM)
 
 
 def _distance(made: Scan) -> float:

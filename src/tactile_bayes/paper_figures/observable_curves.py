@@ -8,9 +8,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.paper_figures.choice import Choice, Direction, Profile
-from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
-from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, legend_entry, set_unit
-from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, events_by_label, load_of, phase_runs, with_events
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_in_rows
+from tactile_bayes.plotting.marks import PHASES
+from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, draw_events, phase_runs, with_events
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.scanning import scan
 
@@ -63,14 +64,14 @@ def draw_observable_curves(profile: Profile, direction: Direction, choice: Choic
         ax.yaxis.set_major_locator(MaxNLocator(5))
         set_unit(ax.yaxis, f"{LABELS[channel]}\n", channel, {}, np.zeros(1))
     panels[-1].xaxis.set_major_locator(MultipleLocator(30.0))
-    panels[-1].set_xlabel(f"{LABELS['drive_angle']} [°]")
+    panels[-1].set_xlabel(DRIVE_ANGLE)
     figure.align_ylabels(list(panels))
     groups = [
         [_distance_in_words(distance) for distance in choice.distances],
         [*_LINES, *PHASES.values()],
         list(EVENT_MARKERS),
     ]
-    legend_in_rows(figure, entries_of(panels), groups, 2 if choice.is_column else 4)
+    legend_in_rows(figure, legend_entries(*panels), groups, 2 if choice.is_column else 4)
     return figure
 
 
@@ -100,16 +101,4 @@ def _draw_sweep(ax: Axes, sweep: xr.Dataset, events: SweepEvents, channel: str, 
     line: dict[str, Any] = {"color": colour, "linestyle": _LINES[events.direction], "zorder": 2.5}
     for run in phase_runs(phase):
         ax.plot(np.degrees(angle[run]), value[run], linewidth=_WIDTHS[str(phase[run.start])], **line)
-    for label, marked in events_by_label(events).items():
-        style = dict(EVENT_MARKERS[label])
-        style["markersize"] *= _SHRUNK
-        ax.plot(
-            np.degrees([event.drive_angle for event in marked]),
-            [load_of(event, channel, "fixed") for event in marked],
-            color=PALETTE["change"],
-            linestyle="none",
-            markeredgewidth=0.7,
-            zorder=4,
-            label=label,
-            **style,
-        )
+    draw_events(ax, events, channel, "fixed", _SHRUNK, markeredgewidth=0.7)

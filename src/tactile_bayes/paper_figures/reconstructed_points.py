@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.paper_figures.choice import Choice, Profile
-from tactile_bayes.paper_figures.legends import entries_of, legend_in_rows
-from tactile_bayes.plotting.axes import BASES, LABELS, PALETTE, legend_entry, set_unit
+from tactile_bayes.plotting.labels import LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_in_rows
 from tactile_bayes.plotting.maps import draw_pivot, outline
+from tactile_bayes.plotting.marks import BASES, PALETTE, SWEEP_MARKERS
 from tactile_bayes.reconstruction import reconstruct
 
 if TYPE_CHECKING:
@@ -19,10 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_reconstructed_points"]
 
-_SWEEPS: dict[str, dict[str, Any]] = {
-    "forward": {"color": BASES[3], "marker": "o"},
-    "backward": {"color": BASES[2], "marker": "^"},
-}
+_COLOURS = {"forward": BASES[3], "backward": BASES[2]}
 _X = (-0.92, 0.92)
 _Y = (-0.06, 1.0)
 """What every panel shows [L]: no rod reaches farther."""
@@ -30,16 +28,9 @@ _Y = (-0.06, 1.0)
 
 def draw_reconstructed_points(profiles: Sequence[Profile], choice: Choice) -> Figure:
     """Points of a forward and a backward sweep, and the gap between them, in a panel for each profile."""
-    from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
-    columns = 1 if choice.is_column else 2
-    rows = -(-len(profiles) // columns)
-    wide = choice.width / columns - 0.4
-    high = wide * (_Y[1] - _Y[0]) / (_X[1] - _X[0]) + 0.3
-    figure = Figure(figsize=(choice.width, rows * high + 0.8), layout="compressed")
-    options: dict[str, Any] = {"xlim": _X, "ylim": _Y, "aspect": "equal"}
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
+    figure, grid = choice.map_panels(len(profiles), (_X, _Y), beside=0.4, between=0.3, above=0.8)
     grid[0, 0].xaxis.set_major_locator(MultipleLocator(0.5))
     for ax, profile in zip(grid.ravel(), profiles, strict=True):
         for distance in choice.distances:
@@ -50,10 +41,10 @@ def draw_reconstructed_points(profiles: Sequence[Profile], choice: Choice) -> Fi
         set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", {}, np.zeros(1))
     for ax in grid[:, 0]:
         set_unit(ax.yaxis, LABELS["contact_y"] + " ", "contact_y", {}, np.zeros(1))
-    groups = [[f"{direction} sweep" for direction in _SWEEPS], ["contour", "gap", "pivot"]]
+    groups = [[f"{direction} sweep" for direction in _COLOURS], ["contour", "gap", "pivot"]]
     if not choice.is_column:
         groups = [[*groups[0], *groups[1]]]
-    legend_in_rows(figure, entries_of(list(grid.flat)), groups, 3 if choice.is_column else 5)
+    legend_in_rows(figure, legend_entries(*grid.flat), groups, 3 if choice.is_column else 5)
     return figure
 
 
@@ -71,8 +62,9 @@ def _draw_points(ax: Axes, profile: Profile, distance: float, choice: Choice) ->
     lowest = outline(made.contour, *_X)[1].min()
     ax.text(0.0, lowest - 0.04, f"$q$ = {distance:g} $L$", ha="center", va="top", fontsize="small")
     x, y = contacts["contact_x"].values, contacts["contact_y"].values
-    for direction, style in _SWEEPS.items():
+    for direction, colour in _COLOURS.items():
         chosen = (contacts["direction"].values == direction) & np.isfinite(x) & np.isfinite(y)
-        points: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0.0, **style}
+        points: dict[str, Any] = {"linestyle": "none", "color": colour, "marker": SWEEP_MARKERS[direction]}
+        points["markeredgewidth"] = 0.0
         ax.plot(x[chosen], y[chosen], markersize=2.4, zorder=3, **points)
         legend_entry(ax, f"{direction} sweep", markersize=4.5, **points)

@@ -5,14 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.checks import check_probability, check_seed, check_whole_number
+from tactile_bayes.checks import (
+    TINY,
+    check_choice,
+    check_numbers,
+    check_path,
+    check_probability,
+    check_seed,
+    check_whole_number,
+    refused,
+)
 from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.families import Prior
@@ -143,8 +151,7 @@ def design(
     >>> bool(found.width[1] > found.width[0])  # farther away
     True
     """
-    if criterion not in CRITERIA:
-        raise ParameterError(f"criterion is {criterion!r}: choose {', '.join(CRITERIA)}")
+    check_choice("criterion", criterion, CRITERIA)
     check_whole_number("draws", draws, 2)
     check_seed(seed)
     check_probability("probability", probability)
@@ -167,13 +174,15 @@ def design(
         if taken:
             raise ParameterError(f"{', '.join(taken)} and a posterior, which has its own: leave one of the two")
         told = known_from_posterior(known, draws=int(draws), rng=rng)
-    steps = np.atleast_1d(np.asarray(drive_steps, dtype=float))
-    if steps.ndim != 1 or not steps.size or not np.all((steps > 0.0) & (steps <= 0.5)):
-        raise ParameterError(f"drive_steps are {drive_steps!r}: give positive angles in radians, at most 0.5")
+    remedy = "give positive angles in radians, at most 0.5"
+    several = drive_steps if np.iterable(drive_steps) else [drive_steps]
+    steps = check_numbers("drive_steps", several, remedy, shape=(None,), least=TINY, most=0.5)
     candidates = tuple(Candidate(base, float(step)) for base, step in product(_bases(bases, told), steps))
     x = np.linspace(*_span(span, told), _PLACES)
     question = Question(told, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
-    with open_ledger(question_in_words(question), None if out is None else Path(out).resolve(), CANDIDATES) as ledger:
+    with open_ledger(
+        question_in_words(question), None if out is None else check_path("out", out).resolve(), CANDIDATES
+    ) as ledger:
         found = keep_outcomes(
             ledger, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
         )
@@ -198,20 +207,19 @@ def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:
     if bases is None:
         x, y = told.bases[0] if told.bases else (0.0, 0.0)
         return [(float(x + told.length * dx), float(y + told.length * dy)) for dy in ABOVE for dx in ACROSS]
-    pivots = np.asarray(bases, dtype=float)
-    if pivots.ndim != 2 or pivots.shape[1] != 2 or not pivots.size or not np.all(np.isfinite(pivots)):
-        raise ParameterError(f"bases are {bases!r}: give a list of pivots, [(x, y), (x, y)]")
+    pivots = check_numbers("bases", bases, "give a list of pivots, [(x, y), (x, y)]", shape=(None, 2))
     if len(np.unique(pivots, axis=0)) < len(pivots):
-        raise ParameterError("bases: one of them is given twice")
-    return [(float(x), float(y)) for x, y in pivots]
+        raise refused("bases", bases, "one of them is given twice")
+    return [(x, y) for x, y in pivots.tolist()]
 
 
 def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, float]:
     if span is not None:
-        ends = np.asarray(span, dtype=float)
-        if ends.shape != (2,) or not np.all(np.isfinite(ends)) or not ends[0] < ends[1]:
-            raise ParameterError(f"span is {span!r}: give two values of x, the smaller first")
-        return float(ends[0]), float(ends[1])
+        remedy = "give two values of x, the smaller first"
+        left, right = check_numbers("span", span, remedy, shape=(2,)).tolist()
+        if not left < right:
+            raise refused("span", span, remedy)
+        return left, right
     model = told.model(told.blank(told.bases or [(0.0, 0.0)], COARSE))
     events = events_of(model.likelihood, model.contours(told.points), model.rig(told.points), exact=False)
     first = events["first_contact_x"]

@@ -9,15 +9,26 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.checks import check_probability, check_seed, check_whole_number
+from tactile_bayes.checks import (
+    TINY,
+    check_mapping,
+    check_names,
+    check_number,
+    check_numbers,
+    check_optional,
+    check_path,
+    check_probability,
+    check_seed,
+    check_whole_number,
+    refused,
+)
 from tactile_bayes.contours import Contour, paper_profile
-from tactile_bayes.errors import ParameterError, StudyError
+from tactile_bayes.errors import StudyError
 from tactile_bayes.inference.contour_problem import prior_in_words
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
@@ -145,6 +156,7 @@ def error_map(
     >>> found.rms_across.sel(reconstruction="constrained").values.ravel().round(4) < 0.02
     array([ True,  True])
     """
+    check_optional("rod", rod, Rod)
     rod_taken = rod or Rod()
     objects = _objects(contours, rod_taken)
     distances, noise_factors = _grid("distances", distances), _grid("noise_factors", noise_factors)
@@ -155,20 +167,18 @@ def error_map(
     check_seed(seed)
     check_probability("probability", probability)
     cells = tuple(
-        MapCell(name, float(distance) * rod_taken.length, float(factor))
+        MapCell(name, distance * rod_taken.length, factor)
         for name, distance, factor in product(objects, distances, noise_factors)
     )
-    if isinstance(nuisances, str):
-        raise ParameterError(f"nuisances is {nuisances!r}: give a list of names, like [{nuisances!r}]")
     plan = Plan(
         next(iter(objects.values())),
         load_cell=load_cell,
         rod=rod,
-        base=(float(base_x), 0.0),
+        base=(check_number("base_x", base_x), 0.0),
         drive_step=drive_step,
         friction=friction,
-        nuisances=tuple(nuisances),
-        priors=dict(priors or {}),
+        nuisances=nuisances,
+        priors={} if priors is None else priors,
     )
     chosen = np.unique(np.linspace(0, len(cells) - 1, min(posterior_cells, len(cells))).round().astype(int))
     task = MapTask(
@@ -180,34 +190,31 @@ def error_map(
         float(probability),
         int(seed),
     )
-    with open_ledger(_words(task), None if out is None else Path(out).resolve(), CELLS) as ledger:
+    with open_ledger(_words(task), None if out is None else check_path("out", out).resolve(), CELLS) as ledger:
         kept = keep_outcomes(
             ledger, error_cell, task, len(cells), workers=workers, scheduler=scheduler, progress=progress
         )
-    return _labelled(task, kept, list(objects), list(distances), list(noise_factors))
+    return _labelled(task, kept, list(objects), distances, noise_factors)
 
 
 def _grid(name: str, values: Sequence[float]) -> list[float]:
-    try:
-        numbers = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        numbers = np.empty(0)
-    if numbers.ndim != 1 or not numbers.size or not np.all(np.isfinite(numbers) & (numbers > 0.0)):
-        raise ParameterError(f"{name} are {values!r}: give a list of positive numbers")
-    if np.unique(numbers).size != numbers.size:
-        raise ParameterError(f"{name} are {values!r}: one of them is given twice")
-    return [float(number) for number in numbers]
+    numbers = check_numbers(name, values, "give a list of positive numbers", shape=(None,), least=TINY).tolist()
+    if len(set(numbers)) < len(numbers):
+        raise refused(name, values, "one of them is given twice")
+    return numbers
 
 
 def _objects(contours: Mapping[str, Contour] | Sequence[str], rod: Rod) -> dict[str, Contour]:
-    if isinstance(contours, str) or not contours:
-        raise ParameterError(f"contours is {contours!r}: give names of the paper's profiles, or contours by name")
-    if isinstance(contours, Mapping):
+    remedy = "give names of the paper's profiles, or contours by name"
+    if isinstance(contours, Mapping) and contours:
+        check_mapping("contours", contours, remedy)
         for contour in contours.values():
             family_parameters(contour)  # or a refusal
         return dict(contours)
+    if isinstance(contours, str) or not check_names("contours", contours):
+        raise refused("contours", contours, remedy)
     if len(set(contours)) < len(contours):
-        raise ParameterError(f"contours is {contours!r}: one of them is given twice")
+        raise refused("contours", contours, "one of them is given twice")
     return {name: enlarged(paper_profile(name, q=0.5), rod.length) for name in contours}  # type: ignore[arg-type]
 
 

@@ -17,7 +17,7 @@ from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_priors
-from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
@@ -105,13 +105,7 @@ def known_from_prior(
     empty = np.zeros((0, 0))
     known = Knowledge(family, empty, empty, (), rod, cell, friction, tuple(nuisances), dict(priors or {}))
     model = known.model(known.blank([base], COARSE))
-    strangers = sorted(set(known.priors) - set(model.names))
-    if strangers:
-        raise ParameterError(
-            f"there is a prior of {', '.join(strangers)}, which is no parameter: there are {', '.join(model.names)}"
-        )
-    for name, prior in known.priors.items():
-        refuse_no_prior(name, prior)
+    refuse_wrong_priors(known.priors, model.names)
     points, _ = model.draw_prior(rng, draws)
     many, _ = model.draw_prior(rng, 1000)
     return replace(known, points=points, precision=_precision(many))

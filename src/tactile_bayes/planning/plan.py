@@ -11,12 +11,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.checks import check_mapping, check_names, check_optional
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_priors
-from tactile_bayes.inference.families import Prior, refuse_no_prior
+from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell
@@ -66,12 +67,10 @@ class Plan:
     priors: Mapping[str, Prior] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.rod is not None and not isinstance(self.rod, Rod):
-            raise ParameterError(f"rod is {self.rod!r}: give a Rod, or None")
-        if self.load_cell is not None and not isinstance(self.load_cell, LoadCell):
-            raise ParameterError(f"load_cell is {self.load_cell!r}: give a LoadCell, or None")
-        if isinstance(self.nuisances, str):
-            raise ParameterError(f"nuisances is {self.nuisances!r}: give a list of names, like [{self.nuisances!r}]")
+        check_optional("rod", self.rod, Rod)
+        check_optional("load_cell", self.load_cell, LoadCell)
+        check_mapping("priors", self.priors, "give distributions by name")
+        object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
         deviations = self.cell.standard_deviations
         silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]
         if silent:
@@ -126,13 +125,7 @@ class Plan:
         noise = noise_of(self.record, self.cell)
         rig = nuisances_of(self.record, self.nuisances, self.priors, noise.cell, self.friction)
         priors = {**contour_priors(self.record, family), **rig.priors, **noise.priors}
-        for name, prior in self.priors.items():
-            refuse_no_prior(name, prior)
-        strangers = sorted(set(self.priors) - set(priors))
-        if strangers:
-            raise ParameterError(
-                f"there is a prior of {', '.join(strangers)}, which is no parameter: there are {', '.join(priors)}"
-            )
+        refuse_wrong_priors(self.priors, priors)
         model = ContourModel(self.record, family, rig, noise, {**priors, **self.priors})
         model.likelihood.exact = True
         return model

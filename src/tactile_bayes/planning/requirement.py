@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from tactile_bayes.checks import TINY, check_choice, check_kind, check_numbers, check_positive, check_probability
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
 from tactile_bayes.ledger import TaskProgress
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
@@ -80,9 +81,10 @@ def required_noise(
     ParameterError
         If a width is not positive, or no noise is small enough for it.
     """
-    wanted = np.atleast_1d(np.asarray(band_width, dtype=float))
-    if wanted.ndim != 1 or not np.all(np.isfinite(wanted) & (wanted > 0.0)):
-        raise ParameterError(f"band_width is {band_width!r}: give a positive length, or several")
+    check_kind("plan", plan, Plan, "give a Plan")
+    check_probability("probability", probability)
+    several = band_width if np.iterable(band_width) else [band_width]
+    wanted = check_numbers("band_width", several, "give a positive length, or several", shape=(None,), least=TINY)
     band = _Band(plan, _places(plan, where), probability)
     least, most = band.width(_LEAST), band.width(_MOST)
     if np.any(wanted <= least):
@@ -173,15 +175,20 @@ def required_rod(
         If the plan is not in SI units or states no load cell, or a length, a diameter, the modulus or the strain is not
         positive.
     """
+    check_kind("plan", plan, Plan, "give a Plan")
+    check_probability("probability", probability)
+    check_positive("elastic_strain", elastic_strain)
     if plan.rod is None or plan.rod.is_dimensionless or plan.load_cell is None:
         raise ParameterError(
             "a rod is sought for a load cell in N and N m: give a plan with a rod in SI, and a load_cell"
         )
     x = _places(plan, where)
-    sides = {"length": np.atleast_1d(lengths), "diameter": np.atleast_1d(diameters)}
-    for name, values in sides.items():
-        if values.ndim != 1 or not values.size or not np.all(np.isfinite(values) & (values > 0.0)):
-            raise ParameterError(f"{name}s are {values!r}: give a list of positive numbers [m]")
+    sides = {
+        name: check_numbers(
+            f"{name}s", np.atleast_1d(values), "give a list of positive numbers [m]", shape=(None,), least=TINY
+        )
+        for name, values in (("length", lengths), ("diameter", diameters))
+    }
     shape = (sides["length"].size, sides["diameter"].size)
     width, strain = np.full(shape, np.nan), np.full(shape, np.nan)
     status = np.full(shape, "", dtype="U16")
@@ -230,9 +237,8 @@ def _judged(plan: Plan, elastic_strain: float, x: Floats, probability: float) ->
 
 def _places(plan: Plan, where: Where) -> Floats:
     """Values of x."""
+    check_choice("where", where, ("everywhere", "gap", "touched"))
     places = [stretch.x for stretch in stretches(plan.scan) if where in ("everywhere", stretch.name)]
     if not places:
-        if where in ("gap", "touched"):
-            raise ParameterError("the sweeps leave no gap: ask for the band where the contour is touched")
-        raise ParameterError(f"where is {where!r}: choose 'everywhere', 'gap' or 'touched'")
+        raise ParameterError("the sweeps leave no gap: ask for the band where the contour is touched")
     return np.concatenate(places)

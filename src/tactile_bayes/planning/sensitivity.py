@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from tactile_bayes.checks import check_names, check_optional, refused
 from tactile_bayes.contours import Contour, paper_profile
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.ledger import TaskProgress
@@ -110,9 +110,9 @@ def sensitivity(
     >>> found["information"].bound.sel(parameter="a").item().__round__(4)
     0.0025
     """
-    unknown = [part for part in parts if part not in PARTS]
-    if isinstance(parts, str) or unknown or not parts:
-        raise ParameterError(f"parts is {parts!r}: give a list of some of {', '.join(PARTS)}")
+    if not set(check_names("parts", parts)) <= set(PARTS) or not parts:
+        raise refused("parts", parts, f"give a list of some of {', '.join(PARTS)}")
+    check_optional("rod", rod, Rod)
     taken = rod or Rod()
     if contour is None:
         contour = enlarged(paper_profile("II", q=0.5), taken.length)
@@ -125,8 +125,8 @@ def sensitivity(
         drive_step=drive_step,
         drive_angles=drive_angles,
         friction=friction,
-        nuisances=tuple(nuisances) if not isinstance(nuisances, str) else nuisances,
-        priors=dict(priors or {}),
+        nuisances=nuisances,
+        priors={} if priors is None else priors,
     )
     widths = band_widths if band_widths is not None else [width * taken.length for width in _WIDTHS]
     made_by: dict[str, Callable[[], xr.Dataset]] = {

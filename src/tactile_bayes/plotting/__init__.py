@@ -6,27 +6,21 @@ made; its settings are left alone, and nothing is shown. `style` is a block in w
 for the screen.
 """
 
-from tactile_bayes.plotting.axes import PALETTE
-from tactile_bayes.plotting.calibration_panels import calibration_ranks
+from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverage
 from tactile_bayes.plotting.contact_regions import contact_ellipses, contact_regions
-from tactile_bayes.plotting.contour_map import band_detail, contour
-from tactile_bayes.plotting.coverage_bars import coverage
+from tactile_bayes.plotting.contour_map import band_detail, contour, gap
 from tactile_bayes.plotting.design_map import design
-from tactile_bayes.plotting.error_growth import amplification
 from tactile_bayes.plotting.error_lines import error_map
 from tactile_bayes.plotting.family_bars import families
-from tactile_bayes.plotting.gap_map import gap
 from tactile_bayes.plotting.inspection_panels import inspection
-from tactile_bayes.plotting.leverage_map import information
-from tactile_bayes.plotting.noise_requirement import required_noise
-from tactile_bayes.plotting.posterior_contours import posterior_contours
+from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.plotting.posteriors import pairs, trace
-from tactile_bayes.plotting.prior_contours import prior_contours
+from tactile_bayes.plotting.reach_map import posterior_contours, prior_contours
 from tactile_bayes.plotting.records import observables, predictive
+from tactile_bayes.plotting.requirements import required_noise, required_rod
 from tactile_bayes.plotting.rod_map import rods
-from tactile_bayes.plotting.rod_requirement import required_rod
-from tactile_bayes.plotting.share_bars import noise_shares
 from tactile_bayes.plotting.style import style
+from tactile_bayes.plotting.sweep_plans import amplification, information, noise_shares
 from tactile_bayes.plotting.tightening import tightening
 from tactile_bayes.plotting.touch_map import touched
 

@@ -1,4 +1,4 @@
-"""Ranks of the truth in a calibration, in a panel for each quantity: whether they are uniform."""
+"""A calibration: whether ranks of the truth are uniform, and what is stated with a probability holds as often."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import xarray as xr
 
 from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, AxesArray, Floats, number
+from tactile_bayes.plotting.axes import AxesArray, Floats, check_dataset, check_panels, new_panels, write_instead
+from tactile_bayes.plotting.labels import number, percent
+from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["calibration_ranks", "refuse_another"]
+__all__ = ["calibration_ranks", "coverage"]
 
 _MOST_COLUMNS = 4
 _BAND = 0.95
@@ -24,6 +26,12 @@ _ROOM = 1.55
 
 _LETTERS = 82
 """In a line of the heading."""
+
+_FEWEST = 2
+"""Replicates below which a claim is left out."""
+
+_LETTERS_PER_INCH = 10.0
+"""In a line of the note on claims that are left out."""
 
 _COLOURS = {"": PALETTE["median"], "leaves the band": "#E69F00", "not uniform": "#D55E00"}
 """Of a line, by the word that stands in its panel."""
@@ -82,7 +90,7 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
     >>> [ax.get_title() for ax in calibration_ranks(found)]
     ['a', 'q']
     """
-    refuse_another(calibration, {"ranks", "rank_p_value", "quantity"}, "level")
+    check_dataset(calibration, {"ranks", "rank_p_value", "quantity"}, "calibration", "calibrate", ["level"])
     if not np.any(calibration["ranks"].values >= 0):
         raise ParameterError(
             f"none of {calibration.sizes['replicate']} replicates has a posterior: see message, that says why"
@@ -101,18 +109,79 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
     return panels
 
 
-def refuse_another(calibration: xr.Dataset, names: set[str], attribute: str) -> None:
-    is_calibration = (
-        isinstance(calibration, xr.Dataset) and names <= set(calibration.variables) and attribute in calibration.attrs
+def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """How often what is stated with a probability holds: each claim's share of replicates, and its standard error.
+
+    A dot is the share, its bar reaches two standard errors to both sides, as far as shares go; the vertical line is
+    the probability that is stated. At the right stands the share, and of how many replicates.
+
+    Parameters
+    ----------
+    calibration : xr.Dataset
+        From `tactile_bayes.calibrate`.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        Claims judged in fewer than 2 replicates are left out, and named below.
+
+    Raises
+    ------
+    ParameterError
+        If this is no calibration.
+
+    Examples
+    --------
+    >>> found = xr.Dataset(
+    ...     {
+    ...         "coverage": ("claim", [0.89, 0.93]),
+    ...         "coverage_error": ("claim", [0.02, 0.018]),
+    ...         "coverage_replicates": ("claim", [200, 198]),
+    ...     },
+    ...     coords={"claim": ["pointwise_in_gap", "snap_off"]},
+    ...     attrs={"probability": 0.9},
+    ... )
+    >>> [label.get_text() for label in coverage(found).get_yticklabels()]
+    ['band, in the gap', 'angle of snap-off']
+    """
+    from tactile_bayes.calibration.summary import CLAIMS
+
+    names = {"coverage", "coverage_error", "coverage_replicates", "claim"}
+    check_dataset(calibration, names, "calibration", "calibrate", ["probability"])
+    is_enough = calibration["coverage_replicates"].values >= _FEWEST
+    is_shown = is_enough & np.isfinite(calibration["coverage"].values)
+    shown = calibration.isel(claim=is_shown)
+    labels, left_out = (
+        [CLAIMS.get(str(name), str(name)) for name in calibration["claim"].values[chosen]]
+        for chosen in (is_shown, ~is_shown)
     )
-    if not is_calibration:
-        raise ParameterError("this is no calibration: give what calibrate returned")
+    if ax is None:
+        ax = new_panels(1, 1, 1.4 + 0.36 * max(len(labels), 2)).item()
+    if not labels:
+        return write_instead(ax, f"no claim was judged in {_FEWEST} replicates or more")
+    probability = float(calibration.attrs["probability"])
+    ax.set_ylim(len(labels) - 0.1, -0.6)
+    ax.set_yticks(np.arange(len(labels)), labels)
+    _draw_shares(ax, shown, probability)
+    ax.tick_params(axis="y", length=0.0)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.locator_params(axis="x", nbins=7, steps=[1, 2, 5, 10])
+    ax.xaxis.set_major_formatter(lambda share, _: percent(share))
+    ax.set_xlabel("share in which it holds ± 2 standard errors")
+    title = f"How often what is stated with {percent(probability)} probability holds"
+    ax.set_title(title, loc="left", fontsize="medium")
+    if left_out:
+        words = f"left out, with fewer than {_FEWEST} replicates: {'; '.join(left_out)}"
+        wrapped = textwrap.fill(words, max(20, int(_LETTERS_PER_INCH * ax.figure.bbox.width / ax.figure.dpi)))
+        style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": "small", "color": "0.35"}
+        ax.annotate(wrapped, (0.5, -0.4), xycoords=ax.xaxis.label, **style)
+    return ax
 
 
 def _panels_given(axes: Any, wanted: int) -> AxesArray:
-    panels = np.atleast_1d(np.asarray(axes, dtype=object))
-    if panels.shape != (wanted,):
-        raise ParameterError(f"axes have shape {panels.shape}, and ({wanted},) is wanted: one for each quantity")
+    panels = check_panels(axes, (wanted,), "one for each quantity")
     for ax in panels:
         ax.set_xlabel(_across(), fontsize="small")
         ax.set_ylabel("share up to there\n− expected share", fontsize="small")
@@ -121,23 +190,18 @@ def _panels_given(axes: Any, wanted: int) -> AxesArray:
 
 def _new_panels(calibration: xr.Dataset, drawn: list[_Ranks]) -> AxesArray:
     """In rows that are about as long as one another, below what they show together."""
-    from matplotlib import pyplot as plt
-
     wanted = len(drawn)
     rows = -(-wanted // _MOST_COLUMNS)
     columns = -(-wanted // rows)
-    size = (7.0, max(3.0, 1.3 + 1.35 * rows))
-    style: dict[str, Any] = {"layout": "constrained", "sharex": True, "sharey": True, "squeeze": False}
-    figure, grid = plt.subplots(rows, columns, figsize=size, **style)
-    panels = grid.ravel()[:wanted]
-    for ax in grid.ravel()[wanted:]:
+    grid = new_panels(rows, columns, max(3.0, 1.3 + 1.35 * rows), sharex=True, sharey=True).ravel()
+    panels, figure = grid[:wanted], grid[0].figure
+    for ax in grid[wanted:]:
         ax.remove()
     for ax in panels[-columns:]:
         ax.tick_params(labelbottom=True)
     figure.supxlabel(f"{_across()}: share of the draws that lie below it", fontsize="medium")
-    figure.supylabel(
-        (" " if rows > 2 else "\n").join(["share of ranks up to there", "− expected share"]), fontsize="medium"
-    )
+    gap = " " if rows > 2 else "\n"
+    figure.supylabel(f"share of ranks up to there{gap}− expected share", fontsize="medium")
     figure.suptitle(_heading(calibration, drawn), x=0.01, ha="left", fontsize="medium")
     return panels
 
@@ -213,3 +277,22 @@ def _heading(calibration: xr.Dataset, drawn: list[_Ranks]) -> str:
         words = f"Too few to judge whether ranks are uniform: {replicates}"
     lines = [words, f"Where ranks are uniform, 1 line in {round(1.0 / (1.0 - _BAND))} leaves the shaded band."]
     return "\n".join(textwrap.fill(line, _LETTERS, break_on_hyphens=False) for line in lines)
+
+
+def _draw_shares(ax: Axes, shown: xr.Dataset, probability: float) -> None:
+    shares, errors = shown["coverage"].values, 2.0 * shown["coverage_error"].values
+    low, high = (np.clip(shares + side * errors, 0.0, 1.0) for side in (-1.0, 1.0))
+    least = float(np.nanmin([*low, *shares, probability]))
+    margin = 0.05 * (1.0 - least)
+    ax.set_xlim(least - 2.0 * margin, 1.0 + margin)
+    is_left = probability < np.mean(ax.get_xlim())
+    ax.axvline(probability, color="black", linewidth=1.0, linestyle="--", zorder=1)
+    place: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points", "va": "bottom"}
+    place |= {"xytext": (4.0, 3.0), "ha": "left"} if is_left else {"xytext": (-4.0, 3.0), "ha": "right"}
+    ax.annotate(f"stated: {percent(probability)}", (probability, 0.0), fontsize="small", **place)
+    for row, (share, count) in enumerate(zip(shares, shown["coverage_replicates"].values, strict=True)):
+        if np.isfinite(errors[row]):
+            ax.plot([low[row], high[row]], [row, row], color=PALETTE["median"], linewidth=2.0, zorder=2)
+        ax.plot(share, row, "o", color=PALETTE["median"], markersize=6.0, zorder=3)
+        words = f"{100.0 * share:.1f} % of {count}"
+        ax.text(1.02, row, words, transform=ax.get_yaxis_transform(), ha="left", va="center", fontsize="small")

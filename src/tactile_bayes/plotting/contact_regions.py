@@ -11,8 +11,11 @@ from scipy.special import chdtri
 
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, legend_entry, single_axes
+from tactile_bayes.plotting.axes import single_axes
+from tactile_bayes.plotting.labels import percent
+from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import finish_map, fit_height, outline
+from tactile_bayes.plotting.marks import PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,9 +23,10 @@ if TYPE_CHECKING:
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["contact_ellipses", "contact_regions", "ellipse_of", "radius_of", "refuse_probability"]
+__all__ = ["contact_ellipses", "contact_regions", "ellipse_of", "radius_of"]
 
 _DRAWN = 12
+_MIDDLE: dict[str, Any] = {"marker": "+", "markersize": 5.0, "zorder": 3}
 
 
 def contact_ellipses(
@@ -58,7 +62,7 @@ def contact_ellipses(
     ParameterError
         If no sample has an ellipse, or the probability is not in (0, 1).
     """
-    refuse_probability(probability)
+    check_probability("probability", probability)
     if not (isinstance(contacts, xr.Dataset) and "contact_x_sd" in contacts):
         raise ParameterError(
             "this is no result of reconstruct: give what it returned; contact_regions draws posteriors"
@@ -68,25 +72,20 @@ def contact_ellipses(
     spread_x, spread_y = contacts["contact_x_sd"].values, contacts["contact_y_sd"].values
     has = np.isfinite(spread_x) & np.isfinite(spread_y)
     certain = contacts["status"] == "ok" if "status" in contacts else contacts["contact_probability"] == 1.0
-    chosen = _spread(np.flatnonzero(has & certain.values), samples)
-    chosen = chosen[has[chosen]]
-    if not chosen.size:
+    chosen = _spread(has, has & certain.values, samples)
+    if not chosen:
         raise ParameterError(
             "no contact here has a standard deviation: reconstruct with a load cell that states its noise, and choose "
             "samples that are in contact"
         )
-    own = ax is None
-    ax = single_axes() if ax is None else ax
-    radius = radius_of(probability)
+    own, ax = ax is None, single_axes() if ax is None else ax
+    radius, phase = radius_of(probability), contacts["contact_phase"].values
     x, y = contacts["contact_x"].values, contacts["contact_y"].values
-    for i in chosen.tolist():
-        colour = PALETTE[str(contacts["contact_phase"].values[i])]
+    for i in chosen:
+        colour = PALETTE[phase[i]]
         ax.add_patch(ellipse_of(contacts, i, radius, fill=False, edgecolor=colour, linewidth=1.0))
-        ax.plot(x[i], y[i], marker="+", color=colour, markersize=5.0, zorder=3)
-    _finish(ax, contacts, chosen, x, y, truth, contacts["contact_phase"].values, f"{100 * probability:.6g} % ellipse")
-    if own:
-        fit_height(ax)
-    return ax
+        ax.plot(x[i], y[i], color=colour, **_MIDDLE)
+    return _finished(ax, contacts, phase[chosen], f"{percent(probability)} ellipse", truth, own)
 
 
 def contact_regions(
@@ -126,7 +125,7 @@ def contact_regions(
     from tactile_bayes.uncertainty.contact_moments import LEAST_DRAWS
     from tactile_bayes.uncertainty.contact_region import contact_region
 
-    refuse_probability(probability)
+    check_probability("probability", probability)
     draws = contact_draws(posterior)
     x, y = (draws[name].median(("chain", "draw")).values for name in ("contact_x", "contact_y"))
     tangential = draws["tangential"].mean(("chain", "draw")).values
@@ -137,26 +136,21 @@ def contact_regions(
         if absent.size:
             raise ParameterError(f"there is no sample {absent[0]}: the posterior has {labels.min()} to {labels.max()}")
         samples = np.flatnonzero(np.isin(labels, samples)).tolist()
-    chosen = _spread(np.flatnonzero(has), samples)
-    chosen = chosen[has[chosen]]
-    if not chosen.size:
+    chosen = _spread(has, has, samples)
+    if not chosen:
         raise ParameterError("no sample here has a contact: choose others")
-    own = ax is None
-    ax = single_axes() if ax is None else ax
+    own, ax = ax is None, single_axes() if ax is None else ax
     phase = np.where(tangential > 0.5, "tangential", "tip")
     corners: list[Any] = []
-    for i in chosen.tolist():
+    for i in chosen:
         region = contact_region(draws, int(labels[i]), probability)
         grid_x, grid_y, density = region.grid()
         lines = ax.contour(grid_x, grid_y, density, levels=[region.level], colors=[PALETTE[phase[i]]], linewidths=1.0)
         lines.sticky_edges.x[:], lines.sticky_edges.y[:] = [], []  # those of the grid, which would cut regions off
         corners.extend(line for path in lines.get_paths() for line in path.to_polygons(closed_only=False))
-        ax.plot(x[i], y[i], marker="+", color=PALETTE[phase[i]], markersize=5.0, zorder=3)
+        ax.plot(x[i], y[i], color=PALETTE[phase[i]], **_MIDDLE)
     ax.dataLim.update_from_data_xy(np.concatenate(corners), ignore=True)  # of the outlines, not of their grids
-    _finish(ax, draws, chosen, x, y, truth, phase, f"{100 * probability:.6g} % region")
-    if own:
-        fit_height(ax)
-    return ax
+    return _finished(ax, draws, phase[chosen], f"{percent(probability)} region", truth, own)
 
 
 def ellipse_of(
@@ -179,39 +173,28 @@ def radius_of(probability: float) -> float:
     return float(np.sqrt(chdtri(2.0, 1.0 - probability)))
 
 
-def refuse_probability(probability: float) -> None:
-    check_probability("probability", probability, "give a number between 0 and 1, like 0.9")
-
-
-def _spread(candidates: np.ndarray[Any, np.dtype[np.intp]], samples: Sequence[int] | None) -> Any:
-    """The samples asked for, or a dozen of the candidates."""
+def _spread(has: Any, is_candidate: Any, samples: Sequence[int] | None) -> list[int]:
+    """The samples asked for, or a dozen of the candidates, without those that have nothing to be drawn."""
+    chosen = np.flatnonzero(is_candidate)
     if samples is not None:
-        return np.atleast_1d(np.asarray(samples, dtype=np.intp))
-    if candidates.size <= _DRAWN:
-        return candidates
-    return candidates[np.linspace(0, candidates.size - 1, _DRAWN).astype(int)]
+        chosen = np.atleast_1d(np.asarray(samples, dtype=np.intp))
+    elif chosen.size > _DRAWN:
+        chosen = chosen[np.linspace(0, chosen.size - 1, _DRAWN).astype(int)]
+    return [int(i) for i in chosen[has[chosen]]]
 
 
-def _finish(
-    ax: Axes,
-    labelled: xr.Dataset,
-    chosen: Any,
-    x: Floats,
-    y: Floats,
-    truth: Contour | None,
-    phase: Any,
-    label: str,
-) -> None:
+def _finished(ax: Axes, labelled: xr.Dataset, phase: Any, label: str, truth: Contour | None, own: bool) -> Axes:
     for name, words in PHASES.items():
-        if np.any(phase[chosen] == name):
+        if np.any(phase == name):
             legend_entry(ax, f"{label}, {words}", color=PALETTE[name], linewidth=1.0)
     ax.autoscale_view(tight=False)  # contour lines ask for tight limits
     if truth is not None:
         low, high = ax.get_xlim()
         bottom, top = ax.get_ylim()
-        ax.plot(
-            *outline(truth, low, high), color=PALETTE["change"], linewidth=1.0, linestyle="--", label="true contour"
-        )
+        ax.plot(*outline(truth, low, high), label="true contour", **TRUTH)
         ax.set_xlim(low, high)
         ax.set_ylim(bottom, top)
     finish_map(ax, labelled["contact_x"].attrs)
+    if own:
+        fit_height(ax)
+    return ax

@@ -1,4 +1,4 @@
-"""The contour as it was found: a map, and its detail."""
+"""The contour as it was found: a map, its band in detail, and its gap enlarged."""
 
 from __future__ import annotations
 
@@ -10,15 +10,36 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import LABELS, PALETTE, PHASES, legend_entry, set_unit, single_axes
-from tactile_bayes.plotting.maps import CONTACT_MARKERS, draw_gap, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.axes import Floats, single_axes, write_instead
+from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
+from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
+from tactile_bayes.plotting.maps import draw_gap, draw_pivot, finish_map, outline
+from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from tactile_bayes.contours.base import Contour
 
-__all__ = ["band_detail", "contour"]
+__all__ = ["band_detail", "contour", "gap"]
+
+_MARGIN = 0.12
+"""What is drawn beside the gap, as a share of its width."""
+
+_ROOM = 0.12
+"""Room above and below what is drawn, as a share of its height."""
+
+_ENDS: dict[str, Any] = {
+    "color": "black",
+    "marker": "o",
+    "markersize": 5.0,
+    "markerfacecolor": "white",
+    "markeredgewidth": 1.1,
+    "linestyle": "none",
+    "linewidth": 1.1,
+    "capsize": 2.5,
+    "zorder": 4,
+}
 
 
 def contour(
@@ -81,15 +102,13 @@ def contour(
         slack = 1e-9 * (high - low)
         inside = band.isel(x=np.flatnonzero((band["x"].values >= low - slack) & (band["x"].values <= high + slack)))
         probability = band.attrs.get("probability")
-        label = "band" if probability is None else f"{100.0 * float(probability):.6g} % band"
+        label = "band" if probability is None else f"{percent(probability)} band"
         lower, upper = inside["lower"].values, inside["upper"].values
         ax.fill_between(inside["x"].values, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5, label=label)
         if "median" in inside:
             ax.plot(inside["x"].values, inside["median"].values, color=PALETTE["median"], linewidth=1.0, label="median")
     if truth is not None:
-        ax.plot(
-            *outline(truth, low, high), color=PALETTE["change"], linewidth=1.0, linestyle="--", label="true contour"
-        )
+        ax.plot(*outline(truth, low, high), label="true contour", **TRUTH)
     if contacts is not None:
         attrs = contacts["contact_x"].attrs or attrs
         _draw_contacts(ax, contacts, low, high)
@@ -140,12 +159,113 @@ def band_detail(
     ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.5, zorder=1.5)
     ax.axhline(0.0, color=PALETTE["median"], linewidth=1.0)
     if truth is not None:
-        ax.plot(x, np.asarray(truth.height(x)) - median, color=PALETTE["change"], linewidth=1.0, linestyle="--")
+        ax.plot(x, np.asarray(truth.height(x)) - median, **TRUTH)
     margin = 0.03 * float(np.ptp(x))
     ax.set_xlim(float(x.min()) - margin, float(x.max()) + margin)
     attrs = band["lower"].attrs or band["x"].attrs
     set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, x)
     set_unit(ax.yaxis, LABELS["contact_y"] + " − median ", "contact_y", attrs, np.concatenate([lower, upper]))
+    return ax
+
+
+def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = None) -> Axes:
+    """What is known of the contour inside the gap, measured from the chord between the end contacts.
+
+    The triangle is what convexity alone leaves open, with a paler rim for the uncertainty of the end contacts; the
+    bands are the posterior's. The legend gives the largest width of each in y.
+
+    Parameters
+    ----------
+    found : xr.Dataset
+        From `tactile_bayes.gap`.
+    truth : Contour, optional
+        The true contour.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+        Where the sweeps overlap there is nothing to be drawn, and the Axes say so.
+
+    Examples
+    --------
+    >>> from tactile_bayes import gap as gap_of
+    >>> draws = {"a": 0.5, "q": 0.3, "x_c": 0.0}
+    >>> ends = {"first_contact_x": [0.9, -0.9], "snap_off_contact_x": [0.1, -0.1], "snap_off_drive_angle": [3.2, -0.1]}
+    >>> posterior = xr.Dataset({k: (("chain", "draw"), [[v]]) for k, v in draws.items()})
+    >>> events = xr.Dataset({k: (("chain", "draw", "stroke"), [[v]]) for k, v in ends.items()})
+    >>> events = events.assign_coords(stroke=["forward", "backward"])
+    >>> tree = xr.DataTree.from_dict({"posterior": posterior, "events": events})
+    >>> tree.attrs = {"family": "parabola", "units": "dimensionless"}
+    >>> gap(gap_of(tree)).get_ylabel()
+    '$y$ − chord [$L$]'
+    """
+    ax = single_axes() if ax is None else ax
+    attrs = found["left"].attrs
+    middle = {name: float(found[name].sel(bound="median")) for name, v in found.items() if v.dims == ("bound",)}
+    if not middle["left"] < middle["right"]:
+        return write_instead(ax, "the sweeps overlap: no gap is left")
+    ends = np.array([middle["left"], middle["right"]])
+    heights = np.array([middle["left_y"], middle["right_y"]])
+    incline = float(np.diff(heights)[0] / np.diff(ends)[0])
+
+    def above_chord(x: Floats, y: Floats) -> Floats:
+        return y - (heights[0] + incline * (x - ends[0]))
+
+    def edges(name: str, *which: str) -> list[Floats]:
+        return [above_chord(x, found[f"{name}_{edge}"].values) for edge in which]
+
+    def wide(width: Any) -> str:
+        power, unit = shown_unit("contact_x", attrs, np.array([float(width)]))
+        return f"{number(float(width), power, digits=3)} {unit} wide"
+
+    x = found["x"].values
+    margin = _MARGIN * float(np.diff(ends)[0])
+    share = percent(found.attrs["probability"])
+    least, most = edges("triangle", "lower", "upper")
+    corners_x = np.array([ends[0], middle["apex_x"], ends[1]])
+    corners_y = above_chord(corners_x, np.array([heights[0], middle["apex_y"], heights[1]]))
+    style: dict[str, Any] = {"linewidth": 0.0, "color": PALETTE["gap"]}
+    label = f"triangle of chord and tangents, {wide(middle['triangle_width'])}"
+    ax.fill(corners_x, corners_y, alpha=0.45, zorder=0.6, label=label, **style)
+    if np.isfinite(most - least).any():
+        label = f"triangle with uncertain ends, {share}, {wide(np.nanmax(most - least))}"
+        ax.fill_between(x, least, most, alpha=0.22, zorder=0.5, label=label, **style)
+    outside = np.concatenate([ends[:1] - margin, ends, ends[1:] + margin])
+    ax.plot(outside, np.zeros(4), color="0.45", linewidth=0.8, linestyle=(0, (6.0, 3.0)), zorder=1.0, label="chord")
+    for side, beyond in ((0, -margin), (1, margin)):
+        slope = (corners_y[1] - corners_y[2 * side]) / (corners_x[1] - corners_x[2 * side])
+        reach = np.array([ends[side] + beyond, corners_x[1]])
+        ax.plot(reach, slope * (reach - ends[side]), color="0.45", linewidth=0.9, zorder=1.0, label="end tangents")
+
+    drawn = np.concatenate([corners_y, least, most])
+    if "band_without_events_lower" in found:
+        lower, upper = edges("band_without_events", "lower", "upper")
+        label = f"{share} band without events, {wide(found['band_width_without_events'])}"
+        ax.fill_between(x, lower, upper, color="0.86", linewidth=0.0, zorder=0.4, label=label)
+        for edge in (lower, upper):
+            ax.plot(x, edge, color="0.4", linewidth=0.9, linestyle=(0, (1.0, 1.2)), zorder=2.1)
+        # A band much wider than the triangle runs out of the figure: else nothing would be seen of the rest.
+        room = 0.7 * float(np.ptp(drawn))
+        drawn = np.concatenate([drawn, np.clip([*lower, *upper], drawn.min() - room, drawn.max() + room)])
+    lower, median, upper = edges("band", "lower", "median", "upper")
+    label = f"{share} band, {wide(found['band_width'])}"
+    ax.fill_between(x, lower, upper, color=PALETTE["band"], linewidth=0.0, zorder=1.6, label=label)
+    ax.plot(x, median, color=PALETTE["median"], linewidth=1.2, zorder=2.2, label="median")
+    if truth is not None:
+        along = np.linspace(outside[0], outside[-1], 401)
+        height = above_chord(along, np.asarray(truth.height(along)))
+        ax.plot(along, height, zorder=2.4, label="true contour", **TRUTH)
+    _draw_ends(ax, found, above_chord)
+
+    drawn = np.concatenate([drawn, lower, upper])
+    low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
+    ax.set_xlim(outside[0], outside[-1])
+    ax.set_ylim(low - _ROOM * (high - low), high + _ROOM * (high - low) + 0.1 * abs(low))
+    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, outside)
+    set_unit(ax.yaxis, LABELS["contact_y"] + " − chord ", "contact_y", attrs, drawn)
+    legend_above(ax, 2, legend_entries(ax))
     return ax
 
 
@@ -158,11 +278,7 @@ def _draw_contacts(ax: Axes, contacts: xr.Dataset, low: float, high: float) -> N
     for name, label in (*PHASES.items(), ("none", "contact")):
         chosen = drawn & (phase == name)
         if chosen.any():
-            style: dict[str, Any] = {
-                "color": PALETTE[name],
-                "marker": CONTACT_MARKERS.get(name, "o"),
-                "linestyle": "none",
-            }
+            style: dict[str, Any] = {"color": PALETTE[name], "marker": CONTACT_MARKERS[name], "linestyle": "none"}
             ax.plot(x[chosen], y[chosen], markersize=2.6, markeredgewidth=0.0, alpha=0.6, zorder=3, **style)
             legend_entry(ax, label, markersize=4.0, **style)
 
@@ -172,3 +288,12 @@ def _draw_gap(ax: Axes, gap: tuple[float, float] | xr.Dataset) -> None:
     left, right = sorted((float(begin), float(end)))
     overlap = float(begin) > float(end)
     draw_gap(ax, left, right, "overlap" if overlap else "gap", hatched=not overlap)
+
+
+def _draw_ends(ax: Axes, found: xr.Dataset, above_chord: Any) -> None:
+    """The end contacts, with the intervals of their x."""
+    for side in ("left", "right"):
+        lower, middle, upper = (float(found[side].sel(bound=bound)) for bound in ("lower", "median", "upper"))
+        y = above_chord(np.array([middle]), np.array([float(found[f"{side}_y"].sel(bound="median"))]))
+        width = [[middle - lower], [upper - middle]]
+        ax.errorbar([middle], y, xerr=width, label="end contacts", **_ENDS)

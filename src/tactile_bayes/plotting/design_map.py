@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import Floats, legend_entry, number, set_unit, shown_unit, single_axes
-from tactile_bayes.plotting.design_lines import draw_design_lines, kind_of
-from tactile_bayes.plotting.maps import draw_pivot
-from tactile_bayes.plotting.tiles import tile_edges
+from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, tile_edges
+from tactile_bayes.plotting.labels import number, shown_unit
+from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
+from tactile_bayes.plotting.maps import draw_pivot, label_map
+from tactile_bayes.plotting.marks import BASES, BEST, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +23,14 @@ _HEIGHTS_OF_A_MAP = 3
 
 _HIGHEST, _ROOM = 7.0, 0.1
 """Of the figure of a map, and what is left free in it [inches]."""
+
+_KINDS = {
+    "band": ("width", "width of the band to be expected", True),
+    "gap": ("gap", "width that no sweep touches", True),
+    "information": ("information", "information to be expected [nat]", False),
+}
+_MARKS = "osD^vP"
+_BARS: dict[str, Any] = {"markersize": 4.0, "linewidth": 1.2, "elinewidth": 0.8, "capsize": 2.0}
 
 
 def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
@@ -59,18 +67,65 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> design(found, ax=Figure().subplots()).get_xlabel()
     'place of the pivot $x$ [$L$]'
     """
-    if not (isinstance(found, xr.Dataset) and {"base_x", "drive_step", "best", "present_base_x"} <= set(found)):
-        raise ParameterError("this is no design: give what tactile_bayes.design has returned")
+    check_dataset(found, {"base_x", "drive_step", "best", "present_base_x"}, "design", "tactile_bayes.design")
     pivots = np.stack([found["present_base_x"].values, found["present_base_y"].values], axis=-1)
     own, ax = ax is None, single_axes() if ax is None else ax
     grid = _grid_of(found)
     if grid is None:
-        draw_design_lines(ax, found, pivots)
+        _draw_lines(ax, found, pivots)
     else:
         _draw_map(ax, found, grid, pivots)
         if own:
             _fit_figure(ax)
     return ax
+
+
+def _kind_of(found: xr.Dataset) -> tuple[str, str, bool]:
+    """Name of the criterion's variable, the criterion in words, and whether it is a length, of which less is better."""
+    return _KINDS[str(found.attrs["criterion"])]
+
+
+def _draw_lines(ax: Axes, found: xr.Dataset, pivots: Floats) -> None:
+    """Draw the lines, and where pivots are already, which are of shape (pivots, 2)."""
+    name, words_of_it, is_length = _kind_of(found)
+    si = found.base_x.attrs.get("units") == "m"
+    scale = 1e3 if si and is_length else 1.0
+    x = found.base_x.values * (1e3 if si else 1.0)
+    y, step = found.base_y.values, found.drive_step.values
+    values, errors = scale * found[name].values, scale * found[f"{name}_error"].values
+    lines = sorted(set(zip(y.tolist(), step.tolist(), strict=True)))
+    several = len(set(y.tolist())) > 1, len(set(step.tolist())) > 1
+    for k, (height, of_step) in enumerate(lines):
+        here = np.flatnonzero((y == height) & (step == of_step))
+        here = here[np.argsort(x[here])]
+        words = []
+        if several[0]:
+            words.append(f"$y$ = {number(height, -3, digits=4)} mm" if si else f"$y$ = {number(height, digits=3)} $L$")
+        if several[1]:
+            words.append(f"steps of {np.degrees(of_step):.3g}°")
+        colour, label = BASES[k % len(BASES)], ", ".join(words) or "Laplace's approximation"
+        look: dict[str, Any] = {"color": colour, "marker": _MARKS[k % len(_MARKS)], "label": label}
+        ax.errorbar(x[here], values[here], 2.0 * np.nan_to_num(errors[here]), **look, **_BARS)
+        if f"nested_{name}" in found:
+            nested = scale * found[f"nested_{name}"].values[here]
+            if np.isfinite(nested).any():
+                crosses = None if k else "sampled posteriors"
+                ax.plot(x[here], nested, "x", color=colour, markersize=7.0, label=crosses)
+    best = int(found.best)
+    ax.plot(x[best], values[best], "o", markersize=12.0, markerfacecolor="none", color=PALETTE["change"], label="best")
+    if name == "width":
+        present = scale * float(found.present_width)
+        if present < 3.0 * np.nanmax(values):
+            ax.axhline(present, color=PALETTE["none"], linestyle="--", linewidth=1.0, label="without a further record")
+    style: dict[str, Any] = {"color": "0.6", "linestyle": ":", "linewidth": 1.2, "zorder": 0.5}
+    for k, place in enumerate(pivots[:, 0] * (1e3 if si else 1.0)):
+        ax.axvline(place, label=None if k else "pivot so far", **style)
+    ax.set_xlabel(f"place of the pivot $x$ [{'mm' if si else '$L$'}]")
+    ax.set_ylabel(f"{words_of_it} [{'mm' if si else '$L$'}]" if is_length else words_of_it)
+    ax.set_ylim(bottom=0.0 if is_length else None)
+    ax.spines[["top", "right"]].set_visible(False)
+    if len(ax.get_legend_handles_labels()[1]) > 1:
+        legend(ax)
 
 
 class _Grid(NamedTuple):
@@ -94,12 +149,12 @@ def _grid_of(found: xr.Dataset) -> _Grid | None:
     if min(x.size, y.size) < _HEIGHTS_OF_A_MAP or chosen.sizes["candidate"] != x.size * y.size:
         return None
     values = np.full((y.size, x.size), np.nan)
-    values[row, column] = chosen[kind_of(found)[0]].values
+    values[row, column] = chosen[_kind_of(found)[0]].values
     return _Grid(x, y, values, step, bool(np.any(steps != step)))
 
 
 def _draw_map(ax: Axes, found: xr.Dataset, grid: _Grid, pivots: Floats) -> None:
-    name, words, is_length = kind_of(found)
+    name, words, is_length = _kind_of(found)
     edges = tile_edges(grid.x), tile_edges(grid.y)
     shown = np.ma.masked_invalid(grid.values)
     mesh = ax.pcolormesh(*edges, shown, cmap="cividis_r" if is_length else "cividis", zorder=0.5)
@@ -113,41 +168,21 @@ def _draw_map(ax: Axes, found: xr.Dataset, grid: _Grid, pivots: Floats) -> None:
         draw_pivot(ax, (x, y), label="" if k else "pivot so far")
     best = found.isel(candidate=int(found["best"]))
     power, unit = shown_unit("contact_x", found[name].attrs, grid.values) if is_length else (0, "nat")
-    ax.plot(
-        [float(best["base_x"])],
-        [float(best["base_y"])],
-        "*",
-        color="#D55E00",
-        markersize=14.0,
-        markeredgecolor="white",
-        zorder=5.5,
-        label=f"best: {number(float(best[name]), power, digits=3)} {unit}",
-    )
-    attrs, limits = found["base_x"].attrs, np.concatenate(edges)
-    set_unit(ax.xaxis, "place of the pivot $x$ ", "contact_x", attrs, limits)
-    set_unit(ax.yaxis, "place of the pivot $y$ ", "contact_y", attrs, limits)
+    label = f"best: {number(float(best[name]), power, digits=3)} {unit}"
+    ax.plot(float(best["base_x"]), float(best["base_y"]), markersize=14.0, zorder=5.5, label=label, **BEST)
+    label_map(ax, found["base_x"].attrs, np.concatenate(edges), "place of the pivot {}")
     _draw_scale(ax, mesh, f"{words} [{unit}]" if is_length else words, power)
     title = f"steps of {np.degrees(grid.drive_step):.3g}°" if grid.has_other_steps else None
-    ax.legend(
-        title=title,
-        title_fontsize="small",
-        fontsize="small",
-        frameon=False,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=3,
-    )
+    legend_above(ax, 3, title=title)
 
 
 def _draw_scale(ax: Axes, mesh: Any, label: str, power: int) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     is_low = abs(np.ptp(ax.get_ylim())) < 0.45 * abs(np.ptp(ax.get_xlim()))
-    bar = ax.figure.colorbar(mesh, ax=ax, orientation="horizontal" if is_low else "vertical")
-    bar.locator = MaxNLocator(5)
-    bar.formatter = FuncFormatter(lambda value, _: number(value, power))
-    bar.update_ticks()
-    bar.set_label(label)
+    written = FuncFormatter(lambda value, _: number(value, power))
+    place: dict[str, Any] = {"ax": ax, "orientation": "horizontal" if is_low else "vertical"}
+    ax.figure.colorbar(mesh, ticks=MaxNLocator(5), format=written, label=label, **place)
 
 
 def _fit_figure(ax: Axes) -> None:

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import BASES, Floats, legend_entry, number, shown_unit, single_axes
-from tactile_bayes.plotting.planning_groups import set_log_scale
+from tactile_bayes.checks import check_choice
+from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, write_instead
+from tactile_bayes.plotting.labels import number, percent, shown_unit
+from tactile_bayes.plotting.legends import legend_above, legend_entry
+from tactile_bayes.plotting.marks import BASES
+from tactile_bayes.plotting.planning_groups import check_among, set_log_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +21,7 @@ __all__ = ["error_map"]
 
 Quantity = Literal["across", "along", "touched", "gap"]
 
-_MARKERS = "osD^vP*X<>"
+_MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]
 _MOST_TICKS = 8
 _MOST_IN_LINE = 6
 """Entries of the legend."""
@@ -69,76 +72,47 @@ def error_map(
     >>> error_map(study, ax=Figure().subplots()).get_ylabel()
     'RMS error across the contour [$L$]'
     """
-    if not isinstance(found, xr.Dataset) or not {"rms_across", "contour", "distance", "noise_factor"} <= set(
-        found.variables
-    ):
-        raise ParameterError("this is no error map: give what error_map returned")
-    if quantity not in ("across", "along", *_BANDS):
-        raise ParameterError(f"quantity is {quantity!r}: choose 'across', 'along', 'touched' or 'gap'")
-    if reconstruction not in found["reconstruction"].values:
-        raise ParameterError(
-            f"reconstruction is {reconstruction!r}: there are {', '.join(map(str, found['reconstruction'].values))}"
-        )
+    check_dataset(found, {"rms_across", "contour", "distance", "noise_factor"}, "error map", "error_map")
+    check_choice("quantity", quantity, ("across", "along", *_BANDS))
+    check_among("reconstruction", reconstruction, found)
     ax = single_axes() if ax is None else ax
     found = found.isel(noise_factor=np.argsort(found["noise_factor"].values))
     seen, foretold = _seen_and_foretold(found, quantity, reconstruction)
     factor = found["noise_factor"].values
+    contours, distances = found["contour"].values, found["distance"].values
+    is_band = quantity in _BANDS
     drawn: list[Floats] = []
     missing: list[str] = []
-    contours, distances = found["contour"].values, found["distance"].values
     is_there = np.zeros((contours.size, distances.size), dtype=bool)
-    for i, contour in enumerate(contours):
-        for j, distance in enumerate(distances):
-            there, first = seen.values[i, j], foretold.values[i, j]
-            if not np.isfinite([*there, *first]).any():
-                missing.append(f"{contour} at {number(distance)} L")
-                continue
-            is_there[i, j] = True
-            style: dict[str, Any] = {"color": BASES[i % len(BASES)], "linewidth": 1.3}
-            marker: dict[str, Any] = {"marker": _MARKERS[j % len(_MARKERS)], "markersize": 5.0}
-            hollow: dict[str, Any] = (
-                marker | {"markerfacecolor": "white"} if quantity in _BANDS or factor.size == 1 else {}
-            )
-            ax.plot(factor, first, linestyle="--", zorder=2, **style, **hollow)
-            ax.plot(factor, there, linestyle="none" if quantity in _BANDS else "-", zorder=3, **style, **marker)
-            drawn += [there, first]
+    for i, j in np.ndindex(is_there.shape):
+        there, first = seen.values[i, j], foretold.values[i, j]
+        if not np.isfinite([*there, *first]).any():
+            missing.append(f"{contours[i]} at {number(float(distances[j]))} L")
+            continue
+        is_there[i, j] = True
+        drawn += [there, first]
+        style: dict[str, Any] = {"color": BASES[i % len(BASES)], "linewidth": 1.3}
+        mark = _MARKS[j % len(_MARKS)]
+        hollow = mark | {"markerfacecolor": "white"} if is_band or factor.size == 1 else {}
+        ax.plot(factor, first, linestyle="--", zorder=2, **style, **hollow)
+        ax.plot(factor, there, linestyle="none" if is_band else "-", zorder=3, **style, **mark)
     if not drawn:
-        ax.set_axis_off()
-        words = "there is no gap" if quantity == "gap" else "no cell of this map has an answer"
-        ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center")
-        return ax
-    for i, contour in enumerate(contours):
-        if is_there[i].any():
-            legend_entry(ax, str(contour), color=BASES[i % len(BASES)], linewidth=2.5)
-    for j, distance in enumerate(distances):
-        if is_there[:, j].any():
-            marker = {"marker": _MARKERS[j % len(_MARKERS)], "markersize": 5.0}
-            legend_entry(ax, f"at {number(distance)} L", color="0.35", linestyle="none", **marker)
+        return write_instead(ax, "there is no gap" if quantity == "gap" else "no cell of this map has an answer")
+    for i in np.flatnonzero(is_there.any(axis=1)):
+        legend_entry(ax, str(contours[i]), color=BASES[i % len(BASES)], linewidth=2.5)
+    for j in np.flatnonzero(is_there.any(axis=0)):
+        legend_entry(ax, f"at {number(distances[j])} L", color="0.35", linestyle="none", **_MARKS[j % len(_MARKS)])
     legend_entry(ax, "first order", color="0.35", linestyle="--", linewidth=1.3)
     set_log_scale(ax.yaxis, _label(found, quantity), "contact_x", foretold.attrs, np.concatenate(drawn))
     set_log_scale(ax.xaxis, _noise_label(found), "sweep", {}, factor)
     if factor.size <= _MOST_TICKS:
         ax.set_xticks(factor)
     entries = len(ax.get_legend_handles_labels()[1])
-    ax.legend(
-        title=_title(quantity, reconstruction, bool(np.isfinite(seen.values).any())),
-        title_fontsize="small",
-        fontsize="small",
-        frameon=False,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=entries if entries <= _MOST_IN_LINE else -(-entries // 2),
-    )
+    title = _title(quantity, reconstruction, bool(np.isfinite(seen.values).any()))
+    legend_above(ax, entries if entries <= _MOST_IN_LINE else -(-entries // 2), title=title)
     if missing:
-        ax.annotate(
-            f"no answer: {', '.join(missing)}",
-            (0.99, 0.02),
-            xycoords="axes fraction",
-            ha="right",
-            va="bottom",
-            fontsize="small",
-            color="0.35",
-        )
+        corner: dict[str, Any] = {"transform": ax.transAxes, "ha": "right", "va": "bottom"}
+        ax.text(0.99, 0.02, f"no answer: {', '.join(missing)}", fontsize="small", color="0.35", **corner)
     return ax
 
 
@@ -155,7 +129,7 @@ def _seen_and_foretold(found: xr.Dataset, quantity: str, reconstruction: str) ->
 
 def _label(found: xr.Dataset, quantity: str) -> str:
     if quantity in _BANDS:
-        return f"mean width of the {100.0 * found.attrs['probability']:.6g} % band"
+        return f"mean width of the {percent(found.attrs['probability'])} band"
     return f"RMS error {quantity} the contour"
 
 

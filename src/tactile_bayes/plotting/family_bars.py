@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, AxesArray, number
+from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_panels, new_panels
+from tactile_bayes.plotting.labels import number, show_numbers
+from tactile_bayes.plotting.legends import legend
+from tactile_bayes.plotting.marks import PALETTE
 from tactile_bayes.uncertainty.family_verdict import NONE_FITS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["families", "panel_count", "panel_height"]
+__all__ = ["families"]
 
 _WIDTHS = {0.5: ("v", -0.26, "priors half as wide"), 2.0: ("^", 0.26, "priors twice as wide")}
 """Marker, place beside the bar's middle, and what it says."""
@@ -30,6 +32,7 @@ _LEGEND_BELOW = 34.0
 """Points between the panel and its legend, in which ticks and label are."""
 
 _WARNING = "#D55E00"
+_DOTS: dict[str, Any] = {"linestyle": "none", "markersize": 5.0, "zorder": 3}
 
 
 def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
@@ -70,8 +73,7 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     >>> families(found).shape
     (1,)
     """
-    if not (isinstance(comparison, xr.Dataset) and {"probability", "fits", "sampled"} <= set(comparison)):
-        raise ParameterError("this is no comparison of families: give what compare_families returned")
+    check_dataset(comparison, {"probability", "fits", "sampled"}, "comparison of families", "compare_families")
     panels = _panels(comparison, axes)
     places = np.arange(comparison.sizes["family"], dtype=float)
     _draw_probabilities(panels[0], comparison, places)
@@ -84,29 +86,12 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     return panels
 
 
-def panel_count(comparison: xr.Dataset) -> int:
-    return 2 if "elpd_difference" in comparison else 1
-
-
-def panel_height(comparison: xr.Dataset) -> float:
-    """Height of a figure that holds the panels [inches]."""
-    return 1.9 + 0.48 * comparison.sizes["family"]
-
-
 def _panels(comparison: xr.Dataset, axes: Any) -> AxesArray:
-    wanted = panel_count(comparison)
+    wanted = 2 if "elpd_difference" in comparison else 1
     if axes is None:
-        from matplotlib import pyplot as plt
-
-        size = (7.0, panel_height(comparison))
-        axes = plt.subplots(1, wanted, figsize=size, layout="constrained", sharey=True, squeeze=False)[1][0]
-    panels = np.atleast_1d(np.asarray(axes, dtype=object))
-    if panels.shape != (wanted,):
-        raise ParameterError(
-            f"axes have shape {panels.shape}, and ({wanted},) is wanted: for probabilities"
-            + (" and elpd differences" if wanted == 2 else "; there are no leave-one-out densities")
-        )
-    return panels
+        return new_panels(1, wanted, 1.9 + 0.48 * comparison.sizes["family"], sharey=True)[0]
+    others = " and elpd differences" if wanted == 2 else "; there are no leave-one-out densities"
+    return check_panels(axes, (wanted,), f"for probabilities{others}")
 
 
 def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
@@ -128,21 +113,11 @@ def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
         for width, (marker, beside, label) in _WIDTHS.items():
             sampled = comparison["sampled"].values
             shares = comparison["probability_by_width"].sel(prior_width=width).values
-            ax.plot(
-                shares[sampled],
-                places[sampled] + beside,
-                linestyle="none",
-                marker=marker,
-                markersize=5.0,
-                color="black",
-                markerfacecolor="white",
-                clip_on=False,
-                zorder=3,
-                label=label,
-            )
+            style = {"marker": marker, "color": "black", "markerfacecolor": "white", "clip_on": False, **_DOTS}
+            ax.plot(shares[sampled], places[sampled] + beside, label=label, **style)
         below = ax.transAxes + ScaledTranslation(0.0, -_LEGEND_BELOW / 72.0, ax.figure.dpi_scale_trans)
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": below}
-        ax.legend(fontsize="small", frameon=False, ncols=2, columnspacing=1.0, handletextpad=0.2, **place)
+        legend(ax, ncols=2, columnspacing=1.0, handletextpad=0.2, **place)
     ax.set_xlim(0.0, 1.0)
     ax.set_xlabel("probability" if comparison["fits"].any() else "probability: the least wrong")
     labels = [_family_label(comparison.sel(family=name)) for name in comparison["family"].values]
@@ -166,50 +141,31 @@ def _write_share(ax: Axes, place: float, share: float, *, inside_colour: str, sa
     if not sampled:
         return
     words = "<0.001" if share < 1e-3 else ">0.999" if share > 0.999 else number(share, digits=2)
-    inside = share > 0.75
-    ax.annotate(
-        words,
-        (share, place),
-        (-8.0 if inside else 8.0, 0.0),
-        textcoords="offset points",
-        ha="right" if inside else "left",
-        va="center",
-        fontsize="small",
-        color=inside_colour if inside else "black",
-        bbox={"facecolor": "0.9", "edgecolor": "none", "pad": 1.0} if inside and inside_colour == "black" else None,
-    )
+    style: dict[str, Any] = {"xytext": (8.0, 0.0), "ha": "left", "color": "black"}
+    if share > 0.75:
+        style = {"xytext": (-8.0, 0.0), "ha": "right", "color": inside_colour}
+        if inside_colour == "black":
+            style["bbox"] = {"facecolor": "0.9", "edgecolor": "none", "pad": 1.0}
+    ax.annotate(words, (share, place), textcoords="offset points", va="center", fontsize="small", **style)
 
 
 def _draw_differences(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
     difference, error = (comparison[f"elpd_difference{end}"].values for end in ("", "_error"))
     ax.axvspan(-_LITTLE, 0.0, color="0.92", linewidth=0.0, zorder=0)
     ax.axvline(0.0, color="0.4", linewidth=0.8, zorder=1)
-    inside: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points"}
     fits = comparison["fits"].values
     for chosen, colour, filling in ((fits, PALETTE["median"], PALETTE["median"]), (~fits, "0.55", "white")):
-        ax.errorbar(
-            difference[chosen],
-            places[chosen],
-            xerr=error[chosen],
-            linestyle="none",
-            marker="o",
-            markersize=5.0,
-            markerfacecolor=filling,
-            color=colour,
-            capsize=2.5,
-            linewidth=1.2,
-            zorder=3,
-        )
-    ax.annotate(
-        "little", (-0.5 * _LITTLE, 0.0), (0.0, 2.0), **inside, ha="center", va="bottom", fontsize="small", color="0.35"
-    )
+        style = {"marker": "o", "color": colour, "markerfacecolor": filling, "capsize": 2.5, "linewidth": 1.2, **_DOTS}
+        ax.errorbar(difference[chosen], places[chosen], xerr=error[chosen], **style)
+    place: dict[str, Any] = {"xycoords": ax.get_xaxis_transform(), "textcoords": "offset points", "ha": "center"}
+    ax.annotate("little", (-0.5 * _LITTLE, 0.0), (0.0, 2.0), va="bottom", fontsize="small", color="0.35", **place)
     least = float(np.min((difference - error)[np.isfinite(difference - error)], initial=0.0))
     if least < _FAR:
         ax.set_xscale("symlog", linthresh=10.0)
         decades = int(np.log10(-least))
         ax.set_xticks([0.0, *(-(10.0**k) for k in range(1, decades + 1) if k % 2 or decades < 4)])
         ax.set_xlim(1.5 * least, 3.0)
-        ax.xaxis.set_major_formatter(lambda value, _: number(value))
+        show_numbers(ax.xaxis)
     ax.set_xlabel("how left-out samples are foretold:\nelpd difference ± standard error")
     ax.tick_params(axis="y", length=0.0)
 

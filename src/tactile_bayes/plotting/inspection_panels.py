@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import LABELS, PALETTE, AxesArray, handles_once, legend_entry, set_unit
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.marks import PALETTE
+from tactile_bayes.plotting.sweep_lines import finish_channels, reading_style
 from tactile_bayes.record import CHANNELS, present_channels
 
 if TYPE_CHECKING:
@@ -18,7 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["inspection"]
 
 _COLOURS = {"forward": "#0072B2", "backward": "#D55E00"}
-_MARKERS = {"forward": "o", "backward": "^"}
 _WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "outlier": ("stands out", {"marker": "o", "markersize": 9.0, "color": "#CC79A7"}),
     "stuck": ("stuck", {"marker": "s", "markersize": 8.0, "color": "#E69F00"}),
@@ -26,6 +28,8 @@ _WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "repeated": ("twice", {"marker": "h", "markersize": 9.0, "color": "#000000"}),
     "uneven_step": ("uneven step", {"marker": "|", "markersize": 14.0, "color": "#000000"}),
 }
+_MARKS: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 1.2, "zorder": 4}
+_LEGEND = ["forward", "backward", "first contact", "snap-off", *(words for words, _ in _WRONG.values())]
 
 
 def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
@@ -60,38 +64,28 @@ def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
     >>> inspection(inspect_record(measured))[0, 1].get_title()
     'unloaded'
     """
-    panels = _panels(axes)
+    if axes is None:
+        panels = new_panels(3, 2, 5.6, sharex="col", width_ratios=(2.2, 1.0))
+    else:
+        panels = check_panels(axes, (3, 2), f"a row for each of {', '.join(CHANNELS)}")
     record = inspected.record
     for index, channel in enumerate(CHANNELS):
         readings, zero = panels[index]
         label = LABELS[channel]
         if channel not in present_channels(record):
-            for panel, words in ((readings, "not measured"), (zero, "")):
-                panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center", va="center", color=PALETTE["none"])
-                panel.set_yticks([])
-            readings.set_ylabel(label)
+            write_not_measured(readings, label)
+            zero.set_yticks([])
             continue
         _draw_readings(readings, inspected, index)
         set_unit(readings.yaxis, f"{label}\n", channel, record[channel].attrs, record[channel].values)
         _draw_unloaded(zero, inspected, index)
         unloaded = record[channel].values[inspected.samples.unloaded.values]
         set_unit(zero.yaxis, "", channel, record[channel].attrs, unloaded)
-    panels[-1, 0].set_xlabel(f"{LABELS['drive_angle']} [°]")
+    panels[-1, 0].set_xlabel(DRIVE_ANGLE)
     panels[-1, 1].set_xlabel("sample")
     panels[0, 1].set_title("unloaded", fontsize="small")
-    _finish(panels)
-    return panels
-
-
-def _panels(axes: Any) -> AxesArray:
-    if axes is None:
-        from matplotlib import pyplot as plt
-
-        ratios = {"width_ratios": (2.2, 1.0)}
-        return plt.subplots(3, 2, figsize=(7.0, 5.6), sharex="col", layout="constrained", gridspec_kw=ratios)[1]
-    panels = np.asarray(axes, dtype=object)
-    if panels.shape != (3, 2):
-        raise ParameterError(f"axes have shape {panels.shape}: give (3, 2), a row for each of {', '.join(CHANNELS)}")
+    panels[0, 0].figure.align_ylabels(list(panels[:, 0]))
+    finish_channels(panels.ravel(), _LEGEND.index, 3, handlelength=1.5, columnspacing=1.2)
     return panels
 
 
@@ -102,13 +96,7 @@ def _draw_readings(ax: Axes, inspected: Inspection, index: int) -> None:
     for place, number in enumerate(sweeps.sweep.values):
         direction = str(sweeps.direction.values[place])
         rows = record.sweep.values == number
-        style: dict[str, Any] = {
-            "color": _COLOURS[direction],
-            "marker": _MARKERS[direction],
-            "markersize": 2.6,
-            "linestyle": "none",
-        }
-        style |= {"markerfacecolor": "none", "markeredgewidth": 0.6}
+        style = reading_style(direction, _COLOURS[direction])
         ax.plot(angle[rows], reading[rows], **style)
         legend_entry(ax, direction, **style)
         for event, label, line in (("onset", "first contact", ":"), ("snap_off", "snap-off", "--")):
@@ -118,14 +106,7 @@ def _draw_readings(ax: Axes, inspected: Inspection, index: int) -> None:
                 legend_entry(ax, label, color="0.35", linestyle=line, linewidth=1.0)
     for name, flags in _wrong(inspected, index):
         label, special = _WRONG[name]
-        marks: dict[str, Any] = {
-            "linestyle": "none",
-            "markerfacecolor": "none",
-            "markeredgewidth": 1.2,
-            "zorder": 4,
-            **special,
-        }
-        ax.plot(angle[flags], reading[flags], label=label, **marks)
+        ax.plot(angle[flags], reading[flags], label=label, **_MARKS, **special)
 
 
 def _draw_unloaded(ax: Axes, inspected: Inspection, index: int) -> None:
@@ -144,13 +125,7 @@ def _draw_unloaded(ax: Axes, inspected: Inspection, index: int) -> None:
     for name, flags in _wrong(inspected, index):
         shown = flags & unloaded
         if shown.any():
-            marks: dict[str, Any] = {
-                "linestyle": "none",
-                "markerfacecolor": "none",
-                "markeredgewidth": 1.2,
-                "zorder": 4,
-            }
-            ax.plot(sample[shown], reading[shown], **(marks | _WRONG[name][1]))
+            ax.plot(sample[shown], reading[shown], **_MARKS, **_WRONG[name][1])
     ax.set_xlim(-0.02 * reading.size, 1.02 * reading.size)
 
 
@@ -160,26 +135,3 @@ def _wrong(inspected: Inspection, index: int) -> list[tuple[str, Any]]:
     flags = {name: samples[name].values for name in _WRONG}
     flags = {name: values[:, index] if values.ndim == 2 else values for name, values in flags.items()}
     return [(name, values) for name, values in flags.items() if values.any()]
-
-
-def _finish(panels: AxesArray) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    for panel in panels.ravel().tolist():
-        if len(panel.get_yticks()):
-            panel.yaxis.set_major_locator(MaxNLocator(4))
-    panels[0, 0].figure.align_ylabels(list(panels[:, 0]))
-    found = {label: handle for panel in panels[:, 0] for handle, label in zip(*handles_once(panel), strict=True)}
-    order = ["forward", "backward", "first contact", "snap-off", *(words for words, _ in _WRONG.values())]
-    shown = [label for label in order if label in found]
-    panels[0, 0].legend(
-        [found[label] for label in shown],
-        shown,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=min(3, len(shown)),
-        handlelength=1.5,
-        columnspacing=1.2,
-        fontsize="small",
-        frameon=False,
-    )

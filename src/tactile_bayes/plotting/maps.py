@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import LABELS, PALETTE, Floats, handles_once, set_unit
+from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.plotting.labels import LABELS, set_unit
+from tactile_bayes.plotting.legends import legend, legend_above, legend_entries
+from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,19 +19,17 @@ if TYPE_CHECKING:
     from tactile_bayes.contours.base import Contour
 
 __all__ = [
-    "CONTACT_MARKERS",
     "draw_gap",
     "draw_object",
     "draw_pivot",
     "finish_map",
     "fit_height",
+    "label_map",
     "limits_of",
     "outline",
     "set_below",
     "write_on_top",
 ]
-
-CONTACT_MARKERS = {"tip": "o", "tangential": "s"}
 
 
 def limits_of(ax: Axes) -> Floats:
@@ -41,19 +42,19 @@ def limits_of(ax: Axes) -> Floats:
 def finish_map(ax: Axes, attrs: Mapping[Any, Any]) -> None:
     """Equal scales, labels, and a legend beside or above the data, whichever leaves them larger."""
     limits = limits_of(ax)
-    set_unit(ax.xaxis, LABELS["contact_x"] + " ", "contact_x", attrs, limits)
-    set_unit(ax.yaxis, LABELS["contact_y"] + " ", "contact_y", attrs, limits)
-    handles, labels = handles_once(ax)
-    if not labels:
-        return
+    label_map(ax, attrs, limits)
+    entries = legend_entries(ax)
     left, right, bottom, top = limits
-    beside = (right - left) < 1.6 * (top - bottom)
-    place: dict[str, Any] = (
-        {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
-        if beside
-        else {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": min(4, len(labels))}
-    )
-    ax.legend(handles, labels, fontsize="small", frameon=False, **place)
+    if (right - left) < 1.6 * (top - bottom):
+        legend(ax, entries, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    else:
+        legend_above(ax, min(4, len(entries)), entries)
+
+
+def label_map(ax: Axes, attrs: Mapping[Any, Any], limits: Floats, form: str = "{}") -> None:
+    """Label both axes of a map with their unit, in a form that holds the symbol."""
+    for axis, name in ((ax.xaxis, "contact_x"), (ax.yaxis, "contact_y")):
+        set_unit(axis, f"{form.format(LABELS[name])} ", name, attrs, limits)
 
 
 def fit_height(ax: Axes) -> None:
@@ -96,31 +97,14 @@ def draw_object(ax: Axes, contour: Contour, x: Floats, y: Floats, room: float) -
 
 
 def draw_pivot(ax: Axes, base: tuple[float, float], *, colour: str = "black", label: str = "pivot") -> None:
-    ax.plot(
-        *base,
-        linestyle="none",
-        marker="o",
-        markersize=6.0,
-        markerfacecolor="white",
-        markeredgecolor=colour,
-        markeredgewidth=1.2,
-        zorder=5,
-        label=label,
-    )
+    style: dict[str, Any] = {"marker": "o", "markersize": 6.0, "markerfacecolor": "white", "markeredgewidth": 1.2}
+    ax.plot(*base, linestyle="none", markeredgecolor=colour, zorder=5, label=label, **style)
 
 
 def draw_gap(ax: Axes, left: float, right: float, text: str, *, hatched: bool = True) -> Text:
     """A stretch in x from bottom to top, and what it is; the text is returned."""
-    ax.axvspan(
-        left,
-        right,
-        facecolor=PALETTE["gap"],
-        alpha=0.25,
-        edgecolor="0.5",
-        linewidth=0.0,
-        hatch="///" if hatched else None,
-        zorder=0.5,
-    )
+    style: dict[str, Any] = {"facecolor": PALETTE["gap"], "alpha": 0.25, "edgecolor": "0.5", "linewidth": 0.0}
+    ax.axvspan(left, right, hatch="///" if hatched else None, zorder=0.5, **style)
     return write_on_top(ax, 0.5 * (left + right), text)
 
 

@@ -10,7 +10,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, AxesArray, Floats, parameter_grid
+from tactile_bayes.plotting.axes import AxesArray, Floats, check_panels, new_panels
+from tactile_bayes.plotting.labels import number
+from tactile_bayes.plotting.marks import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +24,8 @@ _CHAINS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _MOST_DRAWS = 2000
 _INTERVAL = 0.95
 _REGIONS = (0.95, 0.5)
+_ROWS = "rows are parameters"
+_TRUTH: dict[str, Any] = {"color": PALETTE["change"], "linestyle": "--", "linewidth": 0.9}
 
 
 def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = None, axes: Any = None) -> AxesArray:
@@ -54,16 +58,20 @@ def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = 
     (1, 2)
     """
     parameters = _parameters(posterior, names)
-    grid = parameter_grid(axes, (len(parameters), 2), (7.0, 0.5 + 1.2 * len(parameters)), width_ratios=(2.0, 1.0))
+    count = len(parameters)
+    if axes is None:
+        grid = new_panels(count, 2, 0.5 + 1.2 * count, width_ratios=(2.0, 1.0))
+    else:
+        grid = check_panels(axes, (count, 2), _ROWS)
     for (left, right), parameter in zip(grid, parameters, strict=True):
         edges = np.linspace(*_core(parameter.draws), 41)
-        for number, draws in enumerate(parameter.draws):
-            colour = _CHAINS[number % len(_CHAINS)]
+        for chain, draws in enumerate(parameter.draws):
+            colour = _CHAINS[chain % len(_CHAINS)]
             step = -(-draws.size // _MOST_DRAWS)
             drawn = np.arange(0, draws.size, step)
             left.plot(drawn, draws[drawn], color=colour, linewidth=0.4, alpha=0.7)
             density = np.histogram(draws[np.isfinite(draws)], edges, density=True)[0]
-            right.stairs(density, edges, color=colour, linewidth=1.0, label=f"chain {number}")
+            right.stairs(density, edges, color=colour, linewidth=1.0, label=f"chain {chain}")
         left.margins(x=0.01)
         right.set_ylim(bottom=0.0)
         right.set_yticks([])
@@ -130,7 +138,7 @@ def pairs(
         )
     size = len(parameters)
     side = max(2.6, min(7.0, 1.75 * size), 0.115 * rcParams["font.size"] * size)
-    grid = parameter_grid(axes, (size, size), (side, side))
+    grid = new_panels(size, size, side, side) if axes is None else check_panels(axes, (size, size), _ROWS)
     limits = [_view(p, truth.get(p.name)) for p in parameters]
     for row, column in np.ndindex(size, size):
         ax: Axes = grid.item(row, column)
@@ -146,11 +154,11 @@ def pairs(
             ax.set_ylim(limits[row])
             _label_parameter(ax.yaxis, parameters[row], 3)
             if parameters[row].name in truth:
-                ax.axhline(truth[parameters[row].name], color=PALETTE["change"], linestyle="--", linewidth=0.9)
+                ax.axhline(truth[parameters[row].name], **_TRUTH)
         ax.set_xlim(limits[column])
         _label_parameter(ax.xaxis, across, 3)
         if across.name in truth:
-            ax.axvline(truth[across.name], color=PALETTE["change"], linestyle="--", linewidth=0.9)
+            ax.axvline(truth[across.name], **_TRUTH)
         ax.tick_params(labelsize="small", labelbottom=row == size - 1, labelleft=column == 0 and row > 0)
         ax.tick_params(axis="x", labelrotation=45.0)
         if row < size - 1:
@@ -204,7 +212,7 @@ def _symbol(name: str) -> str:
 
 def _label_parameter(axis: Axis, parameter: _Parameter, most_ticks: int, *, lines: bool = True) -> None:
     """Label and ticks of an axis; where values are small or large, in a power of ten that the label names."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
+    from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     largest = np.max(np.abs(_core(parameter.draws)))
     power = int(3 * np.floor(np.log10(largest) / 3)) if largest > 0.0 else 0
@@ -215,11 +223,9 @@ def _label_parameter(axis: Axis, parameter: _Parameter, most_ticks: int, *, line
         label = parameter.label.replace(" ", "\n") + (f"\n[{unit}]" if unit else "")
     axis.set_label_text(label)
     axis.set_major_locator(MaxNLocator(most_ticks, min_n_ticks=2))
-    axis.set_major_formatter(
-        FuncFormatter(lambda value, _: f"{value / 10.0**power:.10g}".replace("-", "−"))
-        if power
-        else ScalarFormatter(useOffset=False)
-    )
+    axis.set_major_formatter(ScalarFormatter(useOffset=False))
+    if power:
+        axis.set_major_formatter(lambda value, _: number(value, power, digits=10))
 
 
 def _core(draws: Floats) -> tuple[float, float]:

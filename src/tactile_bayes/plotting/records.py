@@ -10,18 +10,11 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import (
-    LABELS,
-    PALETTE,
-    PHASES,
-    AxesArray,
-    Floats,
-    channel_panels,
-    handles_once,
-    legend_entry,
-    set_unit,
-)
-from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, events_by_label, load_of, phase_runs, with_events
+from tactile_bayes.plotting.axes import AxesArray, Floats, check_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
+from tactile_bayes.plotting.sweep_lines import draw_events, finish_channels, phase_runs, reading_style, with_events
 from tactile_bayes.record import CHANNELS, Frame, frame_of, validate
 
 if TYPE_CHECKING:
@@ -31,8 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["observables", "predictive"]
 
-_LINES = {"forward": "-", "backward": "--"}
-_SAMPLES = {"forward": "o", "backward": "^"}
 _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
 """Colours of residuals, after Okabe and Ito, of which two sweeps lie over one another."""
 
@@ -87,9 +78,9 @@ def observables(
     'drive angle $\\\\varphi_0$ [°]'
     """
     record = validate(record)
-    panels, own = channel_panels(axes)
+    panels = _panels(axes)
     _draw_observables(panels, record, events, with_truth=True)
-    _finish_panels(panels, own)
+    _finish_panels(panels, axes is None)
     return panels
 
 
@@ -159,7 +150,11 @@ def predictive(
         )
     if axes is None and residuals is not None:
         raise ParameterError("axes are given for the residuals only: give three for the channels, too")
-    panels, below, own = _panels_with_residuals(axes, residuals)
+    if axes is None:
+        both = new_panels(6, 1, 8.4, sharex=True, height_ratios=3 * (2.0, 1.0))[:, 0]
+        panels, below = both[::2], both[1::2]
+    else:
+        panels, below = _panels(axes), np.full(3, None) if residuals is None else _panels(residuals)
     _draw_observables(panels, record, None, with_truth=False)
     for channel, panel, ax in zip(CHANNELS, panels, below, strict=True):
         if f"{channel}_lower" not in predicted or np.isnan(record[channel].values).all():
@@ -176,22 +171,14 @@ def predictive(
         if ax is not None:
             _finish_residuals(ax)
     drawn = [ax for pair in zip(panels, below, strict=True) for ax in pair if ax is not None]
-    _finish_panels(np.array(drawn, dtype=object), own, columns=4 if below[0] is None else 3)
+    _finish_panels(np.array(drawn, dtype=object), axes is None, columns=4 if below[0] is None else 3)
     return panels
 
 
-def _panels_with_residuals(
-    axes: Sequence[Axes] | None, residuals: Sequence[Axes] | None
-) -> tuple[AxesArray, AxesArray, bool]:
-    """Panels of channels, those of their residuals or None for each, and whether they are of a figure of their own."""
-    if axes is not None:
-        panels, below = channel_panels(axes)[0], np.full(3, None)
-        return panels, below if residuals is None else channel_panels(residuals)[0], False
-    from matplotlib import pyplot as plt
-
-    ratios = {"height_ratios": 3 * (2.0, 1.0)}
-    _, both = plt.subplots(6, 1, sharex=True, figsize=(7.0, 8.4), layout="constrained", gridspec_kw=ratios)
-    return both[::2], both[1::2], True
+def _panels(axes: Sequence[Axes] | None) -> AxesArray:
+    if axes is None:
+        return new_panels(3, 1, 5.4, sharex=True)[:, 0]
+    return check_panels(axes, (3,), f"give three, for {', '.join(CHANNELS)}")
 
 
 def _draw_residuals(ax: Axes, sweep: xr.Dataset, channel: str) -> None:
@@ -199,8 +186,8 @@ def _draw_residuals(ax: Axes, sweep: xr.Dataset, channel: str) -> None:
     with np.errstate(divide="ignore", invalid="ignore"):
         off = (sweep[channel].values - 0.5 * (lower + upper)) / (0.5 * (upper - lower))
     direction = str(sweep["direction"].values[0])
-    style: dict[str, Any] = {"color": _SWEEPS[direction], "marker": _SAMPLES[direction], "markersize": 2.2}
-    style |= {"markeredgewidth": 0.0, "linestyle": _LINES[direction], "linewidth": 0.5}
+    style: dict[str, Any] = {"color": _SWEEPS[direction], "marker": SWEEP_MARKERS[direction], "markersize": 2.2}
+    style |= {"markeredgewidth": 0.0, "linestyle": SWEEP_LINES[direction], "linewidth": 0.5}
     style |= {"label": f"residual {direction}"}
     ax.plot(_degrees(sweep["drive_angle"].values), np.where(np.isfinite(off), off, np.nan), **style)
 
@@ -215,32 +202,18 @@ def _finish_residuals(ax: Axes) -> None:
 
 
 def _finish_panels(panels: AxesArray, own: bool, columns: int = 4) -> None:
-    from matplotlib.ticker import MaxNLocator, MultipleLocator
+    from matplotlib.ticker import MultipleLocator
 
     bottom = panels[-1]
-    bottom.set_xlabel(f"{LABELS['drive_angle']} [°]")
+    bottom.set_xlabel(DRIVE_ANGLE)
     span = np.ptp(bottom.get_xlim())
     if 60.0 < span < 400.0:
         bottom.xaxis.set_major_locator(MultipleLocator(15.0 if span < 150.0 else 30.0))
-    for panel in panels:
-        if len(panel.get_yticks()):
-            panel.yaxis.set_major_locator(MaxNLocator(4))
     if own:
         bottom.figure.align_ylabels(list(panels))
         for panel in panels[:-1]:
             panel.tick_params(labelbottom=False)
-    found = {label: handle for panel in panels for handle, label in zip(*handles_once(panel), strict=True)}
-    labelled = {label: found[label] for label in sorted(found, key=_legend_order)}
-    if labelled:
-        panels[0].legend(
-            list(labelled.values()),
-            list(labelled),
-            loc="lower center",
-            bbox_to_anchor=(0.5, 1.0),
-            ncols=min(columns, len(labelled)),
-            fontsize="small",
-            frameon=False,
-        )
+    finish_channels(panels, _legend_order, columns)
 
 
 def _legend_order(label: str) -> int:
@@ -256,7 +229,7 @@ def _draw_observables(
     labels = LABELS if frame == "fixed" else _TURNING_LABELS
     for panel, channel in zip(panels, CHANNELS, strict=True):
         if np.isnan(record[channel].values).all():
-            _not_measured(panel, f"{labels[channel]}\n")
+            write_not_measured(panel, f"{labels[channel]}\n")
             continue
         panel.axhline(0.0, color="0.85", linewidth=0.8, zorder=0)
         for sweep in _sweeps(record):
@@ -264,16 +237,15 @@ def _draw_observables(
             of_sweep = events.get(direction) if events is not None else None
             if _is_exact(sweep, channel):
                 _draw_line(panel, sweep, channel, channel, of_sweep, frame, linewidth=1.6)
-                legend_entry(panel, direction, color="0.35", linestyle=_LINES[direction], linewidth=1.6)
+                legend_entry(panel, direction, color="0.35", linestyle=SWEEP_LINES[direction], linewidth=1.6)
             else:
-                style = {"marker": _SAMPLES[direction], "markersize": 2.6, "color": PALETTE["sample"]}
-                style |= {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 0.6}
+                style = reading_style(direction, PALETTE["sample"])
                 panel.plot(_degrees(sweep["drive_angle"].values), sweep[channel].values, **style)
                 legend_entry(panel, f"measured {direction}", **style)
                 if with_truth and f"truth_{channel}" in sweep:
                     _draw_line(panel, sweep, f"truth_{channel}", channel, of_sweep, frame, linewidth=1.0)
             if of_sweep is not None:
-                _draw_events(panel, of_sweep, channel, frame)
+                draw_events(panel, of_sweep, channel, frame)
         values = record[channel].values
         set_unit(panel.yaxis, f"{labels[channel]}\n", channel, record[channel].attrs, values)
 
@@ -305,7 +277,7 @@ def _draw_line(
     angle_column = "truth_drive_angle" if "truth_drive_angle" in sweep else "drive_angle"
     angle, value = sweep[angle_column].values, sweep[column].values
     direction = str(sweep["direction"].values[0])
-    style: dict[str, Any] = {"linestyle": _LINES[direction], "linewidth": linewidth, "zorder": 2.5}
+    style: dict[str, Any] = {"linestyle": SWEEP_LINES[direction], "linewidth": linewidth, "zorder": 2.5}
     phase = sweep["truth_contact_phase"].values.astype(object) if "truth_contact_phase" in sweep else None
     if phase is None:
         ax.plot(_degrees(angle), value, color=PALETTE["change"], **style)
@@ -319,20 +291,6 @@ def _draw_line(
         if name in PHASES:
             prefix = "true " if column != channel else ""
             legend_entry(ax, prefix + PHASES[name], color=PALETTE[name], linewidth=linewidth)
-
-
-def _draw_events(ax: Axes, events: SweepEvents, channel: str, frame: Frame) -> None:
-    for label, marked in events_by_label(events).items():
-        angles = _degrees([event.drive_angle for event in marked])
-        values = [load_of(event, channel, frame) for event in marked]
-        style = {"color": PALETTE["change"], "linestyle": "none", "zorder": 4, **EVENT_MARKERS[label]}
-        ax.plot(angles, values, label=label, **style)
-
-
-def _not_measured(ax: Axes, label: str) -> None:
-    ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", va="center", color=PALETTE["none"])
-    ax.set_yticks([])
-    ax.set_ylabel(label)
 
 
 def _degrees(angle: ArrayLike) -> Floats:

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import PALETTE, PHASES, Floats, single_axes
-from tactile_bayes.plotting.maps import CONTACT_MARKERS, draw_object, draw_pivot, finish_map
+from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.maps import draw_object, draw_pivot, finish_map
+from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
 from tactile_bayes.shape import rod_shape
 
@@ -70,13 +72,11 @@ def rods(
     '$x$ [$L$]'
     """
     number = _number(scan, direction, sweep)
-    if count < 1:
-        raise ParameterError(f"count is {count!r}: at least one rod must be drawn")
+    check_whole_number("count", count, 1, "at least one rod must be drawn")
     record, events, rod = in_frame(scan.record, "fixed"), scan.sweeps[number], rod_of(scan.record)
     samples = np.flatnonzero((record["sweep"].values == number) & (record["truth_contact_phase"].values != "none"))
-    samples = (
-        samples[np.unique(np.linspace(0, samples.size - 1, count).round().astype(int))] if samples.size else samples
-    )
+    if samples.size:
+        samples = samples[np.unique(np.linspace(0, samples.size - 1, count).round().astype(int))]
 
     def shape(state: Mapping[str, Any]) -> tuple[Floats, Floats]:
         x, y = rod_shape(
@@ -88,25 +88,19 @@ def rods(
         )
         return events.base[0] + rod.length_unit * x, events.base[1] + rod.length_unit * y
 
+    def true(name: str) -> Floats:
+        return record[f"truth_{name}" if f"truth_{name}" in record else name].values[samples]
+
     ax = single_axes() if ax is None else ax
-    wrench = ("drive_angle", *CHANNELS)
-    names = {name: f"truth_{name}" if f"truth_{name}" in record else name for name in wrench}
     phases = record["truth_contact_phase"].values[samples]
-    x, y = shape({name: record[column].values[samples] for name, column in names.items()})
+    x, y = shape({name: true(name) for name in ("drive_angle", *CHANNELS)})
     for phase, label in PHASES.items():
         chosen = phases == phase
         if chosen.any():
             ax.plot(x[chosen].T, y[chosen].T, color=PALETTE[phase], linewidth=0.9, label=label)
-            at = samples[chosen]
-            ax.plot(
-                record["truth_contact_x"].values[at],
-                record["truth_contact_y"].values[at],
-                linestyle="none",
-                marker=CONTACT_MARKERS[phase],
-                markersize=3.0,
-                color=PALETTE[phase],
-                zorder=3,
-            )
+            touched = (record[f"truth_contact_{axis}"].values[samples[chosen]] for axis in "xy")
+            dots: dict[str, Any] = {"linestyle": "none", "marker": CONTACT_MARKERS[phase], "markersize": 3.0}
+            ax.plot(*touched, color=PALETTE[phase], zorder=3, **dots)
     marked: list[tuple[Event, str, str]] = [
         (events.first_contact, "first contact", ":"),
         *((event, "phase change", "-") for event in events.transitions),

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import check_choice
 
 __all__ = ["COLUMN_WIDTH", "PAGE_WIDTH", "STYLES", "Style", "style"]
 
@@ -31,28 +31,23 @@ _COMMON: Mapping[str, Any] = {
     "savefig.facecolor": "white",
 }
 
+_TICKS = {"major.width": 0.6, "minor.width": 0.4, "major.size": 3.0, "minor.size": 1.8}
+"""Of both axes, in print."""
+
+
+def _letters(size: float, at_ticks: float) -> dict[str, float]:
+    names = ("font.size", "axes.labelsize", "axes.titlesize", "figure.titlesize", "figure.labelsize", "legend.fontsize")
+    return dict.fromkeys(names, size) | dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), at_ticks)
+
+
 STYLES: Mapping[Style, Mapping[str, Any]] = {
     "print": {
         **_COMMON,
-        "font.size": 8.0,
-        "axes.labelsize": 8.0,
-        "axes.titlesize": 8.0,
-        "figure.titlesize": 8.0,
-        "figure.labelsize": 8.0,
-        "legend.fontsize": 8.0,
-        "xtick.labelsize": 8.0,
-        "ytick.labelsize": 8.0,
+        **_letters(8.0, 8.0),
+        **{f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.items()},
         "axes.linewidth": 0.6,
         "axes.labelpad": 3.0,
         "axes.titlepad": 4.0,
-        "xtick.major.width": 0.6,
-        "ytick.major.width": 0.6,
-        "xtick.minor.width": 0.4,
-        "ytick.minor.width": 0.4,
-        "xtick.major.size": 3.0,
-        "ytick.major.size": 3.0,
-        "xtick.minor.size": 1.8,
-        "ytick.minor.size": 1.8,
         "hatch.linewidth": 0.5,
         "legend.handlelength": 1.8,
         "legend.columnspacing": 1.4,
@@ -60,14 +55,7 @@ STYLES: Mapping[Style, Mapping[str, Any]] = {
     },
     "screen": {
         **_COMMON,
-        "font.size": 10.0,
-        "axes.labelsize": 10.0,
-        "axes.titlesize": 10.0,
-        "figure.titlesize": 10.0,
-        "figure.labelsize": 10.0,
-        "legend.fontsize": 10.0,
-        "xtick.labelsize": 9.0,
-        "ytick.labelsize": 9.0,
+        **_letters(10.0, 9.0),
         "axes.linewidth": 0.8,
         "hatch.linewidth": 0.8,
         "savefig.dpi": 150.0,
@@ -105,8 +93,7 @@ def style(name: Style = "print") -> Iterator[None]:
     ...     _ = figure.subplots().set_xlabel("drive angle")
     ...     figure.savefig(io.BytesIO(), format="pdf")
     """
-    if name not in STYLES:
-        raise ParameterError(f"style is {name!r}: choose {' or '.join(map(repr, STYLES))}")
+    check_choice("style", name, STYLES)
     import matplotlib as mpl
 
     settings: Any = dict(STYLES[name])

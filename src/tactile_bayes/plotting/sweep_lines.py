@@ -1,18 +1,23 @@
-"""Lines of a sweep over the drive angle: complete up to its events, and one for each phase of contact."""
+"""A sweep over the drive angle: its readings, its lines complete up to the events, and panels of channels."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.plotting.legends import legend_above, legend_entries
+from tactile_bayes.plotting.marks import PALETTE, SWEEP_MARKERS
 from tactile_bayes.record import CHANNELS, Frame, turned
 from tactile_bayes.sweep_events import Event, SweepEvents
 
-__all__ = ["EVENT_MARKERS", "events_by_label", "load_of", "phase_runs", "with_events"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["EVENT_MARKERS", "draw_events", "finish_channels", "phase_runs", "reading_style", "with_events"]
 
 Phases = NDArray[np.object_]
 
@@ -23,14 +28,26 @@ EVENT_MARKERS: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-def events_by_label(events: SweepEvents) -> dict[str, tuple[Event, ...]]:
-    """Those that there are, by what they are called in a legend."""
+def reading_style(direction: str, colour: str) -> dict[str, Any]:
+    """How single readings of a sweep are marked."""
+    style = {"marker": SWEEP_MARKERS[direction], "markersize": 2.6, "color": colour}
+    return style | {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 0.6}
+
+
+def draw_events(ax: Axes, events: SweepEvents, channel: str, frame: Frame, size: float = 1.0, **style: Any) -> None:
+    """Mark first contact, phase changes and snap-off, with markers of `size` times their usual size."""
     marked = {
         "first contact": (events.first_contact,),
         "phase change": events.transitions,
         "snap-off": (events.snap_off,),
     }
-    return {label: of_label for label, of_label in marked.items() if of_label}
+    for label, of_label in marked.items():
+        if of_label:
+            angles = np.degrees([event.drive_angle for event in of_label])
+            values = [_load_of(event, channel, frame) for event in of_label]
+            look = {**style, **EVENT_MARKERS[label], "color": PALETTE["change"], "linestyle": "none", "zorder": 4}
+            look["markersize"] *= size
+            ax.plot(angles, values, label=label, **look)
 
 
 def with_events(
@@ -40,7 +57,7 @@ def with_events(
     marked = [events.first_contact, *events.transitions, events.snap_off]
     following = [event.kind.split(" → ")[-1] for event in marked[:-1]]
     angle = np.append(angle, [event.drive_angle for event in marked])
-    value = np.append(value, [load_of(event, channel, frame) for event in marked])
+    value = np.append(value, [_load_of(event, channel, frame) for event in marked])
     phase = np.append(phase, [*following, following[-1]])
     order = np.argsort(angle if events.direction == "forward" else -angle, kind="stable")
     return angle[order], value[order], phase[order]
@@ -54,9 +71,26 @@ def phase_runs(phase: Phases) -> Iterator[slice]:
         yield slice(int(start), int(stop) + 1 if joined else int(stop))
 
 
-def load_of(event: Event, channel: str, frame: Frame) -> float:
+def _load_of(event: Event, channel: str, frame: Frame) -> float:
     """A load of an event in the frame of a record; events are in the fixed one."""
     loads = {name: getattr(event, name) for name in CHANNELS}
     if frame == "turning":
         loads["force_x"], loads["force_y"] = turned(event.force_x, event.force_y, event.drive_angle)
     return float(loads[channel])
+
+
+def finish_channels(panels: Iterable[Axes], order: Callable[[str], int], columns: int, **options: Any) -> None:
+    """Give panels few ticks, and the first of them a legend of all in an order of the labels."""
+    from matplotlib.ticker import MaxNLocator
+
+    panels = list(panels)
+    for panel in panels:
+        if len(panel.get_yticks()):
+            panel.yaxis.set_major_locator(MaxNLocator(4))
+    entries = legend_entries(*panels)
+    legend_above(
+        panels[0],
+        min(columns, len(entries)),
+        {label: entries[label] for label in sorted(entries, key=order)},
+        **options,
+    )

@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import LABELS, PALETTE, AxesArray, Floats, legend_entry, number, set_unit
-from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, radius_of, refuse_probability
-from tactile_bayes.plotting.maps import limits_of, outline
+from tactile_bayes.plotting.axes import AxesArray, check_panels
+from tactile_bayes.plotting.contact_regions import contact_ellipses, ellipse_of, radius_of
+from tactile_bayes.plotting.labels import DRIVE_ANGLE, show_numbers
+from tactile_bayes.plotting.legends import legend_above, legend_entry
+from tactile_bayes.plotting.maps import label_map, limits_of, outline
+from tactile_bayes.plotting.marks import PALETTE, SWEEP_LINES, TRUTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +33,6 @@ _HIGHEST = 0.9
 
 _PANEL = 0.25
 """Height of such a row over the width of the figure."""
-_STYLES = {"forward": "-", "backward": "--"}
 
 
 def tightening(
@@ -86,7 +89,7 @@ def tightening(
     """
     from tactile_bayes.uncertainty.contact_moments import contact_moments
 
-    refuse_probability(probability)
+    check_probability("probability", probability)
     tight = contact_moments(implied)
     loose = single if isinstance(single, xr.Dataset) and "contact_x_sd" in single else contact_moments(single)
     _refuse_another_record(implied, single, tight, loose)
@@ -102,7 +105,7 @@ def tightening(
     contact_ellipses(loose, probability=probability, truth=truth, samples=on_map, ax=panels[0])
     if axes is None:
         _fit_map(panels[0])
-    panels[0].legend(fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    legend_above(panels[0], 2)
     radius = radius_of(probability)
     for letter, ax, i in zip(_DETAILS, panels[1:4], chosen.tolist(), strict=True):
         slope = float(tight["slope_angle"][i])
@@ -132,18 +135,15 @@ def _certain(moments: xr.Dataset) -> Any:
 
 
 def _panels(axes: Any) -> AxesArray:
-    if axes is None:
-        from matplotlib import pyplot as plt
+    if axes is not None:
+        return check_panels(np.ravel(axes), (5,), "give five, for the map, three details, and the ratios")
+    from matplotlib import pyplot as plt
 
-        figure = plt.figure(figsize=(7.0, 7.6), layout="constrained")
-        grid = figure.add_gridspec(3, 3, height_ratios=(_HIGHEST, 1.0, 1.0))
-        whole, bottom = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[2, :])
-        panels = [whole, *(figure.add_subplot(grid[1, i]) for i in range(3)), bottom]
-    else:
-        panels = list(np.asarray(axes, dtype=object).ravel())
-    if len(panels) != 5:
-        raise ParameterError(f"axes are {len(panels)}: give five, for the map, three details, and the ratios")
-    return np.array(panels, dtype=object)
+    figure = plt.figure(figsize=(7.0, 7.6), layout="constrained")
+    grid = figure.add_gridspec(3, 3, height_ratios=(_HIGHEST, 1.0, 1.0))
+    places = grid[0, :], grid[2, :], *(grid[1, i] for i in range(3))
+    whole, bottom, *details = (figure.add_subplot(place) for place in places)
+    return np.array([whole, *details, bottom], dtype=object)
 
 
 def _fit_map(ax: Axes) -> None:
@@ -199,17 +199,15 @@ def _draw_detail(
     reach = 1.15 * (radius * max(spread) + max(map(abs, off)))
     if truth is not None:
         along, height = outline(truth, x - 2.0 * reach, x + 2.0 * reach)
-        ax.plot(along - x, height - y, color=PALETTE["change"], linewidth=1.0, linestyle="--")
+        ax.plot(along - x, height - y, **TRUTH)
     ax.set_aspect("equal", adjustable="box")
     ax.set_xlim(-reach, reach)
     ax.set_ylim(-reach, reach)
     ax.locator_params(nbins=3)
     ax.tick_params(labelsize="small")
     for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_formatter(lambda value, _: number(value))
-    limits = np.array([-reach, reach])
-    set_unit(ax.xaxis, LABELS["contact_x"] + " − implied ", "contact_x", tight["contact_x"].attrs, limits)
-    set_unit(ax.yaxis, LABELS["contact_y"] + " − implied ", "contact_y", tight["contact_y"].attrs, limits)
+        show_numbers(axis)
+    label_map(ax, tight["contact_x"].attrs, np.array([-reach, reach]), "{} − implied")
 
 
 def _draw_ratios(ax: Axes, implied: xr.DataTree, tight: xr.Dataset, loose: xr.Dataset, shown: Any) -> None:
@@ -218,20 +216,20 @@ def _draw_ratios(ax: Axes, implied: xr.DataTree, tight: xr.Dataset, loose: xr.Da
     directions = record["direction"].values
     for name, colour in (("tangent_sd", _ALONG), ("normal_sd", _ACROSS)):
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio: Floats = np.where(shown, loose[name].values / tight[name].values, np.nan)
+            ratio = np.where(shown, loose[name].values / tight[name].values, np.nan)
         for sweep in np.unique(record["sweep"].values):
             of_sweep = record["sweep"].values == sweep
-            style = _STYLES[str(directions[of_sweep][0])]
+            style = SWEEP_LINES[str(directions[of_sweep][0])]
             ax.plot(angle[of_sweep], ratio[of_sweep], color=colour, linestyle=style, linewidth=1.3)
     for words, colour in (("along the contour", _ALONG), ("across it", _ACROSS)):
         legend_entry(ax, words, color=colour, linewidth=1.3)
-    present = [direction for direction in _STYLES if direction in directions]
+    present = [direction for direction in SWEEP_LINES if direction in directions]
     for direction in present:
-        legend_entry(ax, direction, color="0.4", linestyle=_STYLES[direction], linewidth=1.3)
+        legend_entry(ax, direction, color="0.4", linestyle=SWEEP_LINES[direction], linewidth=1.3)
     ax.axhline(1.0, color="0.4", linewidth=0.8)
     ax.set_yscale("log")
     ax.yaxis.set_major_formatter("{x:g}")
-    ax.set_xlabel(LABELS["drive_angle"] + " [°]")
+    ax.set_xlabel(DRIVE_ANGLE)
     ax.set_ylabel("single sd / implied sd")
     ax.grid(axis="y", color="0.9", linewidth=0.6)
-    ax.legend(fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2 + len(present))
+    legend_above(ax, 2 + len(present))

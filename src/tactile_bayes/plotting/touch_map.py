@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import BASES, Floats, legend_entry, number, shown_unit, single_axes
+from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.labels import number, shown_unit
+from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_gap, draw_object, draw_pivot, finish_map, limits_of, outline, write_on_top
+from tactile_bayes.plotting.marks import BASES
 from tactile_bayes.record import rod_of
 from tactile_bayes.scanning import Scan
 

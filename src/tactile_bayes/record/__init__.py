@@ -1,6 +1,5 @@
 """The record of a tactile sensor: its schema, its validation, its units, its frame, and its files (CSV and NetCDF)."""
 
-from tactile_bayes.record.channels import present_channels
 from tactile_bayes.record.construction import make_record
 from tactile_bayes.record.files import read_record, write_record
 from tactile_bayes.record.frame import frame_of, in_frame, turned
@@ -15,6 +14,7 @@ from tactile_bayes.record.schema import (
     Column,
     Frame,
     column_of,
+    present_channels,
 )
 from tactile_bayes.record.units import rod_of, to_dimensionless, to_si, with_rod
 from tactile_bayes.record.validation import validate

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.errors import ParameterError
+from tactile_bayes.checks import check_kind, check_mapping, check_names, check_optional, refused
 from tactile_bayes.record.attributes import completed_attributes
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.schema import CHANNELS, Frame
@@ -73,6 +73,9 @@ def make_record(
     >>> record.attrs["units"], present_channels(record)
     ('dimensionless', ('holding_moment',))
     """
+    check_kind("columns", columns, Mapping, "give arrays by name of a column")
+    check_mapping("attrs", attrs, "give strings and numbers by name")
+    check_optional("the rod", rod, Rod)
     cells = {str(name): (np.array(_unmasked(values)), getattr(values, "attrs", {})) for name, values in columns.items()}
     source = Source()
     lengths = [len(values) for values, _ in cells.values() if values.ndim == 1]
@@ -88,21 +91,16 @@ def make_record(
 
 def completed_record(table: Table, rod: Rod | None, missing: Collection[str], frame: Frame | None) -> xr.Dataset:
     """The record that a table makes with the rod, the missing channels and the frame that were given beside it."""
-    return checked_record(
-        Table(
-            _with_missing(table, missing),
-            completed_attributes(table.attrs, rod, frame, table.source),
-            table.source,
-        )
-    )
+    columns = _with_missing(table, [missing] if isinstance(missing, str) else check_names("missing", missing))
+    return checked_record(Table(columns, completed_attributes(table.attrs, rod, frame, table.source), table.source))
 
 
 def _with_missing(table: Table, missing: Collection[str]) -> dict[str, Cells]:
     """The columns with an empty one for each channel that is declared missing."""
     columns = dict(table.columns)
-    for name in (missing,) if isinstance(missing, str) else missing:
+    for name in missing:
         if name not in CHANNELS:
-            raise ParameterError(f"missing={missing!r}: {name!r} is no channel; the channels are {', '.join(CHANNELS)}")
+            raise refused("missing", missing, f"{name!r} is no channel; the channels are {', '.join(CHANNELS)}")
         if name not in columns:
             columns[name] = (np.full(table.samples, np.nan), {})
         elif not all(_is_empty(cell) for cell in columns[name][0].tolist()):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -136,7 +136,7 @@ def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Map
         )
 
 
-def _refuse_content(texts: NDArray[Any], place: int, lines: Sequence[int], head: int, source: Source) -> None:
+def _refuse_content(texts: NDArray[Any], place: int, lines: NDArray[np.int64], head: int, source: Source) -> None:
     """Refuse a column without a name that has something in it."""
     for sample in np.flatnonzero(texts != "").tolist():
         text = str(texts[sample])

@@ -5,10 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import warnings
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, BinaryIO, NoReturn, overload
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 import pandas as pd
@@ -16,12 +15,12 @@ from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
+from tactile_bayes.record.parsing import FREE, text_array
 from tactile_bayes.record.schema import Kind
 from tactile_bayes.record.storable import LONGEST_CELL
 from tactile_bayes.record.table import Source
-from tactile_bayes.record.text import FREE, text_array
 
-__all__ = ["Layout", "Lines", "read_rows"]
+__all__ = ["Layout", "read_rows"]
 
 _FIRST, _CHUNK = 1 << 16, 1 << 21
 """Bytes that are read at once: at first few, from which the kinds of columns are guessed."""
@@ -33,38 +32,6 @@ _ROUNDING: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 )
 """Digits become the nearest double: since pandas 3.1 they always do."""
-
-
-class Lines(Sequence[int]):
-    """The line that each sample begins in: runs of lines that follow each other, and what is between them."""
-
-    def __init__(self) -> None:
-        self._starts: list[int] = []
-        self._runs: list[range | NDArray[np.int64]] = []
-        self._size = 0
-
-    def extend(self, lines: range | NDArray[np.int64]) -> None:
-        """Add the lines of further samples."""
-        last = self._runs[-1] if self._runs else None
-        if isinstance(last, range) and isinstance(lines, range) and last.stop == lines.start:
-            self._runs[-1] = range(last.start, lines.stop)
-        elif len(lines):
-            self._starts.append(self._size)
-            self._runs.append(lines)
-        self._size += len(lines)
-
-    def __len__(self) -> int:
-        return self._size
-
-    @overload
-    def __getitem__(self, sample: int) -> int: ...
-    @overload
-    def __getitem__(self, sample: slice) -> Sequence[int]: ...
-    def __getitem__(self, sample: int | slice) -> int | Sequence[int]:
-        if isinstance(sample, slice):
-            return [self[index] for index in range(*sample.indices(self._size))]
-        run = bisect_right(self._starts, sample) - 1
-        return int(self._runs[run][sample - self._starts[run]])
 
 
 @dataclass
@@ -108,108 +75,61 @@ class _WrongGuessError(Exception):
     """A column has text in it, but was guessed to be of numbers: all of it has to be read again, as text."""
 
 
-def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str, NDArray[Any]], Lines]:
-    """The columns of a file from where it stands, as int64, float64 or text, and the line of each sample.
+def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    """The columns of a file from where it stands, as int64, float64 or text, and the line that each sample begins in.
 
     It takes little more memory than what it returns. Text is as `text_array` makes it. Columns that the layout says
     nothing of are integers, else numbers (empty cells are NaN), else text.
     """
     begin = file.tell()
-    most = sum(block.count(b"\n") for block in iter(lambda: file.read(_CHUNK), b"")) + 1
     while True:
         file.seek(begin)
         try:
-            return _read_once(_Chunks(file), layout, most, source)
+            return _read_once(_chunks(file), layout, source)
         except _WrongGuessError:
             continue
 
 
-def _read_once(chunks: _Chunks, layout: Layout, most: int, source: Source) -> tuple[dict[str, NDArray[Any]], Lines]:
-    columns = {name: _Growing(most) for name in layout.names}
-    lines = Lines()
+def _read_once(
+    chunks: Iterator[bytes], layout: Layout, source: Source
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    parts: dict[str, list[NDArray[Any]]] = {name: [] for name in layout.names}
+    lines = [np.empty(0, np.int64)]
     above = layout.line
-    while chunk := chunks.next():
+    for chunk in chunks:
         cells = _read_fast(chunk, layout)
         if cells is None:
             cells, here, above = _read_carefully(chunk, chunks, layout, above, source)
         else:
             rows = len(cells[layout.names[0]])
-            here, above = range(above + 1, above + 1 + rows), above + rows
-        lines.extend(here)
+            here, above = np.arange(above + 1, above + 1 + rows), above + rows
+        lines.append(here)
         for name, values in cells.items():
-            columns[name].append(values)
-    return {name: column.finished() for name, column in columns.items()}, lines
+            parts[name].append(values)
+    return {name: _joined(parts.pop(name)) for name in layout.names}, np.concatenate(lines)
 
 
-class _Chunks:
-    """The rest of a file in pieces that end with a line."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._size = _FIRST
-        self._rest: list[bytes] = []
-
-    def next(self) -> bytes:
-        """The next piece, empty at the end."""
-        while block := self._file.read(self._size):
-            self._size = max(self._size, _CHUNK) if self._rest else self._size
-            end = block.rfind(b"\n") + 1
-            if end:
-                chunk = b"".join((*self._rest, block[:end]))
-                self._rest = [block[end:]]
-                self._size = _CHUNK
-                return chunk
-            self._rest.append(block)
-        chunk = b"".join(self._rest)
-        self._rest = []
-        return chunk
+def _chunks(file: BinaryIO) -> Iterator[bytes]:
+    """The rest of a file in pieces that end with a line, but for the last."""
+    size, rest = _FIRST, b""
+    while block := file.read(size):
+        end = block.rfind(b"\n") + 1
+        if end:
+            yield rest + block[:end]
+        rest = block[end:] if end else rest + block
+        size = _CHUNK
+    if rest:
+        yield rest
 
 
-class _Growing:
-    """A column that is filled from the top. Memory that is never written to costs nothing."""
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._size = 0
-        self._values: NDArray[Any] | None = None
-        self._seen: dict[str, str] = {}
-
-    def append(self, values: NDArray[Any]) -> None:
-        """Add values, which may be wider or of a more general type than those before."""
-        size = self._size + len(values)
-        self._most = max(self._most, size)
-        before = self._values
-        dtype = self._dtype_with(values)
-        if before is None or before.dtype != dtype or len(before) < self._most:
-            self._values = np.empty(self._most, dtype)
-            if before is not None:
-                self._values[: self._size] = self._as(dtype, before[: self._size])
-        assert self._values is not None
-        self._values[self._size : size] = self._as(dtype, values)
-        self._size = size
-
-    def _dtype_with(self, values: NDArray[Any]) -> np.dtype[Any]:
-        """A type for the values and those before: objects, where text of equal width might waste memory."""
-        before = values.dtype if self._values is None else self._values.dtype
-        dtype = np.promote_types(before, values.dtype)
-        if dtype.kind != "U" or dtype == before != values.dtype or dtype.itemsize * self._most <= FREE:
-            return dtype
-        is_wide = dtype.itemsize > 2 * before.itemsize
-        if self._values is None:
-            is_wide = dtype.itemsize > 8 * (float(np.char.str_len(values).mean()) + 1)
-        return np.dtype(object) if is_wide else dtype
-
-    def _as(self, dtype: np.dtype[Any], values: NDArray[Any]) -> Any:
-        if dtype.kind != "O" or values.dtype.kind == "O":
-            return values
-        return [self._seen.setdefault(text, text) for text in values.tolist()]
-
-    def finished(self) -> NDArray[Any]:
-        """The values, without the room that was left for others."""
-        values = np.empty(0, object) if self._values is None else self._values
-        self._values = None
-        values.resize(self._size, refcheck=False)
-        return text_array(values.tolist()) if values.dtype.kind == "O" and self._size else values
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """The values of a column one after the other; text word by word, where equal widths might waste memory."""
+    dtype = np.result_type(*parts) if parts else np.dtype(object)
+    if dtype.kind not in "UO" or (dtype.itemsize * sum(map(len, parts)) <= FREE and dtype.kind == "U"):
+        return np.concatenate(parts)
+    seen: dict[str, str] = {}
+    texts = [seen.setdefault(text, text) for part in parts for text in part.tolist()]
+    return text_array(texts) if texts else np.empty(0, object)
 
 
 # --- The fast reader --------------------------------------------------------------------------------------------
@@ -290,8 +210,8 @@ def _text_array(texts: Sequence[str], stripped: bool) -> NDArray[Any]:
 
 
 def _read_carefully(
-    chunk: bytes, chunks: _Chunks, layout: Layout, above: int, source: Source
-) -> tuple[dict[str, NDArray[Any]], range | NDArray[np.int64], int]:
+    chunk: bytes, chunks: Iterator[bytes], layout: Layout, above: int, source: Source
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64], int]:
     """The columns of a chunk, the lines of its samples, and its last line; or the refusal of a cell, with its place."""
     lines: list[str] = []
 
@@ -300,7 +220,7 @@ def _read_carefully(
         while piece:  # further ones only where a cell in quotation marks goes on beyond the end of one
             lines.extend(_text_lines(piece, above + len(lines), source))
             yield from lines[reader.line_num :]
-            piece = chunks.next()
+            piece = next(chunks, b"")
 
     rows: list[list[str]] = []
     begins: list[int] = []
@@ -330,8 +250,7 @@ def _read_carefully(
     order = sorted(layout.names, key=lambda name: name not in layout.meant)  # they show what separates decimals
     places = {name: index for index, name in enumerate(layout.names)}
     columns = {name: _column_values(name, [row[places[name]] for row in rows], layout, here) for name in order}
-    is_run = bool(begins) and begins[-1] - begins[0] == len(begins) - 1
-    return columns, range(begins[0], begins[-1] + 1) if is_run else np.array(begins, dtype=np.int64), begin - 1
+    return columns, np.array(begins, dtype=np.int64), begin - 1
 
 
 def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:

@@ -13,7 +13,6 @@ from tactile_bayes.checks import (
     check_choice,
     check_kind,
     check_mapping,
-    check_names,
     check_optional,
     check_path,
     check_switch,
@@ -125,16 +124,14 @@ def read_record(
     >>> record.attrs["units"]
     'SI'
     """
-    check_path("path", path)
+    path = check_path("path", path)
     check_mapping("columns", columns, "give names by column of a record, like {'force_x': 'Fx[mN]'}")
     for column, origin in (columns or {}).items():
         check_kind(f"columns[{column!r}]", origin, str, "give what stands for it, like 'Fx[mN]'")
     check_switch("split_sweeps", split_sweeps)
-    check_optional("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
-    missing = [missing] if isinstance(missing, str) else check_names("missing", missing)
+    check_optional("the rod", rod, Rod)
     if load_cell_frame is not None:
         check_choice("load_cell_frame", load_cell_frame, FRAMES)
-    path = Path(path)
     if not path.exists():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     if path.is_dir():
@@ -194,8 +191,7 @@ def write_record(record: xr.Dataset, path: str | os.PathLike[str]) -> None:
     0,forward,0.0,0.0,1.2,,0.0,0.1
     <BLANKLINE>
     """
-    check_path("path", path)
-    path = Path(path)
+    path = check_path("path", path)
     write = _WRITERS[_suffix(path)]
     record = validate(record)
     write(record, path)

@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.checks import check_choice
+from tactile_bayes.errors import RecordError
 from tactile_bayes.record.attributes import stated_frame
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.table import Source
@@ -94,8 +95,7 @@ def in_frame(record: xr.Dataset, frame: Frame) -> xr.Dataset:
     >>> float(abs(excess).max()) < 1e-12
     True
     """
-    if frame not in FRAMES:
-        raise ParameterError(f"frame is {frame!r}: choose 'fixed' or 'turning'")
+    check_choice("frame", frame, FRAMES)
     converted = validate(record)
     if frame_of(converted) == frame:
         return record

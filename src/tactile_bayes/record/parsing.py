@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,11 @@ from tactile_bayes.record.cell import integer_in, number_in
 from tactile_bayes.record.schema import Kind, column_of
 from tactile_bayes.record.storable import LONGEST_CELL, not_storable
 from tactile_bayes.record.table import Source
-from tactile_bayes.record.text import text_array
 
-__all__ = ["parsed_column"]
+__all__ = ["FREE", "parsed_column", "text_array"]
+
+FREE = 1 << 26
+"""Bytes that a column of text may take whatever is in it."""
 
 
 def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[Any]:
@@ -71,3 +73,26 @@ def _refuse_text(name: str, values: NDArray[Any], source: Source) -> None:
 
 def _text(cell: Any) -> str | None:
     return cell if isinstance(cell, str) else None
+
+
+def text_array(texts: Sequence[str]) -> NDArray[Any]:
+    """Texts as an array of NumPy's text, or of str objects.
+
+    NumPy gives every cell the room of the longest one, four bytes a character. Where that is much, and less than half
+    of it would be used, the cells are objects, equal ones the same.
+
+    Parameters
+    ----------
+    texts : sequence of str, length n_samples
+        The cells.
+
+    Examples
+    --------
+    >>> text_array(["a", "bc"]).dtype
+    dtype('<U2')
+    """
+    width = max(map(len, texts), default=0)
+    if 4 * width * len(texts) > FREE and width * len(texts) > 2 * (sum(map(len, texts)) + len(texts)):
+        seen: dict[str, str] = {}
+        return np.fromiter((seen.setdefault(text, text) for text in texts), dtype=object, count=len(texts))
+    return np.array(texts, dtype=np.str_)

@@ -10,6 +10,9 @@ from itertools import combinations, product
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+import xarray as xr
+
 __all__ = [
     "ATTRIBUTE_UNITS",
     "CHANNELS",
@@ -25,6 +28,7 @@ __all__ = [
     "Kind",
     "Scale",
     "column_of",
+    "present_channels",
     "same_unit",
 ]
 
@@ -193,3 +197,21 @@ def same_unit(one: str, other: str) -> bool:
 
 def _plain(unit: str) -> str:
     return re.sub(r"[\s^·⋅*]", "", unicodedata.normalize("NFKC", unit))
+
+
+def present_channels(record: xr.Dataset) -> tuple[str, ...]:
+    """The channels that a record has measured: those that are not NaN throughout.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+
+    Examples
+    --------
+    >>> from tactile_bayes.record import make_record
+    >>> columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2], "force_y": [0.1], "force_x": [0.0]}
+    >>> present_channels(make_record(columns, missing=("holding_moment",)))
+    ('force_x', 'force_y')
+    """
+    return tuple(name for name in CHANNELS if not np.isnan(record[name].values).all())

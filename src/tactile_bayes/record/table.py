@@ -29,7 +29,7 @@ class Source:
     ----------
     name : str
         Name of the file, if there is one.
-    lines : sequence of int, optional
+    lines : sequence or array of int, optional
         The line of the file that each sample begins in.
     heads : mapping of str to int, optional
         The line of the file that says what a column is.
@@ -44,7 +44,7 @@ class Source:
     """
 
     name: str = ""
-    lines: Sequence[int] | None = None
+    lines: Sequence[int] | NDArray[np.int64] | None = None
     heads: Mapping[str, int] = field(default_factory=dict)
     aliases: Mapping[str, str] = field(default_factory=dict)
     names: Sequence[str] = ()

@@ -43,7 +43,7 @@ def rod_of(record: xr.Dataset) -> Rod:
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
     """The record as measured with another rod than the one it states."""
-    check_optional("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
+    check_optional("the rod", rod, Rod)
     if rod is None:
         return record
     if record.attrs["units"] == "dimensionless" and not rod.is_dimensionless:

@@ -11,22 +11,26 @@ import numpy as np
 from tactile_bayes.record import MEASURED
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.meanings import is_direction, meaning_of
-from tactile_bayes.report.table import Table
-from tactile_bayes.report.wording import fixed, percent, shown_as
+from tactile_bayes.report.wording import Table, fixed, percent, shown_as
 
-__all__ = [
-    "columns_table",
-    "hashes_table",
-    "priors_table",
-    "rig_table",
-    "settings_table",
-    "statements_table",
-    "sweeps_table",
-    "versions_table",
-]
+__all__ = ["background_of"]
 
 
-def sweeps_table(findings: Findings) -> Table:
+def background_of(findings: Findings) -> dict[str, Table | None]:
+    """All of these tables, by the names that the template has for them."""
+    return {
+        "sweeps": _sweeps(findings),
+        "priors": _priors(findings),
+        "settings": _settings(findings),
+        "rig": _rig(findings),
+        "columns": _columns(findings),
+        "record_attributes": _statements(findings),
+        "versions": _versions(findings),
+        "hashes": _hashes(findings),
+    }
+
+
+def _sweeps(findings: Findings) -> Table:
     """Sweeps, with what their readings alone tell of first contact and snap-off."""
     record, zero = findings.record, findings.zero
     length = shown_as("contact_x", record["base_x"].attrs, np.r_[record.base_x.values, record.base_y.values])
@@ -38,28 +42,11 @@ def sweeps_table(findings: Findings) -> Table:
         spans = [_between(of_sweep[f"{event}_drive_angle"].values) for event in ("onset", "snap_off")]
         unloaded = int(np.count_nonzero(zero["unloaded"].values[rows_of]))
         base = f"({length.text(float(record.base_x[rows_of[0]]))}, {length.text(float(record.base_y[rows_of[0]]))})"
-        rows.append(
-            [
-                str(int(number)),
-                str(record.direction.values[rows_of[0]]),
-                f"{base} {length.name}".rstrip(),
-                str(rows_of.size),
-                *(fixed(value, ".1f") for value in (angle[0], angle[-1])),
-                *spans,
-                str(unloaded),
-            ]
-        )
-    heads = [
-        "sweep",
-        "direction",
-        "pivot",
-        "samples",
-        "from φ₀ [°]",
-        "to",
-        "first contact between",
-        "snap-off between",
-        "unloaded",
-    ]
+        row = [str(int(number)), str(record.direction.values[rows_of[0]]), f"{base} {length.name}".rstrip()]
+        row += [str(rows_of.size), fixed(angle[0], ".1f"), fixed(angle[-1], ".1f"), *spans, str(unloaded)]
+        rows.append(row)
+    heads = ["sweep", "direction", "pivot", "samples", "from φ₀ [°]", "to"]
+    heads += ["first contact between", "snap-off between", "unloaded"]
     return Table("Sweeps, and what the readings alone tell of contact", heads, rows, 3)
 
 
@@ -69,7 +56,7 @@ def _between(angles: Any) -> str:
     return " and ".join(fixed(float(angle), ".1f") + "°" if np.isfinite(angle) else "…" for angle in np.degrees(angles))
 
 
-def priors_table(findings: Findings) -> Table:
+def _priors(findings: Findings) -> Table:
     """Priors, in words."""
     family = str(findings.posterior.attrs["family"])
     stated = json.loads(findings.posterior.attrs["priors"])
@@ -79,18 +66,17 @@ def priors_table(findings: Findings) -> Table:
     return Table(f"Priors, as scipy.stats has them{reach}", ["parameter", "meaning", "prior"], rows, 3)
 
 
-def settings_table(findings: Findings) -> Table:
+def _settings(findings: Findings) -> Table:
     """How it was sampled."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].attrs
     rows = [["seed", str(attrs["seed"])], ["sampler", str(attrs.get("sampler", ""))]]
     rows += [[name, "none" if value is None else f"{value}"] for name, value in json.loads(attrs["settings"]).items()]
-    for name in ("steps_run", "steps_kept", "evaluations", "stuck"):
-        rows.append([name, str(int(stats[name]))])
+    rows += [[name, str(int(stats[name]))] for name in ("steps_run", "steps_kept", "evaluations", "stuck")]
     rows.append(["seconds", f"{float(stats['seconds']):.3g}"])
     return Table("Sampler", ["setting", "value"], rows, 2)
 
 
-def rig_table(findings: Findings) -> Table:
+def _rig(findings: Findings) -> Table:
     """Rod, load cell, friction, and what was not taken as stated."""
     attrs = findings.posterior.attrs
     names = [name for name in attrs if str(name).startswith(("rod_", "load_cell_"))]
@@ -100,17 +86,17 @@ def rig_table(findings: Findings) -> Table:
     return Table("Rig, as it was taken; numbers in the units of the record", ["entry", "value"], rows, 2)
 
 
-def columns_table(findings: Findings) -> Table | None:
+def _columns(findings: Findings) -> Table | None:
     """Further columns of the record, which inference makes no use of."""
-    rows = []
-    for name, values in findings.record.data_vars.items():
-        if name not in MEASURED:
-            attrs = values.attrs
-            rows.append([str(name), str(attrs.get("units", "")), str(attrs.get("long_name", ""))])
+    rows = [
+        [str(name), *(str(values.attrs.get(key, "")) for key in ("units", "long_name"))]
+        for name, values in findings.record.data_vars.items()
+        if name not in MEASURED
+    ]
     return Table("Further columns of the record", ["column", "unit", "meaning"], rows, 3) if rows else None
 
 
-def statements_table(findings: Findings) -> Table | None:
+def _statements(findings: Findings) -> Table | None:
     """Attributes of the record that say nothing of rod and load cell."""
     said = json.loads(findings.posterior.attrs.get("record_attributes", "{}"))
     rows = [[name, _plain(value)] for name, value in said.items()]
@@ -121,7 +107,7 @@ def _plain(value: Any) -> str:
     return f"{value:.10g}" if isinstance(value, float | np.floating) else str(value)
 
 
-def versions_table(findings: Findings) -> Table:
+def _versions(findings: Findings) -> Table:
     """Software of the inference and of this report."""
     attrs = findings.posterior.attrs
     stated = json.loads(attrs.get("versions", "{}"))
@@ -132,13 +118,11 @@ def versions_table(findings: Findings) -> Table:
     return Table("Software of the inference", ["name", "version"], rows, 2)
 
 
-def hashes_table(findings: Findings) -> Table:
+def _hashes(findings: Findings) -> Table:
     """Digests of the files and of the record."""
     attrs = findings.posterior.attrs
-    same = attrs["data_sha256"] == findings.record_sha256
-    rows = [["posterior.nc", findings.posterior_sha256]]
-    rows.append(["record, as stored in it", findings.record_sha256])
-    if not same:
+    rows = [["posterior.nc", findings.posterior_sha256], ["record, as stored in it", findings.record_sha256]]
+    if attrs["data_sha256"] != findings.record_sha256:
         rows.append(["record, as it was inferred from", str(attrs["data_sha256"])])
     if "record_file_sha256" in attrs:
         rows.append([f"file {attrs['record_file']}", str(attrs["record_file_sha256"])])

@@ -7,17 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from tactile_bayes.inference.found_rig import found_rig
 from tactile_bayes.inference.likelihood import bases_of
+from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.wording import Shown, percent, shown_as, spread
 
 __all__ = ["ContourFigure", "contour_figure", "gap_ends"]
-
-Floats = NDArray[np.float64]
 
 _DETAIL_HEIGHT = 230.0
 
@@ -54,8 +52,7 @@ def contour_figure(findings: Findings) -> ContourFigure:
     ends = gap_ends(findings)
 
     about = np.concatenate([x, bases[:, 0]]), np.concatenate([median, bases[:, 1]])
-    labels = f"x{unit.bracketed}", f"y{unit.bracketed}"
-    overview, height = Plot.map_of(*about, labels, (unit.power, unit.power))
+    overview, height = Plot.map_of(*about, unit)
     entries = [("key-band", f"{percent(findings.probability)} band"), ("key-median", "median")]
     if ends:
         overview.stretch(*ends, "gap")
@@ -63,8 +60,7 @@ def contour_figure(findings: Findings) -> ContourFigure:
     overview.area(x, lower, upper, "band")
     overview.path(x, median, "median")
     entries += _put_contacts(overview, findings, x)
-    for place in bases:
-        overview.put(element("circle", cx=overview.x.at(place[0]), cy=overview.y.at(place[1]), r=5, class_="pivot"))
+    overview.put_pivots(bases)
     entries.append(("key-pivot", "pivot" if len(bases) == 1 else "pivots"))
     diamond = element("path", d="M-7 0L0 -7L7 0L0 7Z")
     overview.put(element("g", diamond, id="band-mark", class_="place js-only", transform="translate(-20 -20)"))
@@ -72,7 +68,7 @@ def contour_figure(findings: Findings) -> ContourFigure:
 
     off = np.stack([lower - median, upper - median])
     fine = shown_as("contact_x", attrs, off)
-    labels = labels[0], f"y − median{fine.bracketed}"
+    labels = overview.x_label, f"y − median{fine.bracketed}"
     detail = Plot.around(x, off, labels, _DETAIL_HEIGHT, (unit.power, fine.power))
     if ends:
         detail.stretch(*ends, "gap")

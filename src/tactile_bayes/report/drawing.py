@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from markupsafe import Markup, escape
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tactile_bayes.plotting.axes import number
+from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.plotting.labels import number
+from tactile_bayes.report.wording import Shown
 
 __all__ = ["WIDTH", "Plot", "Scale", "dots", "element", "figure", "legend", "outline_path"]
-
-Floats = NDArray[np.float64]
 
 WIDTH = 640
 """Of every drawing, in its own units, of which a letter has 13 in height."""
@@ -122,10 +122,8 @@ class Plot:
         return cls(across, up, *labels, *powers)
 
     @classmethod
-    def map_of(
-        cls, x: ArrayLike, y: ArrayLike, labels: tuple[str, str], powers: tuple[int, int] = (0, 0)
-    ) -> tuple[Plot, float]:
-        """A plot with equal scales that holds all of some points, and its height."""
+    def map_of(cls, x: ArrayLike, y: ArrayLike, unit: Shown) -> tuple[Plot, float]:
+        """A plot with equal scales and lengths in a unit that holds all of some points, and its height."""
         across = scale_of(x, _LEFT, WIDTH - _RIGHT, room=0.03)
         per_unit = (across.end - across.start) / (across.high - across.low)
         up = scale_of(y, 0.0, 1.0, room=0.05)
@@ -137,11 +135,17 @@ class Plot:
         room = max(_LOWEST / per_unit - (up.high - up.low), 0.0) / 2.0
         low, high = up.low - room, up.high + room
         height = _TOP + (high - low) * per_unit + _BOTTOM
-        return cls(across, Scale(low, high, height - _BOTTOM, _TOP), *labels, *powers), height
+        labels = f"x{unit.bracketed}", f"y{unit.bracketed}"
+        return cls(across, Scale(low, high, height - _BOTTOM, _TOP), *labels, unit.power, unit.power), height
 
     def put(self, *content: Markup) -> None:
         """Put elements over all that is there."""
         self.content.extend(content)
+
+    def put_pivots(self, places: Floats) -> None:
+        """Put a mark on each pivot."""
+        for x, y in places:
+            self.put(element("circle", cx=self.x.at(x), cy=self.y.at(y), r=5, class_="pivot"))
 
     def path(self, x: ArrayLike, y: ArrayLike, class_: str) -> None:
         """A line through points, interrupted where they are no numbers."""
@@ -170,28 +174,20 @@ class Plot:
         """Axes, and within them what was put there; `clip` is an id of its own for the frame."""
         left, right, top, bottom = self.x.start, self.x.end, self.y.end, self.y.start
         frame = {"x": left, "y": top, "width": right - left, "height": round(bottom - top, 1)}
-        axes = []
+        parts = [element("clipPath", element("rect", **frame), id=clip)]
         for value in self.x.ticks(self.x_power):
             at = self.x.at(value)
-            axes.append(element("line", x1=at, x2=at, y1=top, y2=bottom, class_="grid"))
-            axes.append(element("text", number(value, self.x_power), x=at, y=bottom + 18, class_="tick middle"))
+            parts.append(element("line", x1=at, x2=at, y1=top, y2=bottom, class_="grid"))
+            parts.append(element("text", number(value, self.x_power), x=at, y=bottom + 18, class_="tick middle"))
         for value in self.y.ticks(self.y_power, most=min(8, max(2, int((bottom - top) / 32)))):
             at = self.y.at(value)
-            axes.append(element("line", x1=left, x2=right, y1=at, y2=at, class_="grid"))
-            axes.append(element("text", number(value, self.y_power), x=left - 6, y=at + 4, class_="tick end"))
-        middle = 0.5 * (top + bottom)
-        turned = f"translate(16 {middle:.1f}) rotate(-90)"
-        axes += [
-            element("text", self.x_label, x=0.5 * (left + right), y=bottom + 39, class_="label middle"),
-            element("text", self.y_label, x=0, y=0, transform=turned, class_="label middle"),
-        ]
-        inside = element("g", *self.content, clip_path=f"url(#{clip})")
-        return (
-            element("clipPath", element("rect", **frame), id=clip),
-            *axes,
-            inside,
-            element("rect", **frame, class_="frame"),
-        )
+            parts.append(element("line", x1=left, x2=right, y1=at, y2=at, class_="grid"))
+            parts.append(element("text", number(value, self.y_power), x=left - 6, y=at + 4, class_="tick end"))
+        turned = f"translate(16 {0.5 * (top + bottom):.1f}) rotate(-90)"
+        parts.append(element("text", self.x_label, x=0.5 * (left + right), y=bottom + 39, class_="label middle"))
+        parts.append(element("text", self.y_label, x=0, y=0, transform=turned, class_="label middle"))
+        parts.append(element("g", *self.content, clip_path=f"url(#{clip})"))
+        return *parts, element("rect", **frame, class_="frame")
 
 
 def outline_path(x: Floats, y: Floats) -> str:
@@ -228,7 +224,6 @@ def legend(entries: Iterable[tuple[str, str]]) -> Markup:
     items = []
     for class_, text in entries:
         key, _, shown = class_.partition(" ")
-        items.append(
-            element("li", element("span", class_=f"key {key}", aria_hidden="true"), text, class_=shown or None)
-        )
+        mark = element("span", class_=f"key {key}", aria_hidden="true")
+        items.append(element("li", mark, text, class_=shown or None))
     return element("ul", *items, class_="legend")

@@ -11,16 +11,16 @@ from pathlib import Path
 import xarray as xr
 
 from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.load_cell import zero_load
 from tactile_bayes.netcdf import read_netcdf
 from tactile_bayes.record import record_hash
-from tactile_bayes.runs.contour import contact_points, reach, summary
-from tactile_bayes.runs.run_folder import posterior_in
+from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.gap import gap
 from tactile_bayes.uncertainty.predictive import predictive_interval
 from tactile_bayes.uncertainty.record_check import check_record
+from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 from tactile_bayes.uncertainty.verdicts import verdicts
 
 __all__ = ["FINDING_STEPS", "Findings", "findings_of"]
@@ -54,7 +54,7 @@ class Findings:
     edges : xr.Dataset or None
         The gap; None where there are sweeps in one direction only.
     numbers : xr.Dataset
-        Of the parameters, from `tactile_bayes.runs.contour.summary`.
+        Of the parameters, from `tactile_bayes.uncertainty.summary.summary`.
     verdicts : tuple of str
     check : xr.Dataset or None
         Of the record; None where there are too few draws for one.
@@ -125,7 +125,7 @@ def findings_of(
     except InferenceError:  # too few draws, which is among the verdicts
         check = None
     progress(3)
-    both = set(posterior["events"].stroke.values) == {"forward", "backward"}
+    edges = gap_if_any(posterior, probability)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DriftWarning)  # as the verdicts do
         zero = zero_load(record)
@@ -135,8 +135,8 @@ def findings_of(
         contacts=contacts,
         band=contour_band(posterior, reach(posterior), probability),
         interval=predictive_interval(posterior, probability),
-        edges=gap(posterior, probability) if both else None,
-        numbers=summary(posterior, probability),
+        edges=edges,
+        numbers=summary(posterior, probability, edges),
         verdicts=verdicts(posterior, contacts),
         check=check,
         zero=zero,

@@ -16,14 +16,13 @@ from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
+from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.record import rod_of
 from tactile_bayes.shape import rod_shape
 from tactile_bayes.sweeps import ManyUnits
 from tactile_bayes.world import in_world
 
 __all__ = ["Motion", "motion_of"]
-
-Floats = NDArray[np.float64]
 
 _MOST = 900
 """Samples that are shown: of a longer record every second, or third, and so on."""

@@ -8,25 +8,15 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.record import present_channels
-from tactile_bayes.report.background import (
-    columns_table,
-    hashes_table,
-    priors_table,
-    rig_table,
-    settings_table,
-    statements_table,
-    sweeps_table,
-    versions_table,
-)
+from tactile_bayes.report.background import background_of
 from tactile_bayes.report.contour_figure import contour_figure, gap_ends
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
-from tactile_bayes.report.table import Table
 from tactile_bayes.report.trust import check_table, check_words, contacts_words, convergence
-from tactile_bayes.report.wording import chance, fixed, percent, shown_as, spread
+from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as, spread
 
 __all__ = ["page_of"]
 
@@ -44,7 +34,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         f"{label} [{unit}]" if unit else label for channel, label, unit in readings.channels if channel in channels
     ]
     first = readings.data["first"]
-    return {
+    return background_of(findings) | {
         "name": name,
         "record_file": str(attrs.get("record_file", "")),
         "family": str(attrs["family"]),
@@ -71,17 +61,9 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
             (channel, label, unit, readings.data["said"][channel][first]) for channel, label, unit in readings.channels
         ],
         "motion_every": motion.every,
-        "sweeps": sweeps_table(findings),
         "all_readings": Table("The readings", ["sample", "sweep", "φ₀ [°]", *heads], readings.rows, 0),
-        "priors": priors_table(findings),
         "everything": _parameters(findings, mute=False) if any(map(is_direction, stats.parameter.values)) else None,
-        "settings": settings_table(findings),
-        "rig": rig_table(findings),
-        "columns": columns_table(findings),
-        "record_attributes": statements_table(findings),
         "approximations": str(attrs.get("approximations", "")),
-        "versions": versions_table(findings),
-        "hashes": hashes_table(findings),
         "command": command_of(attrs),
         "python": python_lines(attrs),
         "hindrances": hindrances(findings.posterior, findings.record),
@@ -129,15 +111,14 @@ def _gap_words(findings: Findings) -> list[str]:
     middle, low, high = spread(values, values[2] - values[1])
     share = percent(findings.probability)
     would_be = "would be" if findings.is_rejected else "is"
-    of_such = "On such a contour" if findings.is_rejected else ""
+    of_such = "on such a contour " if findings.is_rejected else ""
     if gap_ends(findings) is None:
         overlap = f"{middle.removeprefix('−')} {unit.name}".rstrip()
-        said = [_sentence(f"{of_such} no gap {would_be} left: the sweeps overlap by {overlap}.")]
+        words = f"no gap {would_be} left: the sweeps overlap by {overlap}."
     else:
         wide, range_ = f"{middle} {unit.name}".rstrip(), f"{low} to {high} {unit.name}".rstrip()
-        said = [
-            _sentence(f"{of_such} the gap, which no sweep touches, {would_be} {wide} wide ({share} from {range_}).")
-        ]
+        words = f"the gap, which no sweep touches, {would_be} {wide} wide ({share} from {range_})."
+    said = [sentence(of_such + words)]
     if gap_ends(findings) is not None and not findings.is_rejected:
         certificate = float(np.max(edges["triangle_upper"].values - edges["triangle_lower"].values))
         band = float(edges["band_width"])
@@ -149,15 +130,10 @@ def _gap_words(findings: Findings) -> list[str]:
             )
     status = str(edges["status"].values)
     if status != "ok" and float(edges["share_open"]) > 0.0:
-        said.append(f"{status[0].upper()}{status[1:]}.")
+        said.append(sentence(f"{status}."))
     if edges.attrs["gaps"] > 1:
         said.append(f"There are {edges.attrs['gaps']} gaps; this is the widest.")
     return said
-
-
-def _sentence(words: str) -> str:
-    words = words.strip()
-    return words[0].upper() + words[1:]
 
 
 def _shapes(comparison: xr.Dataset | None) -> dict[str, Any] | None:

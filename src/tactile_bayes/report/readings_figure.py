@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from tactile_bayes.inference.likelihood import bases_of
+from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.plotting.maps import outline
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, turned
 from tactile_bayes.report.drawing import Plot, dots, element, figure, legend
@@ -19,8 +20,6 @@ from tactile_bayes.report.frames import Motion
 from tactile_bayes.report.wording import Shown, percent, shown_as
 
 __all__ = ["ReadingsFigure", "channel_words", "readings_figure"]
-
-Floats = NDArray[np.float64]
 
 _WORDS = {"holding_moment": "holding moment", "force_x": "force x", "force_y": "force y"}
 _TURNING = {"force_x": "force along the rod", "force_y": "force across the rod"}
@@ -71,33 +70,22 @@ def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
     }
     force = np.hypot(motion.loads[:, 1], motion.loads[:, 2])
     first = int(np.argmax(np.where(motion.sweep == motion.sweep[0], force, -1.0)))
-    rods, frames = _rods(findings, motion, first)
-    plots, drawings, every = _readings(findings, present, words, shown, motion, first)
-    angle = np.degrees(record.drive_angle.values)
-    marks = {
+    rods, data = _rods(findings, motion, first)
+    plots, drawings, every = _readings(findings, shown, int(motion.samples[first]))
+    across = next(iter(plots.values())).x
+    data["angle"] = [across.at(value) for value in np.degrees(record.drive_angle.values[motion.samples])]
+    data["marks"] = {
         name: [None if not np.isfinite(value) else plot.y.at(value) for value in record[name].values[motion.samples]]
         for name, plot in plots.items()
     }
-    across = next(iter(plots.values())).x
-    said, rows = _said(findings, motion, present, shown, bent)
-    sweeps = [
-        {
-            "name": _sweep_name(record, number),
-            "frames": np.flatnonzero(motion.sweep == number).tolist(),
-        }
+    data["said"], rows = _said(findings, motion, shown, bent)
+    data["sweeps"] = [
+        {"name": _sweep_name(record, number), "frames": np.flatnonzero(motion.sweep == number).tolist()}
         for number in dict.fromkeys(motion.sweep.tolist())
     ]
-    data = {
-        **frames,
-        "angle": [across.at(value) for value in angle[motion.samples]],
-        "marks": marks,
-        "said": said,
-        "sweeps": sweeps,
-        "first": first,
-    }
-    entries = [("key-forward", "reading, forward sweep"), ("key-backward", "reading, backward sweep")]
-    have = set(record.direction.values.tolist())
-    entries = [entry for entry in entries if entry[0].removeprefix("key-") in have]
+    data["first"] = first
+    senses = [sense for sense in ("forward", "backward") if sense in record.direction.values]
+    entries = [(f"key-{sense}", f"reading, {sense} sweep") for sense in senses]
     entries += [
         ("key-unloaded", "unloaded for certain (pale)"),
         ("key-predicted", f"{percent(findings.probability)} of what the posterior predicts"),
@@ -145,14 +133,12 @@ def _rods(findings: Findings, motion: Motion, first: int) -> tuple[Markup, dict[
     attrs = findings.record["base_x"].attrs
     x, y = motion.rod_x, motion.rod_y
     unit = shown_as("contact_x", attrs, np.concatenate([x.ravel(), y.ravel()]))
-    labels = f"x{unit.bracketed}", f"y{unit.bracketed}"
-    plot, height = Plot.map_of(x.ravel(), y.ravel(), labels, (unit.power, unit.power))
+    plot, height = Plot.map_of(x.ravel(), y.ravel(), unit)
     along, up = outline(motion.contour, plot.x.low, plot.x.high)
     up = np.minimum(up, plot.y.high + 1.0 * (plot.y.high - plot.y.low))
     plot.area(along, up, np.full_like(up, plot.y.high + 2.0 * (plot.y.high - plot.y.low)), "object")
     plot.path(along, up, "object-edge")
-    for place in motion.pivots:
-        plot.put(element("circle", cx=plot.x.at(place[0]), cy=plot.y.at(place[1]), r=5, class_="pivot"))
+    plot.put_pivots(motion.pivots)
 
     rod_x, rod_y = np.round(plot.x(x), 1), np.round(plot.y(y), 1)
     force = motion.loads[:, 1:]
@@ -171,23 +157,14 @@ def _rods(findings: Findings, motion: Motion, first: int) -> tuple[Markup, dict[
     }
     plot.put(*_rod(frames, first))
     head = element("path", d="M0 0L8 4L0 8z")
-    marker: dict[str, object] = {
-        "markerWidth": 8,
-        "markerHeight": 8,
-        "refX": 7,
-        "refY": 4,
-        "orient": "auto",
-        "viewBox": "0 0 8 8",
-    }
-    defs = element(
-        "defs", element("marker", head, id="head", class_="arrow-head", markerUnits="userSpaceOnUse", **marker)
-    )
+    size = {"markerUnits": "userSpaceOnUse", "markerWidth": 8, "markerHeight": 8, "refX": 7, "refY": 4}
+    marker = element("marker", head, id="head", class_="arrow-head", **size, orient="auto", viewBox="0 0 8 8")
     description = (
         "The rod from its pivot to its tip, as the likeliest contour bends it at one sample of the record, with the "
         "contact point, the forces and the holding moment. The slider below chooses the sample; its numbers are in the "
         "table beside it."
     )
-    return figure("rod-map", "The rod", description, height, defs, *plot.drawn("rod-clip")), frames
+    return figure("rod-map", "The rod", description, height, element("defs", marker), *plot.drawn("rod-clip")), frames
 
 
 def _rod(frames: Mapping[str, Any], first: int) -> tuple[Markup, ...]:
@@ -211,24 +188,17 @@ def _rod(frames: Mapping[str, Any], first: int) -> tuple[Markup, ...]:
     )
 
 
-def _readings(
-    findings: Findings,
-    present: tuple[str, ...],
-    words: Mapping[str, str],
-    shown: Mapping[str, Shown],
-    motion: Motion,
-    first: int,
-) -> tuple[dict[str, Plot], list[Markup], int]:
-    record, interval = findings.record, findings.interval
+def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tuple[dict[str, Plot], list[Markup], int]:
+    """A plot of each channel that was measured, with a rule at one sample, and one of how many readings is drawn."""
+    record, interval, words = findings.record, findings.interval, channel_words(findings.record)
     angle, sweep = np.degrees(record.drive_angle.values), record.sweep.values
     unloaded, direction = findings.zero.unloaded.values, record.direction.values
     every = max(1, -(-angle.size // _MOST_DOTS))
     kept = np.arange(angle.size) % every == 0
     events = findings.posterior["events"].to_dataset().median(("chain", "draw"))
-    here = int(motion.samples[first])
     axes = _AXES | (_TURNING_AXES if frame_of(record) == "turning" else {})
     plots, drawings = {}, []
-    for name in present:
+    for name in present_channels(record):
         values = record[name].values
         bounds = [interval[f"{name}_{edge}"].values for edge in ("lower", "upper")]
         unit = shown[name]
@@ -242,14 +212,11 @@ def _readings(
         for event in ("first_drive_angle", "snap_off_drive_angle"):
             for at in np.degrees(events[event].values):
                 plot.path([at, at], [plot.y.low, plot.y.high], "event")
-        for sense in ("forward", "backward"):
-            for is_unloaded in (True, False):
-                rows = np.flatnonzero(kept & (direction == sense) & (unloaded == is_unloaded))
-                if rows.size:
-                    pale = " unloaded" if is_unloaded else ""
-                    square = sense == "backward"
-                    places = plot.x(angle[rows]), plot.y(values[rows])
-                    plot.put(dots(*places, 1.8, f"reading {sense}{pale}", square=square))
+        for sense, pale in product(("forward", "backward"), (" unloaded", "")):
+            rows = np.flatnonzero(kept & (direction == sense) & (unloaded == bool(pale)))
+            if rows.size:
+                places = plot.x(angle[rows]), plot.y(values[rows])
+                plot.put(dots(*places, 1.8, f"reading {sense}{pale}", square=sense == "backward"))
         across = plot.x.at(angle[here])
         ends = {"x1": across, "x2": across, "y1": plot.y.end, "y2": plot.y.start}
         plot.put(
@@ -269,14 +236,14 @@ def _readings(
 
 
 def _said(
-    findings: Findings, motion: Motion, present: tuple[str, ...], shown: Mapping[str, Shown], bent: Floats
+    findings: Findings, motion: Motion, shown: Mapping[str, Shown], bent: Floats
 ) -> tuple[dict[str, Any], list[list[str]]]:
     """What the table beside the rod says in every frame, and a table of all readings."""
-    record, interval = findings.record, findings.interval
-    angle = np.degrees(record.drive_angle.values)
+    record, interval, present = findings.record, findings.interval, present_channels(findings.record)
+    angles = [f"{angle:.2f}".replace("-", "−") for angle in np.degrees(record.drive_angle.values[motion.samples])]
     length = shown_as("contact_x", record["base_x"].attrs, np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()]))
     frames: dict[str, Any] = {
-        "angle": [f"{angle[k]:.2f}".replace("-", "−") for k in motion.samples],
+        "angle": angles,
         "sample": motion.samples.tolist(),
         "contact": [
             f"({length.text(a)}, {length.text(b)}) {length.name}".rstrip() if np.isfinite(a) else "none"
@@ -294,12 +261,7 @@ def _said(
                 between = f"{low} to {high}"
             frames[name].append([reading, between, unit.text(float(bent[row, i]))])
     rows = [
-        [
-            str(k),
-            str(int(record.sweep.values[k])),
-            f"{angle[k]:.2f}".replace("-", "−"),
-            *(shown[name].text(float(record[name].values[k])) for name in present),
-        ]
-        for k in motion.samples
+        [str(k), str(sweep), angle, *(shown[name].text(float(record[name].values[k])) for name in present)]
+        for k, sweep, angle in zip(motion.samples, motion.sweep, angles, strict=True)
     ]
     return frames, rows

@@ -11,8 +11,7 @@ from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_words
-from tactile_bayes.report.table import Table
-from tactile_bayes.report.wording import chance, fixed, percent, shown_as
+from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
 from tactile_bayes.uncertainty.record_check import DISCREPANCIES
 
 __all__ = ["check_table", "check_words", "contacts_words", "convergence"]
@@ -21,8 +20,7 @@ __all__ = ["check_table", "check_words", "contacts_words", "convergence"]
 def convergence(findings: Findings) -> list[str]:
     """How the ensembles ended, and how they fared."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].to_dataset()
-    message = str(attrs["message"])
-    said = [f"{message[0].upper()}{message[1:]}."]
+    said = [sentence(f"{attrs['message']}.")]
     draws = stats.sizes["chain"] * stats.sizes["draw"]
     said.append(
         f"{stats.sizes['chain']} independent ensembles of {int(stats.attrs['walkers'])} walkers made {draws} draws; "

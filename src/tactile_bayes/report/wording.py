@@ -1,4 +1,4 @@
-"""Numbers and units as a page writes them."""
+"""Numbers, units and tables as a page writes them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import number, shown_unit
+from tactile_bayes.plotting.labels import number, shown_unit
 
-__all__ = ["Shown", "chance", "fixed", "percent", "shown_as", "spread"]
+__all__ = ["Shown", "Table", "chance", "fixed", "percent", "sentence", "shown_as", "spread"]
+
+
+class Table(NamedTuple):
+    """A table: what it shows, its heads, its rows, and how many of the columns hold words rather than numbers."""
+
+    caption: str
+    heads: list[str]
+    rows: list[list[str]]
+    words: int = 1
 
 
 class Shown(NamedTuple):
@@ -61,6 +70,11 @@ def spread(values: Iterable[float], width: float) -> list[str]:
     if decimals > 9 or decimals < -3:
         return [fixed(value, ".4g") for value in values]
     return [fixed(value, f".{max(0, decimals)}f") for value in values]
+
+
+def sentence(words: str) -> str:
+    """Words with a capital at their beginning."""
+    return words[0].upper() + words[1:]
 
 
 def fixed(value: float, form: str) -> str:

@@ -3,40 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.files import write_atomically
-from tactile_bayes.netcdf import write_netcdf
+from tactile_bayes import plotting
 from tactile_bayes.planning.design import design
+from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.outermost import outermost
-from tactile_bayes.runs.picture import write_picture
 
-__all__ = ["DesignRun", "design_in_words", "design_into"]
-
-
-@dataclass(frozen=True)
-class DesignRun:
-    """What `design_into` made.
-
-    Attributes
-    ----------
-    design : xr.Dataset
-        From `tactile_bayes.design`.
-    files : mapping of str to Path
-        By what they hold.
-    """
-
-    design: xr.Dataset
-    files: Mapping[str, Path]
+__all__ = ["design_in_words", "design_into"]
 
 
-def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> DesignRun:
+def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> Run[xr.Dataset]:
     """Choose the next record, and write what comes out to a folder.
 
     Parameters
@@ -52,32 +33,24 @@ def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, *
 
     Returns
     -------
-    DesignRun
+    Run
+        Of what `design` returns.
 
     Raises
     ------
     ParameterError, InferenceError, ReachError, StudyError, TaskError
         As `design`.
     """
-    folder = Path(out)
-    found = design(*args, nested=nested, out=folder / "nested" if nested else None, **options)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = {
-        "design": folder / "design.nc",
-        "candidates": folder / "candidates.csv",
-        "words": folder / "words.txt",
-        "figure": folder / "design.png",
-    }
-    write_netcdf(found, files["design"])
-    columns = [name for name, values in found.data_vars.items() if values.dims == ("candidate",)]
-    with write_atomically(files["candidates"]) as temporary:
-        rows = np.stack([found[name].values for name in columns], axis=1)
-        lines = [",".join(map(str, columns)), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    with write_atomically(files["words"]) as temporary:
-        temporary.write_text("\n".join(design_in_words(found)) + "\n", encoding="utf-8")
-    _draw(found, files["figure"])
-    return DesignRun(found, files)
+    found = design(*args, nested=nested, out=Path(out) / "nested" if nested else None, **options)
+    folder = Folder(out)
+    folder.write_netcdf("design", "design.nc", found)
+    columns = [str(name) for name, values in found.data_vars.items() if values.dims == ("candidate",)]
+    rows = np.stack([found[name].values for name in columns], axis=1)
+    lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    folder.write_lines("candidates", "candidates.csv", lines)
+    folder.write_lines("words", "words.txt", design_in_words(found))
+    folder.draw("figure", "design.png", plotting.design, found)
+    return Run(found, folder.files)
 
 
 def design_in_words(found: xr.Dataset) -> tuple[str, ...]:
@@ -116,14 +89,3 @@ def design_in_words(found: xr.Dataset) -> tuple[str, ...]:
             f"there, Laplace's approximation {length(float(best.width))}."
         )
     return tuple(sentences)
-
-
-def _draw(found: xr.Dataset, path: Path) -> None:
-    from matplotlib import pyplot as plt
-
-    from tactile_bayes import plotting
-
-    with plt.ioff():
-        plt.sca(plotting.design(found))
-        write_picture(plt.gcf(), path)
-        plt.close()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tactile_bayes.files import write_atomically
+from tactile_bayes import plotting
 from tactile_bayes.inspection import Inspection
-from tactile_bayes.runs.picture import write_picture
+from tactile_bayes.runs.folder import Folder
 
 __all__ = ["write_inspection"]
 
@@ -45,26 +45,17 @@ def write_inspection(
     ...     sorted(path.name for path in write_inspection(inspect_record(record), folder).values())
     ['channels.csv', 'inspection.png', 'inspection.txt', 'samples.csv', 'sweeps.csv']
     """
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = {
-        "words": folder / "inspection.txt",
-        "sweeps": folder / "sweeps.csv",
-        "channels": folder / "channels.csv",
-        "samples": folder / "samples.csv",
-        "figure": folder / "inspection.png",
-    }
-    with write_atomically(files["words"]) as temporary:
-        temporary.write_text("\n".join((*inspection.words, *text)) + "\n", encoding="utf-8")
+    folder = Folder(out)
+    folder.write_lines("words", "inspection.txt", (*inspection.words, *text))
     sweeps = inspection.sweeps
-    flat = sweeps.drop_vars(["side", "onset_drive_angle", "snap_off_drive_angle"]).assign(
-        {
-            f"{event}_{side}": sweeps[f"{event}_drive_angle"].sel(side=side, drop=True)
-            for event in ("onset", "snap_off")
-            for side in ("before", "after")
-        }
-    )
-    tables = {"sweeps": flat.to_dataframe(), "channels": inspection.channels.to_dataframe()}
+    sides = {
+        f"{event}_{side}": sweeps[f"{event}_drive_angle"].sel(side=side, drop=True)
+        for event in ("onset", "snap_off")
+        for side in ("before", "after")
+    }
+    flat = sweeps.drop_vars(["side", "onset_drive_angle", "snap_off_drive_angle"]).assign(sides)
+    folder.write_table("sweeps", "sweeps.csv", flat)
+    folder.write_table("channels", "channels.csv", inspection.channels)
     flags = inspection.samples
     by_channel = {
         f"{name}_{channel}": flags[name].sel(channel=channel, drop=True)
@@ -73,24 +64,7 @@ def write_inspection(
     }
     samples = flags.drop_vars(["outlier", "stuck", "cut_off", "channel"]).assign(by_channel)
     kept = inspection.record[["sweep", "drive_angle"]].drop_attrs(deep=False)
-    samples = kept.assign(
-        {name: values.astype(int) if values.dtype == np.bool_ else values for name, values in samples.items()}
-    )
-    tables["samples"] = samples.to_dataframe()
-    for name, table in tables.items():
-        with write_atomically(files[name]) as temporary:
-            table.to_csv(temporary)
-    _draw(inspection, files["figure"])
-    return files
-
-
-def _draw(inspection: Inspection, path: Path) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    from tactile_bayes import plotting
-
-    figure = Figure(figsize=(7.0, 5.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    plotting.inspection(inspection, axes=figure.subplots(3, 2, sharex="col", width_ratios=(2.2, 1.0)))
-    write_picture(figure, path)
+    numbers = {name: values.astype(int) if values.dtype == np.bool_ else values for name, values in samples.items()}
+    folder.write_table("samples", "samples.csv", kept.assign(numbers))
+    folder.draw("figure", "inspection.png", plotting.inspection, inspection)
+    return folder.files

@@ -5,23 +5,24 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.files import write_atomically
+from tactile_bayes import plotting
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inspection import CellSource, known_cell
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
 from tactile_bayes.record import validate
-from tactile_bayes.runs.picture import write_picture
+from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.uncertainty.verdicts import doubtful_sides
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_in_words"]
 
@@ -30,24 +31,22 @@ _CONTRADICTION = 1e-4
 
 
 @dataclass(frozen=True)
-class ReconstructionRun:
+class ReconstructionRun(Run[xr.Dataset]):
     """What `reconstruct_into` made.
 
     Attributes
     ----------
-    contacts : xr.Dataset
+    result : xr.Dataset
         From `reconstruct`.
+    files : mapping of str to Path
+        By what they hold.
     load_cell : LoadCell or None
     source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
         What the load cell is known from; see `known_cell`.
-    files : mapping of str to Path
-        By what they hold.
     """
 
-    contacts: xr.Dataset
     load_cell: LoadCell | None
     source: CellSource
-    files: Mapping[str, Path]
 
 
 def reconstruct_into(
@@ -90,7 +89,7 @@ def reconstruct_into(
     >>> from tactile_bayes.contours import paper_profile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = reconstruct_into(scan(paper_profile("II", q=0.5), drive_step=0.05).record, folder)
-    >>> run.contacts.attrs["method"], sorted(run.files)
+    >>> run.result.attrs["method"], sorted(run.files)
     ('raw', ['contacts', 'map'])
     """
     measured = validate(measured)
@@ -98,18 +97,13 @@ def reconstruct_into(
     if method is None:
         method = "constrained" if cell is not None and cell.has_variances else "raw"
     contacts = reconstruct(measured, method=method, load_cell=cell, friction=friction)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = {"contacts": folder / "contacts.csv"}
-    drawn = folder / "contacts.png"
-    drawn.unlink(missing_ok=True)  # which is of other contacts
-    with write_atomically(files["contacts"]) as temporary:
-        contacts.to_dataframe().to_csv(temporary)
+    folder = Folder(out)
+    (folder.path / "contacts.png").unlink(missing_ok=True)  # which is of other contacts
+    folder.write_table("contacts", "contacts.csv", contacts)
     shown = contacts.contact_x.values[contacts.status.values == "ok"]
     if shown.size > 1 and np.ptp(shown) > 0.0:
-        files["map"] = drawn
-        _draw(measured, contacts, shown, drawn)
-    return ReconstructionRun(contacts, cell, source, files)
+        folder.draw("map", "contacts.png", _map, measured, contacts, shown)
+    return ReconstructionRun(contacts, folder.files, cell, source)
 
 
 def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
@@ -169,18 +163,9 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
     return (*against, *told)
 
 
-def _draw(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64], path: Path) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    from tactile_bayes import plotting
-
-    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
+def _map(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64]) -> Axes:
     pivots = np.unique(np.stack([measured.base_x.values, measured.base_y.values], axis=1), axis=0)
     base = (float(pivots[0, 0]), float(pivots[0, 1])) if len(pivots) == 1 else None
     low, high = (float(end) for end in np.quantile(shown, [0.01, 0.99]))
-    plotting.contour(
-        [low, high] if high > low else [shown.min(), shown.max()], contacts=contacts, base=base, ax=figure.subplots()
-    )
-    write_picture(figure, path)
+    ends = [low, high] if high > low else [shown.min(), shown.max()]
+    return plotting.contour(ends, contacts=contacts, base=base, ax=panels(1, 1, 7.0, 4.0)[0, 0])

@@ -6,22 +6,20 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from tactile_bayes import plotting
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.files import write_atomically
 from tactile_bayes.ledger import TaskProgress
-from tactile_bayes.netcdf import write_netcdf
 from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
+from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.outermost import outermost
-from tactile_bayes.runs.picture import write_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,25 +43,23 @@ class Material(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SensitivityRun:
+class SensitivityRun(Run[xr.DataTree]):
     """What `sensitivity_into` made.
 
     Attributes
     ----------
-    sensitivity : xr.DataTree
+    result : xr.DataTree
         From `sensitivity`.
+    files : mapping of str to Path
+        By what they hold.
     rods : xr.Dataset or None
         From `required_rod`, where a material was given.
     study : xr.Dataset or None
         From `error_map`, where one was asked for.
-    files : mapping of str to Path
-        By what they hold.
     """
 
-    sensitivity: xr.DataTree
     rods: xr.Dataset | None
     study: xr.Dataset | None
-    files: Mapping[str, Path]
 
 
 def sensitivity_into(
@@ -108,38 +104,33 @@ def sensitivity_into(
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = sensitivity_into(folder, seed=1, parts=["information"])
-    ...     sorted(path.name for path in Path(folder).iterdir())
+    ...     sorted(path.name for path in run.files.values())
     ['information.png', 'sensitivity.nc', 'words.txt']
     """
-    folder = Path(out)
     if material is not None and (options.get("rod") is None or options.get("load_cell") is None):
         raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
     told = progress or (lambda done: None)
     found = sensitivity(**options, progress=lambda part: told(part.done))
-    folder.mkdir(parents=True, exist_ok=True)
-    files = {"sensitivity": folder / "sensitivity.nc", "words": folder / "words.txt"}
-    write_netcdf(found, files["sensitivity"])
-    with write_atomically(files["words"]) as temporary:
-        temporary.write_text(f"{found.attrs['words']}\n", encoding="utf-8")
+    folder = Folder(out)
+    folder.write_netcdf("sensitivity", "sensitivity.nc", found)
+    folder.write_lines("words", "words.txt", [found.attrs["words"]])
     for part in found.children:
-        files[part] = folder / f"{part}.png"
-        _write_figure(_DRAWN[part], found, files[part])
-    rods = None
+        draw = _draw_noise_shares if part == "noise_shares" else getattr(plotting, part)
+        folder.draw(part, f"{part}.png", draw, found)
+    rods, studied = None, None
     if material is not None:
         rods = _rods(material, options, lambda rod: told(len(PARTS) + rod.done))
-        files |= {"rods": folder / "rods.nc", "required_rod": folder / "required_rod.png"}
-        write_netcdf(rods, files["rods"])
-        _write_figure(_draw_required_rod, rods, files["required_rod"])
-        with write_atomically(files["words"]) as temporary:
-            temporary.write_text(f"{found.attrs['words']}\n{rod_in_words(rods)}\n", encoding="utf-8")
-    if study is None:
-        return SensitivityRun(found, rods, None, files)
-    inside = folder / "study"
-    studied = error_map(out=inside, **study)
-    files |= {"cells": inside / CELLS.file, "study": inside / "study.nc", "errors": inside / "study.png"}
-    write_netcdf(studied, files["study"])
-    _write_figure(_draw_study, studied, files["errors"])
-    return SensitivityRun(found, rods, studied, files)
+        folder.write_netcdf("rods", "rods.nc", rods)
+        folder.draw("required_rod", "required_rod.png", plotting.required_rod, rods)
+        folder.write_lines("words", "words.txt", [found.attrs["words"], rod_in_words(rods)])
+    if study is not None:
+        studied = error_map(out=folder.path / "study", **study)
+        inside = Folder(folder.path / "study")
+        inside.files["cells"] = inside.path / CELLS.file
+        inside.write_netcdf("study", "study.nc", studied)
+        inside.draw("errors", "study.png", _draw_study, studied)
+        folder.files |= inside.files
+    return SensitivityRun(found, folder.files, rods, studied)
 
 
 def rod_in_words(rods: xr.Dataset) -> str:
@@ -180,66 +171,15 @@ def _rods(material: Material, options: Mapping[str, Any], progress: Callable[[Ta
     )
 
 
-def _write_figure(draw: Callable[[Any], Axes], found: xr.DataTree | xr.Dataset, path: Path) -> None:
-    from matplotlib import pyplot as plt
-
-    with plt.ioff():
-        plt.sca(draw(found))
-        write_picture(plt.gcf(), path)
-        plt.close()
-
-
-def _two_panels() -> Any:
-    from matplotlib import pyplot as plt
-
-    return plt.subplots(2, 1, figsize=(7.0, 7.4), layout="constrained")[1]
-
-
-def _draw_amplification(found: xr.DataTree) -> Axes:
-    from tactile_bayes import plotting
-
-    return plotting.amplification(found)
-
-
-def _draw_information(found: xr.DataTree) -> Axes:
-    from tactile_bayes import plotting
-
-    return plotting.information(found)
-
-
 def _draw_noise_shares(found: xr.DataTree) -> Axes:
     """Of both methods."""
-    from tactile_bayes import plotting
-
-    panels = _two_panels()
-    plotting.noise_shares(found, reconstruction="raw", ax=panels[0])
-    return plotting.noise_shares(found, reconstruction="constrained", ax=panels[1])
-
-
-def _draw_required_noise(found: xr.DataTree) -> Axes:
-    from tactile_bayes import plotting
-
-    return plotting.required_noise(found)
-
-
-def _draw_required_rod(rods: xr.Dataset) -> Axes:
-    from tactile_bayes import plotting
-
-    return plotting.required_rod(rods)
+    above, below = panels(2, 1, 7.0, 7.4)[:, 0]
+    plotting.noise_shares(found, reconstruction="raw", ax=above)
+    return plotting.noise_shares(found, reconstruction="constrained", ax=below)
 
 
 def _draw_study(studied: xr.Dataset) -> Axes:
     """Of contacts and of bands."""
-    from tactile_bayes import plotting
-
-    panels = _two_panels()
-    plotting.error_map(studied, quantity="across", ax=panels[0])
-    return plotting.error_map(studied, quantity="touched", ax=panels[1])
-
-
-_DRAWN: Mapping[str, Callable[[xr.DataTree], Axes]] = {
-    "amplification": _draw_amplification,
-    "information": _draw_information,
-    "noise_shares": _draw_noise_shares,
-    "required_noise": _draw_required_noise,
-}
+    above, below = panels(2, 1, 7.0, 7.4)[:, 0]
+    plotting.error_map(studied, quantity="across", ax=above)
+    return plotting.error_map(studied, quantity="touched", ax=below)

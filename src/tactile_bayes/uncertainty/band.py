@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.checks import as_numbers, check_probability, check_switch
+from tactile_bayes.checks import as_numbers
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.blocks import blocks
@@ -68,8 +68,6 @@ def contour_band(
     array([0.3, 0.8])
     """
     at = places(x)
-    check_probability("probability", probability)
-    check_switch("simultaneous", simultaneous)
     heights = contour_heights(posterior, at)
     share = np.isfinite(heights).mean(axis=0)
     lower, median, upper = quantile_band(heights, probability, simultaneous)

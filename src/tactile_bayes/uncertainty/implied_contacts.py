@@ -17,7 +17,7 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.nuisances import Nuisances
-from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.mechanics.touching import PLACE
@@ -143,10 +143,7 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
 
 def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
     """The record that a contour was inferred from, with the rod and the load cell that were taken."""
-    groups = ("posterior", "observed_data", "constant_data")
-    is_tree = isinstance(posterior, xr.DataTree) and set(groups) <= set(posterior.children)
-    if not (is_tree and "family" in posterior.attrs and "sample" not in posterior["posterior"].dims):
-        raise InferenceError("this is no result of infer_contour: give the tree that it returned")
+    contour_draws(posterior)
     record = validate(record_of(posterior))
     if record_hash(record) != posterior.attrs["data_sha256"]:
         raise InferenceError(

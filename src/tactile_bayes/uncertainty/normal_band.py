@@ -10,7 +10,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.roots import falling_root
 from tactile_bayes.uncertainty.band import contours_drawn, length_unit, places
-from tactile_bayes.uncertainty.quantiles import central_levels, quantile_band
+from tactile_bayes.uncertainty.quantiles import quantile_band
 
 __all__ = ["normal_band", "normal_offsets"]
 
@@ -75,7 +75,6 @@ def normal_band(
     >>> normal_band(tree, [0.0, 0.3, 0.55], 0.5)["upper"].values.round(12)  # circles about one centre
     array([0.05, 0.05, 0.05])
     """
-    central_levels(probability)
     at = places(x)
     contours = contours_drawn(posterior)
     if reference is None:

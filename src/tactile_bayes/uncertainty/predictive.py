@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_probability
+from tactile_bayes.inference.result import refuse_no_contour
 
 __all__ = ["predictive_interval"]
 
@@ -40,6 +41,7 @@ def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr
     >>> round(interval.force_x_lower.item(), 6), round(interval.force_x_upper.item(), 6)
     (5.0, 95.0)
     """
+    refuse_no_contour(posterior, "posterior_predictive")
     check_probability("probability", probability)
     levels = {"lower": 0.5 * (1.0 - probability), "upper": 0.5 * (1.0 + probability)}
     out = {}

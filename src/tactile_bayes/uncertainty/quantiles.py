@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.checks import check_probability
+from tactile_bayes.checks import check_probability, check_switch
 
 __all__ = ["central_levels", "quantile_band"]
 
@@ -63,6 +63,7 @@ def quantile_band(values: Floats, probability: float, simultaneous: bool = False
            [0.95, 1.9 ]])
     """
     levels = central_levels(probability)
+    check_switch("simultaneous", simultaneous)
     band = np.full((3, values.shape[1]), np.nan)
     known = np.isfinite(values).all(axis=0)
     if not known.any():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.result import record_of
+from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, rough_noise
 
 __all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
@@ -174,6 +174,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
 
 def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
     """Residuals of the record and of every prediction, by channel."""
+    refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
     predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()
     sweep = posterior["constant_data"].to_dataset().sweep.values
     order = np.argsort(sweep, kind="stable")

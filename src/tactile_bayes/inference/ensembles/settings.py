@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tactile_bayes.checks import check_number, check_optional, check_positive, check_whole_number
+from tactile_bayes.checks import check_number, check_optional, check_positive, check_whole_number, refused
 from tactile_bayes.errors import ParameterError
 
 __all__ = ["SamplerSettings", "refuse_few_walkers", "settings_of"]
@@ -68,22 +68,19 @@ class SamplerSettings:
     max_seconds: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("ensembles", "walkers", "block_steps", "max_steps"):
-            value = getattr(self, name)
-            if value is None and name == "walkers":
-                continue
-            check_whole_number(name, value, -_MOST, f"give a whole number, at most {_MOST}", most=_MOST)
-        if self.ensembles < 2:
-            raise ParameterError(
-                f"{self.ensembles} ensembles: give at least 2 (4 is better), since convergence is judged by comparing "
-                "independent ensembles; walkers of one ensemble are not independent"
+        for name in ("block_steps", "max_steps"):
+            check_whole_number(
+                name, getattr(self, name), 1, f"give a whole number, at least 1 and at most {_MOST}", most=_MOST
             )
-        if self.walkers is not None and (self.walkers < 4 or self.walkers % 2):
-            raise ParameterError(f"{self.walkers} walkers: give an even number of at least 4, or None for the default")
-        if self.block_steps < 1:
-            raise ParameterError(f"block_steps is {self.block_steps}: give at least 1")
-        if self.max_steps < 1:
-            raise ParameterError(f"max_steps is {self.max_steps}: give at least 1")
+        remedy = (
+            "give a whole number of at least 2 (4 is better), since convergence is judged by comparing independent "
+            "ensembles; walkers of one ensemble are not independent"
+        )
+        check_whole_number("ensembles", self.ensembles, 2, remedy, most=_MOST)
+        if self.walkers is not None:
+            remedy = "give an even number of at least 4, or None for the default"
+            if check_whole_number("walkers", self.walkers, 4, remedy, most=_MOST) % 2:
+                raise refused("walkers", self.walkers, remedy)
         remedy = "R̂ is 1 at best, give a little more, like 1.01"
         check_number("max_r_hat", self.max_r_hat, remedy, least=math.nextafter(1.0, 2.0))
         check_positive("min_ess", self.min_ess)

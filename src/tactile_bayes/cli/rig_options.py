@@ -1,0 +1,133 @@
+"""Options that describe a rig: what is simulated, and what is not known of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactile_bayes.cli.numbers import numbers_asked
+
+if TYPE_CHECKING:
+    from tactile_bayes.load_cell import LoadCell
+    from tactile_bayes.rod import Rod
+
+__all__ = ["Friction", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions", "rod_asked"]
+
+Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)]
+
+
+@dataclass(frozen=True)
+class NoiseOptions:
+    """Noise of a load cell that is simulated."""
+
+    force_noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; by default 0.05 EI/L².")
+    ] = None
+    moment_noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; by default 0.02 EI/L.")
+    ] = None
+
+    @property
+    def load_cell(self) -> LoadCell | None:
+        """The load cell, if one is given.
+
+        Raises
+        ------
+        ParameterError
+            If it is not given whole.
+        """
+        from tactile_bayes.errors import ParameterError
+        from tactile_bayes.load_cell import LoadCell
+
+        if self.force_noise is None and self.moment_noise is None:
+            return None
+        if not self.force_noise or not self.moment_noise:
+            raise ParameterError("--force-noise and --moment-noise go together, above zero: give both, or neither")
+        return LoadCell(force_noise=self.force_noise, moment_noise=self.moment_noise)
+
+
+@dataclass(frozen=True)
+class RodOptions:
+    """A rod that is simulated."""
+
+    length: Annotated[
+        float | None, typer.Option(help="Rod length [m]; by default everything is dimensionless, in units of the rod.")
+    ] = None
+    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None
+    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0
+
+    @property
+    def rod(self) -> Rod | None:
+        """The rod, if one is given."""
+        return rod_asked(self.length, self.flexural_rigidity, self.diameter)
+
+
+@dataclass(frozen=True)
+class RigOptions(RodOptions):
+    """A rod that is simulated, and where it pivots."""
+
+    base: Annotated[
+        list[str] | None, typer.Option(help="A pivot, X,Y; give it again for another. By default one at 0,0.")
+    ] = None
+
+    @property
+    def pivots(self) -> list[tuple[float, ...]]:
+        """Places of the pivots."""
+        return [numbers_asked(pivot, "--base", 2) for pivot in self.base or ["0,0"]]
+
+
+@dataclass(frozen=True)
+class UnknownOptions:
+    """What is not known of a rig, and inferred beside a contour."""
+
+    friction: Annotated[
+        float | None,
+        typer.Option(help="Coulomb's coefficient, where it is known; else it is inferred.", min=0.0, max=0.84),
+    ] = None
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset, bias, "
+            "lever, backlash and friction: one of these, or drift, gain, suspension_compliance, base (where further "
+            "pivots stand); give it again for another."
+        ),
+    ] = None
+    as_stated: Annotated[
+        bool, typer.Option("--as-stated", help="Take everything about the rig as stated: fewer parameters, narrower.")
+    ] = False
+
+    @property
+    def nuisances(self) -> list[str]:
+        """Names of what is inferred.
+
+        Raises
+        ------
+        ParameterError
+            If the options contradict each other.
+        """
+        from tactile_bayes.errors import ParameterError
+        from tactile_bayes.inference.nuisances import STANDARD
+
+        if self.as_stated and self.nuisance:
+            raise ParameterError("--as-stated and --nuisance contradict each other: leave one of them out")
+        return [] if self.as_stated else list(self.nuisance or STANDARD)
+
+
+def rod_asked(length: float | None, flexural_rigidity: float | None, diameter: float) -> Rod | None:
+    """The rod, if one is given.
+
+    Raises
+    ------
+    ParameterError
+        If it is not given whole.
+    """
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.rod import Rod
+
+    if (length is None) != (flexural_rigidity is None):
+        raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
+    if diameter and length is None:
+        raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
+    return None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)

@@ -1,0 +1,36 @@
+"""Colours, lines and markers that have the same meaning in every figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+__all__ = ["BASES", "BEST", "CONTACT_MARKERS", "PALETTE", "PHASES", "SWEEP_LINES", "SWEEP_MARKERS", "TRUTH"]
+
+PALETTE: Mapping[str, str] = {
+    "tip": "#0072B2",
+    "tangential": "#D55E00",
+    "change": "#000000",
+    "none": "#8C8C8C",
+    "sample": "#9A9A9A",
+    "object": "#EFEFEF",
+    "band": "#9CCBE8",
+    "median": "#0072B2",
+    "gap": "#F0E442",
+}
+"""Colours after Okabe and Ito, told apart with any colour vision."""
+
+BASES = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
+"""Colours of bases in their order, after Okabe and Ito, without the gap's; used over again from the seventh base on."""
+
+BEST: Mapping[str, Any] = {"marker": "*", "color": "#D55E00", "markeredgecolor": "white", "linestyle": "none"}
+"""The mark on the best of several choices."""
+
+SWEEP_LINES: Mapping[str, str] = {"forward": "-", "backward": "--"}
+SWEEP_MARKERS: Mapping[str, str] = {"forward": "o", "backward": "^"}
+
+PHASES = {"tip": "tip contact", "tangential": "tangential contact"}
+CONTACT_MARKERS = {"tip": "o", "tangential": "s", "none": "o"}
+
+TRUTH: Mapping[str, Any] = {"color": PALETTE["change"], "linewidth": 1.0, "linestyle": "--"}
+"""The line of the true contour."""

@@ -1,0 +1,215 @@
+"""Contours that the prior expects, and those that the posterior leaves possible, on a map of the rod's reach."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.checks import check_whole_number
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.legends import legend_entry
+from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
+from tactile_bayes.plotting.marks import PALETTE, TRUTH
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tactile_bayes.contours.base import Contour
+
+__all__ = ["posterior_contours", "prior_contours"]
+
+_ROOM = 0.06
+"""What the map shows beside the rod's reach, in rod lengths."""
+
+_BELOW = 0.2
+"""What it shows below the pivot at least, likewise."""
+
+_DRAWS = 400
+"""Of which the posterior's median is taken."""
+
+_THIN = 0.6
+"""Width of a contour's line."""
+
+_PRIOR = "#E69F00"
+"""Of the prior where the posterior lies over it."""
+
+_COUNT = "give a whole number from 1 up, like 40"
+_DASHED: dict[str, Any] = {"linestyle": (0, (6.0, 3.0)), "linewidth": 1.0}
+
+
+def prior_contours(
+    posterior: xr.DataTree,
+    *,
+    contours: int = 40,
+    median: bool = True,
+    truth: Contour | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Contours drawn from the prior: does it expect what might be there, and nothing that cannot?
+
+    Beyond the rod's reach they are paler. The legend says which share of the prior is within reach of every sweep: the
+    rest is excluded, and not drawn.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`, of which the group `prior` is drawn: contours within reach in every sweep.
+    contours : int
+        How many, evenly picked from the draws.
+    median : bool
+        Whether the posterior's median is drawn over them, where the rod touched.
+    truth : Contour, optional
+        The true contour.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If the tree has no prior draws, or `contours` is not positive.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> prior_contours(infer_contour(measured, nuisances=[], seed=1, settings=quick)).get_ylabel()
+    '$y$ [$L$]'
+    """
+    from tactile_bayes.inference.contour import contours_of
+
+    if not {"prior", "constant_data"} <= set(getattr(posterior, "children", ())):
+        raise ParameterError("there are no draws from a prior here: give the tree that infer_contour returned")
+    check_whole_number("contours", contours, 1, _COUNT)
+    prior, family = posterior["prior"].to_dataset(), posterior.attrs["family"]
+    share = prior.attrs.get("share_within_reach")
+    words = "" if share is None else f"\n({100.0 * share:.2g} % of it is within reach)"
+    layer = f"{family}, from the prior{words}", contours_of(prior, family), PALETTE["median"]
+    touched = _median(posterior) if median and "posterior" in posterior.children else None
+    return _draw(ax, posterior, contours, [layer], truth, touched=touched, entry_width=_THIN)
+
+
+def posterior_contours(
+    posterior: xr.DataTree, *, contours: int = 40, truth: Contour | None = None, ax: Axes | None = None
+) -> Axes:
+    """Contours drawn from the posterior over contours drawn from the prior: what the record has told.
+
+    Beyond the rod's reach they are paler. Where both look alike the record says nothing. A good posterior is a single
+    line on a map: `band_detail` enlarges it.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`; without a group `prior` the posterior alone is drawn.
+    contours : int
+        How many of each, evenly picked from the draws.
+    truth : Contour, optional
+        The true contour.
+    ax : Axes, optional
+        Where to draw.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If the tree is no posterior of a contour, or `contours` is not positive.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    >>> measured = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    >>> quick = SamplerSettings(min_ess=100, max_r_hat=1.1)
+    >>> posterior_contours(infer_contour(measured, nuisances=[], seed=1, settings=quick)).get_ylabel()
+    '$y$ [$L$]'
+    """
+    from tactile_bayes.inference.contour import contours_of
+    from tactile_bayes.uncertainty.band import contours_drawn
+
+    if not {"posterior", "constant_data"} <= set(getattr(posterior, "children", ())):
+        raise ParameterError("this is no posterior of a contour: give the tree that infer_contour returned")
+    check_whole_number("contours", contours, 1, _COUNT)
+    family = posterior.attrs["family"]
+    layers = [(f"{family}, from the posterior", contours_drawn(posterior, contours), PALETTE["median"])]
+    if "prior" in posterior.children:
+        expected = contours_of(posterior["prior"].to_dataset(), family)
+        layers.insert(0, (f"{family}, from the prior", expected, _PRIOR))
+    return _draw(ax, posterior, contours, layers, truth)
+
+
+def _draw(
+    ax: Axes | None,
+    posterior: xr.DataTree,
+    most: int,
+    layers: list[tuple[str, Contour, str]],
+    truth: Contour | None,
+    *,
+    touched: tuple[Floats, Floats] | None = None,
+    entry_width: float = 1.5,
+) -> Axes:
+    """Layers of contours, paler beyond the circles around the pivots, with what lies over them.
+
+    A layer is a label, many contours, of which some are evenly picked, and a colour. The map shows what is within reach
+    and what is between that and the lowest contour.
+    """
+    from matplotlib.patches import Circle
+
+    from tactile_bayes.uncertainty.band import length_unit
+
+    ax = single_axes() if ax is None else ax
+    record, length = posterior["constant_data"].to_dataset(), float(posterior.attrs["rod_length"])
+    pivots = np.unique(np.stack([record["base_x"].values, record["base_y"].values], axis=1), axis=0)
+    beside, room = (1.0 + _ROOM) * length, _ROOM * length
+    span = float(pivots[:, 0].min() - beside), float(pivots[:, 0].max() + beside)
+    for pivot in pivots:
+        ax.add_patch(Circle(tuple(pivot), length, fill=False, edgecolor="0.4", **_DASHED))
+    legend_entry(ax, "rod's reach", color="0.4", **_DASHED)
+    lowest = float(pivots[:, 1].min()) - _BELOW * length
+    for above, (label, contours, colour) in enumerate(layers):
+        style: dict[str, Any] = {"color": colour, "linewidth": _THIN}
+        count, zorder = contours.shape[0], 1.5 + 0.5 * above
+        for i in np.unique(np.linspace(0, count - 1, min(most, count)).astype(np.intp)):
+            x, y = outline(contours.take(i), *span)
+            ax.plot(x, y, alpha=0.2, zorder=zorder, **style)
+            for pivot in pivots:
+                within = Circle(tuple(pivot), length, transform=ax.transData)
+                ax.plot(x, y, alpha=0.7, zorder=zorder + 0.1, clip_path=within, **style)
+                is_near = np.hypot(x - pivot[0], y - pivot[1]) < length
+                lowest = min(lowest, float(np.min(y[is_near], initial=lowest)))
+        legend_entry(ax, label, color=colour, linewidth=entry_width)
+    ax.set_xlim(*span)
+    ax.set_ylim(lowest - 2.0 * room, float(pivots[:, 1].max()) + length + room)
+    if touched is not None:
+        style = {"color": PALETTE["tangential"], "linewidth": 2.2, "label": "posterior median, where touched"}
+        ax.plot(*touched, zorder=3, **style)
+    if truth is not None:
+        ax.plot(*outline(truth, *span), zorder=3, label="true contour", **TRUTH)
+    for k, (x, y) in enumerate(pivots.tolist()):
+        draw_pivot(ax, (x, y), label="" if k else "pivot")
+    finish_map(ax, length_unit(posterior))
+    return ax
+
+
+def _median(posterior: xr.DataTree) -> tuple[Floats, Floats]:
+    """Points of the posterior's median, where the rod touched."""
+    from tactile_bayes.uncertainty.band import contour_heights
+
+    events = posterior["events"].to_dataset()
+    ends = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
+    left, right = np.quantile(ends, [0.05, 0.95])
+    x = np.linspace(left, right, 201)
+    heights = contour_heights(posterior, x, _DRAWS)
+    return x, np.median(np.where(np.isnan(heights), np.inf, heights), axis=0)  # beyond its ends a contour is upright

@@ -1,0 +1,77 @@
+"""A posterior of a contour in numbers: the parameters, and the gap where there is one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.result import posterior_draws
+from tactile_bayes.uncertainty.gap import gap
+from tactile_bayes.uncertainty.quantiles import central_levels
+
+__all__ = ["gap_if_any", "reach", "summary"]
+
+
+def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset | None = None) -> xr.Dataset:
+    """Return median, central interval, R̂ and effective sample size of every parameter, and the gap where one is given.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    probability : float
+        Of the central interval.
+    edges : xr.Dataset, optional
+        The gap, from `gap_if_any` with this probability.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "quantity": median, lower, upper, r_hat, ess_bulk, ess_tail, unit.
+    """
+    draws, stats = posterior_draws(posterior), posterior["sample_stats"].to_dataset()
+    rows: list[tuple[Any, ...]] = []
+    for name in stats.parameter.values:
+        lower, median, upper = np.quantile(draws[name], central_levels(probability))
+        diagnostics = (float(stats[d].sel(parameter=name)) for d in ("r_hat", "ess_bulk", "ess_tail"))
+        rows.append((name, median, lower, upper, *diagnostics, draws[name].attrs["units"]))
+    if edges is not None:
+        width = edges["width"]
+        values = (float(width.sel(bound=b)) for b in ("median", "lower", "upper"))
+        rows.append(("gap width", *values, np.nan, np.nan, np.nan, width.attrs["units"]))
+    quantity, *columns = zip(*rows, strict=True)
+    names = ("median", "lower", "upper", "r_hat", "ess_bulk", "ess_tail", "unit")
+    return xr.Dataset(
+        {name: ("quantity", list(column)) for name, column in zip(names, columns, strict=True)},
+        coords={"quantity": list(quantity)},
+        attrs={"probability": probability},
+    )
+
+
+def gap_if_any(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
+    """Return the gap, or None where there are sweeps in one direction only."""
+    both = set(_events(posterior).stroke.values) == {"forward", "backward"}
+    return gap(posterior, probability) if both else None
+
+
+def reach(posterior: xr.DataTree) -> NDArray[np.float64]:
+    """Return values of x from one end of what the rod touched to the other, where a run has its band; shape (201,).
+
+    Draws without an event do not count.
+    """
+    events = _events(posterior)
+    x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
+    if not np.isfinite(x).any():
+        raise InferenceError("the rod touches none of the posterior's contours: there is no stretch of it to tell of")
+    lo, hi = np.nanquantile(x, [0.05, 0.95])
+    return np.linspace(lo, hi, 201)
+
+
+def _events(posterior: xr.DataTree) -> xr.Dataset:
+    if "events" not in posterior.children:
+        raise InferenceError("the posterior holds no events: first contacts and snap-offs of its contours are missing")
+    return posterior["events"].to_dataset()

@@ -1,0 +1,31 @@
+"""A posterior in numbers, and where the rod touched its contours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
+
+
+def test_the_summary_has_the_probability_it_is_asked_for(analysed):
+    run, _ = analysed
+    wide, narrow = (summary(run.posterior, p, gap_if_any(run.posterior, p)) for p in (0.95, 0.5))
+    assert wide.quantity.values[-1] == "gap width"
+    assert (narrow["lower"] > wide["lower"]).all()
+    assert (narrow["upper"] < wide["upper"]).all()
+
+
+def test_the_band_is_where_events_are(analysed):
+    """Of draws whose contour is not touched, or ends before, there are none."""
+    posterior = analysed[0].posterior.copy(deep=True)
+    events = posterior["events"]
+    events["snap_off_contact_x"][:, ::3] = np.nan
+    x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
+    expected = np.quantile(x[np.isfinite(x)], [0.05, 0.95])
+    np.testing.assert_allclose(reach(posterior)[[0, -1]], expected, rtol=1e-13)
+    for when in ("first", "snap_off"):
+        events[f"{when}_contact_x"][:] = np.nan
+    with pytest.raises(InferenceError, match="touches none of the posterior's contours"):
+        reach(posterior)
