@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from tactile_bayes.calibration.world import World
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.load_cell import LoadCell
 

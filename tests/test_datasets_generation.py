@@ -12,10 +12,12 @@ from scipy import stats
 import tactile_bayes as tb
 from helpers.data_sets import PLAIN, RICH, changed
 from tactile_bayes.contours import Circle
+from tactile_bayes.contours.families import FAMILIES
+from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.datasets import contour_of, read_specification, record
-from tactile_bayes.datasets.families import FAMILIES
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
+from tactile_bayes.datasets.specification import left_out
 from tactile_bayes.errors import ParameterError, SpecificationError, StrainWarning
 from tactile_bayes.record import in_frame
 
@@ -29,7 +31,7 @@ RANGES = {
     "b": {"uniform": [0.3, 0.8]},
     "n": {"uniform": [2.0, 4.0]},
     "r": {"uniform": [0.4, 1.0]},
-    "radius": {"log_uniform": [0.4, 1.5]},
+    "w": {"uniform": [0.6, 1.5]},
     "amplitude": 0.3,
     "length_scale": 1.0,
     "q": {"uniform": [0.3, 0.6]},
@@ -39,7 +41,7 @@ RANGES = {
 
 def drawn_from(family, count=4, **more):
     group = {"family": family, "x_c": RANGES["x_c"]}
-    for name in FAMILIES[family].parameters:
+    for name in set(FAMILIES[family].parameters) - set(left_out(FAMILIES[family])):
         group[name] = RANGES[name.removeprefix("left_").removeprefix("right_")]
     return {"records": count, "seed": 3, "contours": [group], "scan": {"samples": 40}, **more}
 
@@ -276,17 +278,31 @@ def test_numbers_are_drawn_by_their_laws():
 
 
 @pytest.mark.slow
-def test_shape_free_radii_are_a_gaussian_process():
+def test_weights_of_shape_free_radii_are_standard_normal():
+    """And independent of one another; what they make of a radius is a matter of the family."""
     data = generated(drawn_from("shape-free", 500, scan={"samples": 2}, contours=[
-        {"family": "shape-free", "radius": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": 0.5},
+        {"family": "shape-free", "r": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": 0.5},
     ]))  # fmt: skip
-    smooth = (data.truth_contour_log_radius.values - np.log(0.8)) / 0.1
-    assert stats.kstest(smooth[:, 6], "norm").pvalue > FALSE_ALARM
-    product = smooth[:, 3] * smooth[:, 6]  # 0.75 rad apart
-    expected = np.exp(-0.5 * (0.75 / 1.5) ** 2)
-    sd = np.sqrt((1.0 + expected**2) / 500)
-    assert abs(product.mean() - expected) < stats.norm.isf(FALSE_ALARM / 2) * sd
-    np.testing.assert_allclose(data.knot.values, np.linspace(-1.5, 1.5, 13))
+    weights = np.stack([data[f"truth_contour_{name}"].values for name in SHAPE_FREE.directions])
+    assert min(stats.kstest(z, "norm").pvalue for z in weights) > FALSE_ALARM / len(weights)
+    correlation = np.corrcoef(weights)[np.triu_indices(len(weights), 1)]
+    assert np.abs(correlation).max() < stats.norm.isf(FALSE_ALARM / 2 / correlation.size) / np.sqrt(500)
+
+
+def test_a_weight_may_have_a_law_of_its_own():
+    """Without weights the contour is a circle; a thousandth of a weight bends it as the family says."""
+    plain = {"family": "shape-free", "r": 0.8, "amplitude": 0.5, "length_scale": 1.0, "q": 0.5}
+    flat = dict.fromkeys(SHAPE_FREE.directions, 0.0)
+    circle, bent = (
+        contour_of(record({"records": 1, "seed": 1, "contours": [{**plain, **flat, **more}]}, 0))
+        for more in ({}, {"z_2": 1e-3})
+    )
+    np.testing.assert_allclose(circle.radius_of_curvature([-1.0, 0.0, 1.0]), 0.8, rtol=1e-12)
+    values = dict(zip(SHAPE_FREE.parameters, np.zeros(len(SHAPE_FREE.parameters)), strict=True))
+    values |= {"r": 0.8, "amplitude": 0.5, "length_scale": 1.0, "q": 0.5, "z_2": 1e-3}
+    same = SHAPE_FREE.contour(values).radius_of_curvature([-1.0, 0.0, 1.0])
+    np.testing.assert_array_equal(bent.radius_of_curvature([-1.0, 0.0, 1.0]), same)
+    assert np.all(same != 0.8)
 
 
 def test_lists_are_gone_through_together():
@@ -361,7 +377,7 @@ def test_what_cannot_be_reached_is_given_up_with_the_counts(count):
 
 
 def test_what_is_no_contour_is_drawn_again():
-    contour = {"family": "power-law", "a": 1.0, "n": {"normal": [1.5, 0.5]}, "q": 0.5}
+    contour = {"family": "power-law", "w": 1.0, "n": {"normal": [1.5, 0.5]}, "q": 0.5}
     records = generate_records(read_specification({**FAR, "contours": [contour]}), 0, 60)
     why = "no contour (n must be at least 1.1: below, the vertex is as good as an edge, which Joined can give)"
     assert records.redrawn[why] > 0
@@ -388,14 +404,15 @@ def test_the_reasons_of_a_record_that_is_given_up_are_its_own():
 def test_wild_shapes_are_drawn_again():
     wild = {
         "family": "shape-free",
-        "radius": 0.5,
-        "amplitude": {"log_normal": [3.0, 2.0]},
-        "length_scale": 0.5,
+        "r": 0.5,
+        "amplitude": 0.5,
+        "length_scale": {"log_normal": [0.15, 2.0]},
         "q": 0.4,
     }
     records = generate_records(read_specification({**FAR, "records": 10, "contours": [wild]}), 0, 10)
-    assert records.redrawn["no contour (amplitude must be from 0 to 3, the latter a factor of 20 in the radius)"] > 0
-    assert np.all(records.drawn["contours[0].amplitude"] <= 3.0)
+    assert records.redrawn["no contour (length_scale must be from 0.15 to 4 rad)"] > 0
+    assert np.all(records.drawn["contours[0].length_scale"] >= 0.15)
+    assert np.all(records.drawn["contours[0].length_scale"] <= 4.0)
 
 
 # ---- what is not as one may wish

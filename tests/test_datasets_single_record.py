@@ -13,7 +13,7 @@ from tactile_bayes.datasets.specification_text import toml_of
 from tactile_bayes.errors import ParameterError
 
 SHAPES = changed(PLAIN, contours=[
-    {"family": "shape-free", "radius": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": {"uniform": [0.4, 0.5]}}
+    {"family": "shape-free", "r": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": {"uniform": [0.4, 0.5]}}
 ])  # fmt: skip
 
 

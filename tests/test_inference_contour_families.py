@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from helpers.contour_posteriors import infer_as_stated
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.families import default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.scanning import scan
@@ -49,7 +50,7 @@ def test_contours_that_the_rod_would_cut_after_snap_off_are_not_usable():
     rng = np.random.default_rng(5)
     count = 3000
     family = family_named("ellipse")
-    priors = family.default_priors((0.0, 0.0), 1.0)
+    priors = default_priors(family, (0.0, 0.0), 1.0)
     points = [priors[name].rvs(count, random_state=rng) for name in family.parameters]
     contours = family.build(*points)
     swept = [scan_many(contours, np.full((count, 1), 1.5), direction=way) for way in ("forward", "backward")]

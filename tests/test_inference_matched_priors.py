@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.matched_priors import matched_priors, mean_log_radius, widened
 
 

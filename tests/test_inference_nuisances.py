@@ -11,12 +11,12 @@ import pytest
 from scipy import stats
 
 from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of

@@ -8,16 +8,16 @@ import xarray as xr
 from scipy.special import gamma, kv
 
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit
 from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
-from tactile_bayes.inference.shape_free_posterior.random_radius import RandomRadius
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.rod import Rod
 from tactile_bayes.scanning import scan

@@ -13,8 +13,9 @@ import pytest
 from numba.core.errors import TypingError
 
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, Smooth
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.families import default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler, sweeps
@@ -43,9 +44,9 @@ def likelihood_of(rod, **options):
 def drawn(name, rod, count, seed=1):
     family = family_named(name)
     rng = np.random.default_rng(seed)
-    priors = family.default_priors((0.0, 0.0), rod.length)
+    priors = default_priors(family, (0.0, 0.0), rod.length)
     points = np.stack([priors[one].rvs(count, random_state=rng) for one in family.parameters])
-    low, high = np.array([family.bounds.get(one, (-np.inf, np.inf)) for one in family.parameters]).T
+    low, high = np.array([family.bounds[one] for one in family.parameters]).T
     inside = ((points > low[:, None]) & (points < high[:, None])).all(axis=0)
     return family.build(*points[:, inside])
 

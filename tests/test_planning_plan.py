@@ -10,8 +10,8 @@ from scipy import stats
 
 import tactile_bayes as tb
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, paper_profile
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
+from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.families import FAMILIES, FLANKS
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.normal_band import normal_band, normal_offsets
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tactile_bayes.blank_record import blank_record
 from tactile_bayes.calibration.world import NUMBERS, World
 from tactile_bayes.checks import check_probability
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import (
@@ -27,7 +28,6 @@ from tactile_bayes.inference.contour_problem import (
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.families import Prior, refuse_wrong_priors
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of

@@ -10,9 +10,9 @@ import numpy as np
 
 from tactile_bayes.checks import check_kind, check_number, check_numbers, check_optional
 from tactile_bayes.contours import Contour, ShapeFree
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.families import Prior, refuse_wrong_priors
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.load_cell import LoadCell
 

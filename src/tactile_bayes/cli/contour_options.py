@@ -82,12 +82,11 @@ class ContourOptions:
 
 
 def _of_family(name: str, options: Sequence[str] | None) -> Contour:
+    from tactile_bayes.contours.families import family_named
     from tactile_bayes.errors import ParameterError
-    from tactile_bayes.inference.families import FAMILIES
-    from tactile_bayes.inference.family_names import family_named
 
-    family = FAMILIES.get(name) or family_named(name)
-    if name not in FAMILIES:
+    family = family_named(name)
+    if family.roughness:
         raise ParameterError(f"--family {name}: such a contour is no few numbers, so give --points")
     values = {"x_c": 0.0}
     for parameter, value in assigned("--parameter", options, known=family.parameters).items():
@@ -96,7 +95,7 @@ def _of_family(name: str, options: Sequence[str] | None) -> Contour:
     if absent:
         like = " ".join(f"--parameter {parameter}=..." for parameter in absent)
         raise ParameterError(f"--family {name} takes {', '.join(family.parameters)}: give {like} as well")
-    return family.build(*(values[parameter] for parameter in family.parameters))
+    return family.contour(values)
 
 
 def _read_points(path: Path) -> tuple[list[float], list[float]]:

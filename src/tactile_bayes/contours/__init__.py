@@ -2,10 +2,9 @@
 
 from tactile_bayes.contours.base import Contour, Graph, Locus, Single
 from tactile_bayes.contours.checking import check
-from tactile_bayes.contours.circle import Circle
-from tactile_bayes.contours.ellipse import Ellipse
 from tactile_bayes.contours.function import from_function
 from tactile_bayes.contours.joined import Joined
+from tactile_bayes.contours.oval import Circle, Ellipse
 from tactile_bayes.contours.paper import paper_profile
 from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.points import MeasuredContour, from_points

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Any, Literal, NamedTuple, Self
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ __all__ = [
     "Locus",
     "Parameter",
     "Single",
+    "Vertexed",
     "alike",
     "as_parameter",
     "common_shape",
@@ -135,15 +136,17 @@ class Contour(ABC):
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Self:
         """The same contours with every parameter an array of one shape, as `take` wants them."""
-        many = object.__new__(type(self))  # the parameters have been checked
-        many.__dict__.update({name: np.broadcast_to(value, shape) for name, value in vars(self).items()})
-        return many
+        return self._each(lambda value: np.broadcast_to(value, (*shape, *np.shape(value)[len(self.shape) :])))
 
     def take(self, index: Index) -> Self:
         """The contours at `index`, of a contour whose parameters are all arrays of one shape."""
-        chosen = object.__new__(type(self))  # the parameters have been checked, and this is called in inner loops
-        chosen.__dict__.update({name: value[index] for name, value in vars(self).items()})
-        return chosen
+        return self._each(lambda value: value[index])
+
+    def _each(self, change: Callable[[Any], Floats]) -> Self:
+        """The contours with all changed that has an entry for each."""
+        other = object.__new__(type(self))  # the parameters have been checked, and this is called in inner loops
+        other.__dict__.update({name: change(value) for name, value in vars(self).items()})
+        return other
 
     def point(self, slope_angle: ArrayLike) -> tuple[Floats, Floats]:
         """Point at which the contour has a slope angle.
@@ -199,6 +202,24 @@ class Contour(ABC):
         return found.reshape(shape)
 
 
+class Vertexed(Contour):
+    """Contours that positive sizes describe, and the vertex, at height q above x_c."""
+
+    sizes: ClassVar[Mapping[str, str]]
+    """What must be said of sizes, by name, where one is not positive and finite."""
+
+    q: Parameter
+    x_c: Parameter
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        family = type(self).__name__
+        for name, rule in self.sizes.items():
+            size = getattr(self, name)
+            refuse_unless(np.greater(size, 0.0) & np.isfinite(size), family, rule, **{name: size})
+        refuse_unless(finite(self.q, self.x_c), family, "q and x_c must be finite", q=self.q, x_c=self.x_c)
+
+
 class Single(Contour):
     """A contour that stands alone, without parameters of a family; it equals itself only."""
 
@@ -212,10 +233,7 @@ class Single(Contour):
     def shape(self) -> tuple[int, ...]:
         return ()
 
-    def broadcast_to(self, shape: tuple[int, ...]) -> Self:
-        return self
-
-    def take(self, index: Index) -> Self:
+    def _each(self, change: Callable[[Any], Floats]) -> Self:
         return self
 
 

@@ -94,6 +94,10 @@ class _Checked:
         """The same values for each of the contours, along a first axis."""
         return values.reshape(-1, *(1,) * len(self.shape)) + np.zeros(self.shape)
 
+    def _located(self, stops: Floats) -> Locus:
+        """The locus, of which all members have the shape of the parameters."""
+        return Locus(*(np.broadcast_to(np.asarray(v, dtype=float), stops.shape) for v in self.contour.locate(stops)))
+
     def _refusal(self, lane: Lane, what: str) -> ContourError:
         which = f" at index {lane if lane[1:] else lane[0]}" if lane else ""
         return ContourError(f"{self.contour}{which}: {what}")
@@ -112,7 +116,7 @@ class _Checked:
             return np.asarray(np.where(begins & ends, between, endless))
 
         ways = np.linspace(-1.0, 1.0, _PROBES + 1)
-        locus = _Broadcast(self.contour.locate, parameter(self._each(ways)))
+        locus = self._located(parameter(self._each(ways)))
         angle = locus.slope_angle
         if np.any(lost := ~np.isfinite(angle).any(axis=0)):
             raise self._refusal(_first(lost), "its slope angle is nowhere finite")
@@ -124,7 +128,7 @@ class _Checked:
         def bisected(inside: Floats, outside: Floats, within: Callable[[Floats], NDArray[np.bool_]]) -> Floats:
             for _ in range(60):
                 middle = 0.5 * (inside + outside)
-                good = within(_Broadcast(self.contour.locate, parameter(middle)[None]).slope_angle[0])
+                good = within(self._located(parameter(middle)[None]).slope_angle[0])
                 inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
             return parameter(inside)
 
@@ -137,15 +141,15 @@ class _Checked:
             bisected(ways[last], ways[np.minimum(last + 1, _PROBES)], lambda found: found <= greatest),
         )
 
-    def _finite(self, stops: Floats) -> _Broadcast:
-        locus = _Broadcast(self.contour.locate, stops)
-        for name, values in locus.items():
+    def _finite(self, stops: Floats) -> Locus:
+        locus = self._located(stops)
+        for name, values in locus._asdict().items():
             if np.any(bad := ~np.isfinite(values)):
                 at, *lane = _first(bad)
                 raise self._refusal(tuple(lane), f"{name} is {values[bad][0]} at parameter {stops[at, *lane]:.6g}")
         return locus
 
-    def _refuse_falling(self, locus: _Broadcast) -> None:
+    def _refuse_falling(self, locus: Locus) -> None:
         """Refuse an x or a slope angle that falls along the contour; of several stretches the middle one is named."""
         for name, values, unit in (("x", locus.x, ""), ("slope angle", locus.slope_angle, " rad")):
             falls = np.diff(values, axis=0) < -_SAME * (1.0 if unit else np.abs(values[1:]))
@@ -162,40 +166,30 @@ class _Checked:
                 )
 
     def _refuse_rates(self, stops: Floats) -> None:
-        contour = self.contour
-        pairs: tuple[tuple[str, str, Rate, Rate], ...]
+        contour, located = self.contour, self._located
+        pairs: dict[tuple[str, str], tuple[Rate, Rate]]
         if isinstance(contour, Graph):
 
             def derivative(order: int) -> Rate:
                 return lambda x: np.broadcast_to(contour.derivatives(x)[order], x.shape)
 
-            pairs = (("g'", "g", derivative(1), derivative(0)), ("g''", "g'", derivative(2), derivative(1)))
+            pairs = {("g'", "g"): (derivative(1), derivative(0)), ("g''", "g'"): (derivative(2), derivative(1))}
         else:
 
-            def rate(of: Callable[[_Broadcast], Floats]) -> Rate:
-                return lambda p: of(_Broadcast(contour.locate, p))
+            def along(direction: Callable[[Floats], Floats]) -> Rate:
+                return lambda p: (at := located(p)).arclength_rate * direction(at.slope_angle)
 
-            pairs = (
-                (
-                    "arclength_rate · cos(slope_angle)",
-                    "x",
-                    rate(lambda at: at.arclength_rate * np.cos(at.slope_angle)),
-                    rate(lambda at: at.x),
-                ),
-                (
-                    "arclength_rate · sin(slope_angle)",
-                    "y",
-                    rate(lambda at: at.arclength_rate * np.sin(at.slope_angle)),
-                    rate(lambda at: at.y),
-                ),
-                ("slope_rate", "slope_angle", rate(lambda at: at.slope_rate), rate(lambda at: at.slope_angle)),
-            )
-        for name, whose, function, of in pairs:
+            pairs = {
+                ("arclength_rate · cos(slope_angle)", "x"): (along(np.cos), lambda p: located(p).x),
+                ("arclength_rate · sin(slope_angle)", "y"): (along(np.sin), lambda p: located(p).y),
+                ("slope_rate", "slope_angle"): (lambda p: located(p).slope_rate, lambda p: located(p).slope_angle),
+            }
+        for (name, whose), (function, of) in pairs.items():
             found = mismatch(function, of, stops)
             if found is None:
                 continue
             ends = np.array([found.left, found.right])
-            x = [_text(v) for v in _Broadcast(contour.locate, self._each(ends)).x[_of(found.lane)]]
+            x = [_text(v) for v in self._located(self._each(ends)).x[_of(found.lane)]]
             if np.isnan(found.miss):
                 raise self._refusal(found.lane, f"{name} jumps at x ≈ {x[1]}: name the parameter there in `knots`")
             raise self._refusal(
@@ -203,7 +197,7 @@ class _Checked:
                 f"{name} is not the derivative of {whose}: from x = {x[0]} to {x[1]} they differ by {found.miss:.3g}",
             )
 
-    def _refuse_straight(self, locus: _Broadcast) -> None:
+    def _refuse_straight(self, locus: Locus) -> None:
         flat = (locus.slope_rate <= 0.0) & (locus.arclength_rate > 0.0)
         if np.any(straight := sliding_window_view(flat, _STRAIGHT, axis=0).all(axis=-1)):
             at, *lane = _first(straight)
@@ -211,7 +205,7 @@ class _Checked:
             raise self._refusal(tuple(lane), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
 
     def _refuse_searches(self, stops: Floats) -> None:
-        contour, locus = self.contour, _Broadcast(self.contour.locate, stops)
+        contour, locus = self.contour, self._located(stops)
         size = np.abs(locus.x).max(axis=0) + np.abs(locus.y).max(axis=0)
         x = contour.locate(contour.parameter_of_x(locus.x)).x
         angle = contour.locate(contour.parameter_of_slope(locus.slope_angle)).slope_angle
@@ -234,25 +228,12 @@ class _Checked:
         shape = self.shape or (1,)
         index = tuple(axis.ravel() for axis in np.indices(shape))
         picked = self.contour.broadcast_to(shape).take(index)
-        y = _Broadcast(self.contour.locate, stops).y.reshape(len(stops), -1)
+        y = self._located(stops).y.reshape(len(stops), -1)
         found = np.broadcast_to(picked.locate(stops.reshape(y.shape)).y, y.shape)
         if np.any(bad := ~(np.abs(found - y) <= _SAME * np.abs(y).max())):
             raise self._refusal(
                 (), f"picked by broadcast_to and take it is at y = {found[bad][0]:.6g}, not {y[bad][0]:.6g}"
             )
-
-
-class _Broadcast:
-    """A locus of which all members have the shape of the parameters."""
-
-    def __init__(self, locate: Callable[[Floats], Locus], stops: Floats) -> None:
-        locus = locate(stops)
-        self.x, self.y, self.slope_angle, self.arclength_rate, self.slope_rate = (
-            np.broadcast_to(np.asarray(values, dtype=float), stops.shape) for values in locus
-        )
-
-    def items(self) -> list[tuple[str, Floats]]:
-        return [(name, values) for name, values in vars(self).items()]
 
 
 def _first(bad: ArrayLike) -> Lane:

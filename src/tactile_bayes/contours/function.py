@@ -111,7 +111,7 @@ def from_function(
     if (slope is None) != (curvature is None):
         raise ContourError("from_function: give both slope and curvature, or none of them")
     if slope is None or curvature is None:
-        interpolant = _resolved(g, lo, hi, named)
+        interpolant = _resolved(_Named(g, named), lo, hi)
         contour = FunctionContour(interpolant, interpolant.deriv(), interpolant.deriv(2), lo, hi, named)
     else:
         contour = FunctionContour(g, slope, curvature, lo, hi, named)
@@ -120,57 +120,65 @@ def from_function(
     return contour
 
 
-def _sampled(function: Function, x: Floats, what: str) -> Floats:
-    try:
-        with np.errstate(all="ignore"):  # what is not finite is refused below
-            values = np.asarray(function(x), dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ContourError(
-            f"from_function: {what} does not work on arrays ({error}): use functions of NumPy, np.cosh instead of "
-            "math.cosh, or wrap it, np.vectorize(g)"
-        ) from error
-    if values.shape != x.shape:
-        raise ContourError(
-            f"from_function: for x of shape {x.shape} {what} gives {values.shape}: it must work on arrays, element by "
-            "element (np.vectorize helps)"
-        )
-    bad = ~np.isfinite(values)
-    if np.any(bad):
-        raise ContourError(f"from_function: {what} is {values[bad][0]} at x = {x[bad][0]:.6g}: shrink the domain")
-    return values
+@dataclass(frozen=True)
+class _Named:
+    """A function with the name that refusals give it, of which all values must be finite."""
+
+    function: Function
+    name: str
+
+    def __call__(self, x: Floats) -> Floats:
+        try:
+            with np.errstate(all="ignore"):  # what is not finite is refused below
+                values = np.asarray(self.function(x), dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ContourError(
+                f"from_function: {self.name} does not work on arrays ({error}): use functions of NumPy, np.cosh "
+                "instead of math.cosh, or wrap it, np.vectorize(g)"
+            ) from error
+        if values.shape != x.shape:
+            raise ContourError(
+                f"from_function: for x of shape {x.shape} {self.name} gives {values.shape}: it must work on arrays, "
+                "element by element (np.vectorize helps)"
+            )
+        bad = ~np.isfinite(values)
+        if np.any(bad):
+            where = f"{values[bad][0]} at x = {x[bad][0]:.6g}"
+            raise ContourError(f"from_function: {self.name} is {where}: shrink the domain")
+        return values
 
 
-def _resolved(g: Function, lo: float, hi: float, named: str) -> Chebyshev:
-    interpolant = _interpolant(g, lo, hi, named)
+def _resolved(g: _Named, lo: float, hi: float) -> Chebyshev:
+    interpolant = _interpolant(g, lo, hi)
     if interpolant is not None:
         return interpolant
     x = _probes(lo, hi, _MANY_PROBES)
-    heights = _sampled(g, x, named)
+    heights = g(x)
     _refuse_dents(x, heights)
-    best = Chebyshev.interpolate(lambda x: _sampled(g, x, named), _MAX_DEGREE, domain=[lo, hi])
+    best = Chebyshev.interpolate(g, _MAX_DEGREE, domain=[lo, hi])
     worst = x[np.argmax(np.abs(best(x) - heights))]
-    at = _rough_place(g, lo, hi, worst, named)
+    at = _rough_place(g, lo, hi, worst)
     for share in (0.1, 0.01, 0.001):
         near = _probes(max(lo, at - share * (hi - lo)), min(hi, at + share * (hi - lo)), _MANY_PROBES)
-        _refuse_dents(near, _sampled(g, near, named))
+        _refuse_dents(near, g(near))
     gap = 0.01 * (hi - lo)
-    if all(_interpolant(g, *part, named) for part in ((lo, at - gap), (at + gap, hi)) if part[0] < part[1]):
+    if all(_interpolant(g, *part) for part in ((lo, at - gap), (at + gap, hi)) if part[0] < part[1]):
         join = f"join two functions there, Joined(left, right, x={at:.6g})"
-        advice = join if _may_be_joined(g, lo, at, hi, named) else f"give slope and curvature, or if they jump, {join}"
-        raise ContourError(f"from_function: {named} is not smooth enough at x ≈ {at:.6g}: {advice}")
+        advice = join if _may_be_joined(g, lo, at, hi) else f"give slope and curvature, or if they jump, {join}"
+        raise ContourError(f"from_function: {g.name} is not smooth enough at x ≈ {at:.6g}: {advice}")
     raise ContourError(
-        f"from_function: {named} is not smooth enough on ({lo:g}, {hi:g}) for a polynomial of degree {_MAX_DEGREE}: "
+        f"from_function: {g.name} is not smooth enough on ({lo:g}, {hi:g}) for a polynomial of degree {_MAX_DEGREE}: "
         "give slope and curvature, shrink the domain, or join smooth parts with Joined"
     )
 
 
-def _interpolant(g: Function, lo: float, hi: float, named: str) -> Chebyshev | None:
+def _interpolant(g: _Named, lo: float, hi: float) -> Chebyshev | None:
     """The interpolant that is g up to rounding, at its nodes and between them, if there is one."""
     between = _probes(lo, hi, _MANY_PROBES)
-    heights = _sampled(g, between, named)
+    heights = g(between)
     degree = 16
     while degree <= _MAX_DEGREE:
-        interpolant = Chebyshev.interpolate(lambda x: _sampled(g, x, named), degree, domain=[lo, hi])
+        interpolant = Chebyshev.interpolate(g, degree, domain=[lo, hi])
         size = np.abs(interpolant.coef)
         small = _RESOLVED * np.sqrt(degree) * size.max()
         found = np.abs(interpolant(between) - heights).max() <= _REFOUND * small
@@ -180,32 +188,32 @@ def _interpolant(g: Function, lo: float, hi: float, named: str) -> Chebyshev | N
     return None
 
 
-def _may_be_joined(g: Function, lo: float, at: float, hi: float, named: str) -> bool:
+def _may_be_joined(g: _Named, lo: float, at: float, hi: float) -> bool:
     """Whether the parts on both sides of a place are smooth up to there, and the slope does not fall."""
     if not lo < at < hi:
         return False
-    left, right = _interpolant(g, lo, at, named), _interpolant(g, at, hi, named)
+    left, right = _interpolant(g, lo, at), _interpolant(g, at, hi)
     return left is not None and right is not None and bool(left.deriv()(at) <= right.deriv()(at) + SAME_SLOPE)
 
 
-def _rough_place(g: Function, lo: float, hi: float, near: float, named: str) -> float:
+def _rough_place(g: _Named, lo: float, hi: float, near: float) -> float:
     """Where a function is not smooth: in the left, the middle or the right half, whichever is worst, and so on."""
-    size, width = np.abs(_sampled(g, _probes(lo, hi), named)).max(), hi - lo
+    size, width = np.abs(g(_probes(lo, hi))).max(), hi - lo
     lo, hi = max(lo, near - 0.02 * width), min(hi, near + 0.02 * width)
     while hi - lo > 1e-6 * width:
         quarter = 0.25 * (hi - lo)
         halves = [(start, start + 2.0 * quarter) for start in (lo, lo + quarter, lo + 2.0 * quarter)]
-        misses = [_patch_miss(g, *half, named) for half in halves]
+        misses = [_patch_miss(g, *half) for half in halves]
         if max(misses) <= 10.0 * _RESOLVED * size:
             break
         lo, hi = halves[int(np.argmax(misses))]
     return float(np.round(0.5 * (lo + hi), -int(np.ceil(np.log10(0.5 * (hi - lo)))))) + 0.0
 
 
-def _patch_miss(g: Function, lo: float, hi: float, named: str) -> float:
-    patch = Chebyshev.interpolate(lambda x: _sampled(g, x, named), _PATCH, domain=[lo, hi])
+def _patch_miss(g: _Named, lo: float, hi: float) -> float:
+    patch = Chebyshev.interpolate(g, _PATCH, domain=[lo, hi])
     x = _probes(lo, hi, 2 * _PATCH)
-    return float(np.abs(patch(x) - _sampled(g, x, named)).max())
+    return float(np.abs(patch(x) - g(x)).max())
 
 
 def _probes(lo: float, hi: float, count: int = _PROBES) -> Floats:
@@ -217,26 +225,19 @@ def _refuse_other_derivatives(contour: FunctionContour) -> None:
     """Each derivative must add up to what it is the derivative of, and not jump."""
     width = contour.right - contour.left
     x = _probes(contour.left, contour.right)
-    pairs = (("slope", contour.slope, "function", contour.g), ("curvature", contour.curvature, "slope", contour.slope))
-    for name, derivative, whose, of in pairs:
-
-        def rate(x: Floats, name: str = name, derivative: Function = derivative) -> Floats:
-            return _sampled(derivative, x, f"the {name}")
-
-        def function(x: Floats, whose: str = whose, of: Function = of) -> Floats:
-            return _sampled(of, x, f"the {whose}")
-
-        found = mismatch(rate, function, x)
+    g, slope = _Named(contour.g, "the function"), _Named(contour.slope, "the slope")
+    for rate, of in ((slope, g), (_Named(contour.curvature, "the curvature"), slope)):
+        found = mismatch(rate, of, x)
         if found is not None and np.isnan(found.miss):
             at = float(np.round(found.right / width, 12) * width) + 0.0
             before, after = rate(np.array([found.left, found.right]))
             raise ContourError(
-                f"from_function: the {name} given jumps at x ≈ {at:.6g}, from {before:.3g} to {after:.3g}: the contour "
-                f"is not smooth there; join two functions there, Joined(left, right, x={at:.6g})"
+                f"from_function: {rate.name} given jumps at x ≈ {at:.6g}, from {before:.3g} to {after:.3g}: the "
+                f"contour is not smooth there; join two functions there, Joined(left, right, x={at:.6g})"
             )
         if found is not None:
             raise ContourError(
-                f"from_function: the {name} given is not the derivative of the {whose}: from x = "
+                f"from_function: {rate.name} given is not the derivative of {of.name}: from x = "
                 f"{found.left:.6g} to {found.right:.6g} they differ by {found.miss:.3g}"
             )
 
@@ -255,7 +256,7 @@ def _refuse_dents(x: Floats, heights: Floats) -> None:
 
 def _refuse_unless_convex(contour: FunctionContour) -> None:
     x = _probes(contour.left, contour.right)
-    bend = _sampled(contour.curvature, x, "the curvature")
+    bend = _Named(contour.curvature, "the curvature")(x)
     concave = bend < -_CONVEX * np.abs(bend).max()
     straight = (bend[1:] <= 0.0) & (bend[:-1] <= 0.0)
     if np.any(concave):

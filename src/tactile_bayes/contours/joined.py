@@ -164,12 +164,12 @@ class Joined(Contour):
         return self._joint[0].shape
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Joined:
-        return self._each(lambda half: half.broadcast_to(shape), lambda value: np.broadcast_to(value, shape))
+        return self._both(lambda half: half.broadcast_to(shape), lambda value: np.broadcast_to(value, shape))
 
     def take(self, index: Index) -> Joined:
-        return self._each(lambda half: half.take(index), lambda value: value[index])
+        return self._both(lambda half: half.take(index), lambda value: value[index])
 
-    def _each(self, of_half: Callable[[Contour], Contour], of_value: Callable[[Floats], Floats]) -> Joined:
+    def _both(self, of_half: Callable[[Contour], Contour], of_value: Callable[[Floats], Floats]) -> Joined:
         other = object.__new__(type(self))  # the halves have been checked, and this is called in inner loops
         other.__dict__.update(
             left=of_half(self.left),

@@ -1,37 +1,22 @@
-"""Ovals: what circles and ellipses share."""
+"""Ovals: circles, of which one is profile III of the paper, and ellipses."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Parameter, finite, refuse_unless
+from tactile_bayes.contours.base import Floats, Locus, Parameter, Vertexed, alike
 from tactile_bayes.contours.halves import OVAL, Half, Halves
 
-__all__ = ["Oval"]
+__all__ = ["Circle", "Ellipse"]
 
 
-class Oval(Contour):
+class _Oval(Vertexed):
     """Lower half of an oval; its parameter is the eccentric angle, counted from the lowest point."""
-
-    sizes: ClassVar[Mapping[str, str]]
-    """What its positive parameters are, by name."""
-
-    q: Parameter
-    x_c: Parameter
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        family = type(self).__name__
-        for name, what in self.sizes.items():
-            size = getattr(self, name)
-            rule = f"the {what} {name} must be positive and finite"
-            refuse_unless(np.greater(size, 0.0) & np.isfinite(size), family, rule, **{name: size})
-        refuse_unless(finite(self.q, self.x_c), family, "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
     @property
     @abstractmethod
@@ -61,3 +46,107 @@ class Oval(Contour):
         with np.errstate(invalid="ignore"):
             sunk = offset**2 / (a + np.sqrt((a - offset) * (a + offset)))
         return np.asarray(self.q + b / a * sunk)
+
+
+@dataclass(frozen=True, eq=False)
+class Circle(_Oval):
+    """Lower half of a circle, y = q + r − √(r² − (x − x_c)²); it ends where it stands upright, at x = x_c ± r.
+
+    Parameters
+    ----------
+    r : array_like
+        Radius, > 0 [length].
+    q : array_like
+        Height of the lowest point [length].
+    x_c : array_like
+        Position of the lowest point [length].
+
+    Raises
+    ------
+    ContourError
+        If r is not positive, a parameter is not finite, or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import Circle
+    >>> Circle(1.0, q=0.3).radius_of_curvature([-0.5, 0.0, 0.5])
+    array([1., 1., 1.])
+    """
+
+    sizes: ClassVar = {"r": "the radius r must be positive and finite"}
+
+    r: Parameter
+    q: Parameter
+    x_c: Parameter = 0.0
+
+    @property
+    def half_axes(self) -> tuple[Parameter, Parameter]:
+        return self.r, self.r
+
+    def locate(self, parameter: ArrayLike) -> Locus:
+        alpha = np.asarray(parameter, dtype=float)
+        x, y = self.x_c + self.r * np.sin(alpha), self.q + 2.0 * self.r * np.sin(0.5 * alpha) ** 2
+        x, y, alpha, radius = alike(x, y, alpha, self.r + 0.0 * alpha)
+        return Locus(x, y, alpha, radius, np.ones_like(alpha))
+
+    def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
+        alpha = np.asarray(slope_angle, dtype=float)
+        return np.where(np.abs(alpha) <= 0.5 * np.pi, alpha, np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipse(_Oval):
+    """Lower half of an ellipse, (x − x_c)²/a² + (y − q − b)²/b² = 1; it ends where it stands upright, at x = x_c ± a.
+
+    Parameters
+    ----------
+    a : array_like
+        Horizontal half-axis, > 0 [length].
+    b : array_like
+        Vertical half-axis, > 0 [length].
+    q : array_like
+        Height of the lowest point [length].
+    x_c : array_like
+        Position of the lowest point [length].
+
+    Raises
+    ------
+    ContourError
+        If a half-axis is not positive, a parameter is not finite, or shapes do not broadcast.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import Ellipse
+    >>> Ellipse(2.0, 0.5, q=0.3).radius_of_curvature(0.0)  # a²/b
+    np.float64(8.0)
+    """
+
+    sizes: ClassVar = {name: f"the half-axis {name} must be positive and finite" for name in "ab"}
+
+    a: Parameter
+    b: Parameter
+    q: Parameter
+    x_c: Parameter = 0.0
+
+    @property
+    def half_axes(self) -> tuple[Parameter, Parameter]:
+        return self.a, self.b
+
+    def locate(self, parameter: ArrayLike) -> Locus:
+        t = np.asarray(parameter, dtype=float)  # the eccentric angle from the lowest point
+        a, b = self.a, self.b
+        sin, cos = np.sin(t), np.cos(t)
+        speed2 = (a * cos) ** 2 + (b * sin) ** 2
+        x, y, slope, speed, bend = alike(
+            self.x_c + a * sin,
+            self.q + 2.0 * b * np.sin(0.5 * t) ** 2,
+            np.arctan2(b * sin, a * cos),
+            np.sqrt(speed2),
+            a * b / speed2,
+        )
+        return Locus(x, y, slope, speed, bend)
+
+    def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
+        alpha = np.asarray(slope_angle, dtype=float)
+        t = np.arctan2(self.a * np.sin(alpha), self.b * np.cos(alpha))
+        return np.where(np.abs(alpha) <= 0.5 * np.pi, t, np.nan)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from tactile_bayes.contours.base import Contour
-from tactile_bayes.contours.circle import Circle
 from tactile_bayes.contours.joined import Joined
+from tactile_bayes.contours.oval import Circle
 from tactile_bayes.contours.parabola import Parabola
 from tactile_bayes.contours.power_law import PowerLaw
 from tactile_bayes.errors import ContourError
@@ -37,12 +37,12 @@ def paper_profile(name: Literal["I", "II", "III", "IV"], q: float) -> Contour:
     >>> paper_profile("II", q=0.5)
     Parabola(a=0.5, q=0.5, x_c=0.0)
     """
-    if name == "I":
-        return Parabola(0.7, q)
-    if name == "II":
-        return Parabola(0.5, q)
-    if name == "III":
-        return Circle(1.0, q)
-    if name == "IV":
-        return Joined(Parabola(0.5, q), PowerLaw(1.0, 4.0, q))
-    raise ContourError(f"there is no profile {name!r}: choose 'I', 'II', 'III' or 'IV'")
+    profiles: dict[str, Contour] = {
+        "I": Parabola(0.7, q),
+        "II": Parabola(0.5, q),
+        "III": Circle(1.0, q),
+        "IV": Joined(Parabola(0.5, q), PowerLaw(1.0, 4.0, q)),
+    }
+    if name not in profiles:
+        raise ContourError(f"there is no profile {name!r}: choose 'I', 'II', 'III' or 'IV'")
+    return profiles[name]

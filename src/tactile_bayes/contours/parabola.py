@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, alike, finite, refuse_unless
+from tactile_bayes.contours.base import Floats, Locus, Parameter, Vertexed, alike
 from tactile_bayes.contours.halves import PARABOLA, Half, Halves
 
 __all__ = ["Parabola"]
 
 
 @dataclass(frozen=True, eq=False)
-class Parabola(Contour):
+class Parabola(Vertexed):
     """y = a (x − x_c)² + q.
 
     Parameters
@@ -40,19 +41,11 @@ class Parabola(Contour):
     (np.float64(1.0), np.float64(0.8))
     """
 
+    sizes: ClassVar = {"a": "a must be positive, else the object is not strictly convex"}
+
     a: Parameter
     q: Parameter
     x_c: Parameter = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        refuse_unless(
-            np.greater(self.a, 0.0) & np.isfinite(self.a),
-            "Parabola",
-            "a must be positive, else the object is not strictly convex",
-            a=self.a,
-        )
-        refuse_unless(finite(self.q, self.x_c), "Parabola", "q and x_c must be finite", q=self.q, x_c=self.x_c)
 
     @property
     def domain(self) -> tuple[Floats, Floats]:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Contour, Floats, Locus, Parameter, alike, finite, refuse_unless
+from tactile_bayes.contours.base import Floats, Locus, Parameter, Vertexed, alike, refuse_unless
 from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
 
 __all__ = ["PowerLaw"]
 
 _LEAST_EXPONENT, _GREATEST_EXPONENT = 1.1, 50.0
 
+_STEEPEST = 1e300
+"""Greatest factor that follows from a width: more is beyond what numbers hold."""
+
 
 @dataclass(frozen=True, eq=False)
-class PowerLaw(Contour):
+class PowerLaw(Vertexed):
     """y = a |x − x_c|ⁿ + q.
 
     For n > 2 the curvature vanishes at the vertex, and only there. For n < 2 it grows beyond all bounds there: the
@@ -46,6 +50,8 @@ class PowerLaw(Contour):
     np.float64(0.0)
     """
 
+    sizes: ClassVar = {"a": "a must be positive, else the object is not strictly convex"}
+
     a: Parameter
     n: Parameter
     q: Parameter
@@ -53,12 +59,6 @@ class PowerLaw(Contour):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        refuse_unless(
-            np.greater(self.a, 0.0) & np.isfinite(self.a),
-            "PowerLaw",
-            "a must be positive, else the object is not strictly convex",
-            a=self.a,
-        )
         refuse_unless(
             np.greater_equal(self.n, _LEAST_EXPONENT),
             "PowerLaw",
@@ -71,7 +71,26 @@ class PowerLaw(Contour):
             f"n must be at most {_GREATEST_EXPONENT:g}: above, the bottom is as good as straight",
             n=self.n,
         )
-        refuse_unless(finite(self.q, self.x_c), "PowerLaw", "q and x_c must be finite", q=self.q, x_c=self.x_c)
+
+    @classmethod
+    def of_width(cls, w: Parameter, n: Parameter, q: Parameter, x_c: Parameter = 0.0) -> Self:
+        """(y − q)/w = (|x − x_c|/w)ⁿ: as high above its vertex as it is wide at w > 0 [length].
+
+        Examples
+        --------
+        >>> PowerLaw.of_width(0.5, 3, q=0.3)
+        PowerLaw(a=4.0, n=3.0, q=0.3, x_c=0.0)
+        """
+        w = np.asarray(w, dtype=float)[()]
+        refuse_unless(np.greater(w, 0.0) & np.isfinite(w), "PowerLaw", "w must be positive and finite", w=w)
+        with np.errstate(over="ignore", divide="ignore"):  # where it is narrow, or wide, and n is large
+            a = np.clip(w ** (1.0 - n), 1.0 / _STEEPEST, _STEEPEST)
+        return cls(a, n, q, x_c)
+
+    @property
+    def w(self) -> Floats:
+        """The width of `of_width`."""
+        return np.asarray(np.asarray(self.a) ** (1.0 / (1.0 - np.asarray(self.n))))
 
     @property
     def domain(self) -> tuple[Floats, Floats]:

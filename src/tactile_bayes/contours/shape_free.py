@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -11,15 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from tactile_bayes import chebyshev
-from tactile_bayes.contours.base import (
-    Floats,
-    Locus,
-    Parameter,
-    as_parameter,
-    common_shape,
-    finite,
-    refuse_unless,
-)
+from tactile_bayes.contours.base import Floats, Locus, Parameter
 from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
 
@@ -74,9 +65,8 @@ class ShapeFree(Tabled):
     at: float = 0.0
 
     def __post_init__(self) -> None:
-        names = ("slope_angles", "log_radius", "x", "y", "at")
-        given = {name: np.asarray(as_parameter("ShapeFree", name, getattr(self, name))) for name in names}
-        knots, values, at = given["slope_angles"], given["log_radius"], given["at"]
+        self._take_arrays("slope_angles", "log_radius", "x", "y", "at")
+        knots, values, at = self.slope_angles, self.log_radius, np.asarray(self.at)
         if knots.ndim != 1 or knots.size < 4 or not np.all(np.diff(knots) > 0.0) or np.any(np.abs(knots) > 0.5 * np.pi):
             raise ContourError("ShapeFree: slope_angles must be at least 4 increasing angles in [−π/2, π/2] radians")
         if values.shape[-1:] != knots.shape:
@@ -85,20 +75,8 @@ class ShapeFree(Tabled):
             )
         if at.ndim or not knots[0] <= at <= knots[-1]:
             raise ContourError(f"ShapeFree: at = {self.at} is not among the slope angles {knots[0]:g} to {knots[-1]:g}")
-        shape = common_shape(
-            "ShapeFree", **{"log_radius[..., 0]": values.shape[:-1], "x": given["x"].shape, "y": given["y"].shape}
-        )
-        refuse_unless(np.isfinite(values), "ShapeFree", "log_radius must be finite", log_radius=values)
-        refuse_unless(finite(given["x"], given["y"]), "ShapeFree", "x and y must be finite", x=given["x"], y=given["y"])
-        self.__dict__.update(
-            slope_angles=knots,
-            log_radius=np.broadcast_to(values, (*shape, knots.size)),
-            x=np.broadcast_to(given["x"], shape),
-            y=np.broadcast_to(given["y"], shape),
-            at=float(at),
-            _row=np.arange(math.prod(shape)).reshape(shape),
-        )
-        self.__dict__["_table"] = self._integrated()
+        self._share_shape()
+        self.__dict__.update(at=float(at), _table=self._integrated())
         x, y = self._evaluate(at)[1:]
         self.__dict__["_table"][..., 1:, 0] += np.stack([self.x - x, self.y - y], axis=-1).reshape(-1, 1, 2)
 

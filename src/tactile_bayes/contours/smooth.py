@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -11,16 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes import chebyshev
-from tactile_bayes.contours.base import (
-    Floats,
-    Index,
-    Locus,
-    Parameter,
-    as_parameter,
-    common_shape,
-    finite,
-    refuse_unless,
-)
+from tactile_bayes.contours.base import Floats, Index, Locus, Parameter
 from tactile_bayes.contours.halves import SLOPES, Half, Halves
 from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
@@ -75,25 +65,11 @@ class Smooth(Tabled):
     x_c: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        given = {
-            name: np.asarray(as_parameter("Smooth", name, getattr(self, name))) for name in ("log_radius", "q", "x_c")
-        }
-        values = given["log_radius"]
+        self._take_arrays("log_radius", "q", "x_c")
+        values = self.log_radius
         if values.ndim < 1 or values.shape[-1] < 2:
             raise ContourError(f"Smooth: log_radius of shape {values.shape} has not at least 2 values for a contour")
-        shape = common_shape(
-            "Smooth", **{"log_radius[..., 0]": values.shape[:-1], "q": given["q"].shape, "x_c": given["x_c"].shape}
-        )
-        refuse_unless(np.isfinite(values), "Smooth", "log_radius must be finite", log_radius=values)
-        refuse_unless(
-            finite(given["q"], given["x_c"]), "Smooth", "q and x_c must be finite", q=given["q"], x_c=given["x_c"]
-        )
-        self.__dict__.update(
-            log_radius=np.broadcast_to(values, (*shape, values.shape[-1])),
-            q=np.broadcast_to(given["q"], shape),
-            x_c=np.broadcast_to(given["x_c"], shape),
-            _row=np.arange(math.prod(shape)).reshape(shape),
-        )
+        self._share_shape()
         self.__dict__["_table"] = _tabulated(chebyshev.coefficients(self.log_radius.reshape(-1, values.shape[-1])))
 
     @staticmethod

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tactile_bayes.datasets.laws import Law
+from itertools import groupby
+
 from tactile_bayes.datasets.manifest import Manifest
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.rod import LARGEST_STRAIN
@@ -43,12 +44,16 @@ def card(spec: Specification, manifest: Manifest) -> str:
     for name, group in zip(_names(spec), spec.groups, strict=True):
         share = "in turn" if spec.each_group else f"weight {group.weight:g}"
         lines.append(f"| **{name}** | {share if len(spec.groups) > 1 else 'always'} |")
-        lines += [f"| {name}: {parameter} | {_words(law)} |" for parameter, law in group.laws.items()]
-    lines += [f"| rod: {name} | {_words(law)} |" for name, law in spec.rod.items()]
+        # Weights of a shape-free contour, of which there are many, have one row where they have one law.
+        alike = groupby(group.laws.items(), lambda entry: entry[1].words if entry[0].startswith("z_") else entry[0])
+        for _, entries in alike:
+            (first, law), *others = entries
+            lines.append(f"| {name}: {f'{first} to {others[-1][0]}' if others else first} | {law.words} |")
+    lines += [f"| rod: {name} | {law.words} |" for name, law in spec.rod.items()]
     for number, pair in enumerate(spec.bases, start=1):
         pivot = "pivot" if bases == 1 else f"pivot {number}"
-        lines += [f"| {pivot}: {axis} | {_words(law)} |" for axis, law in zip("xy", pair, strict=True)]
-    lines += [f"| load cell: {name} | {_words(law)} |" for name, law in spec.load_cell.items()]
+        lines += [f"| {pivot}: {axis} | {law.words} |" for axis, law in zip("xy", pair, strict=True)]
+    lines += [f"| load cell: {name} | {law.words} |" for name, law in spec.load_cell.items()]
     drive = spec.drive
     if drive.begin is None:
         lines.append(f"| drive angles | from first contact to snap-off, and {drive.margin:g} of that on either side |")
@@ -162,23 +167,3 @@ def _not_in_the_files(spec: Specification) -> list[str]:
             "",
         ]
     return lines
-
-
-def _words(law: Law) -> str:
-    numbers = [f"{number:g}" for number in law.numbers]
-    match law.kind:
-        case "constant":
-            return numbers[0]
-        case "uniform":
-            return f"uniform from {numbers[0]} to {numbers[1]}"
-        case "log_uniform":
-            return f"log-uniform from {numbers[0]} to {numbers[1]}"
-        case "normal":
-            return f"normal, mean {numbers[0]}, standard deviation {numbers[1]}"
-        case "log_normal":
-            return f"log-normal, median {numbers[0]}, standard deviation of the logarithm {numbers[1]}"
-        case "choice":
-            return f"one of {', '.join(numbers)}"
-        case _:
-            axis = f", on the axis {law.axis}" if law.axis else ""
-            return f"each of {', '.join(numbers)}{axis}"

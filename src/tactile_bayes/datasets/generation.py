@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.contours.base import Contour
+from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS, rule_of
 from tactile_bayes.datasets.measurement import measure
-from tactile_bayes.datasets.specification import Specification
-from tactile_bayes.datasets.streams import CONTOUR, NORMAL, streams
+from tactile_bayes.datasets.specification import Specification, rule_of
+from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import Paths, trace
@@ -50,8 +50,7 @@ class Records:
     family: Index
     """Which group of the specification each contour is from, shape (n,)."""
     drawn: dict[str, Floats]
-    """By the keys of the specification's laws, shape (n,), and "contours[…].log_radius", shape (n, knots); NaN where
-    another family's."""
+    """By the keys of the specification's laws, shape (n,); NaN where another family's."""
     sweep: dict[str, NDArray[Any]]
     """Of each sweep, shape (n, sweeps): base_x, base_y, phases, events, and the largest strain of a thick rod."""
     sample: dict[str, NDArray[Any]]
@@ -90,7 +89,10 @@ _REMEDIES = {
 
 @threadpool_limits.wrap(limits=1)  # with more threads, products of matrices are rounded otherwise
 def generate_records(spec: Specification, begin: int, end: int) -> Records:
-    """Records from index `begin` to before `end`.
+    """Records from index `begin` to before `end`, by rejection sampling with look-ahead.
+
+    A record keeps the first of its draws that is a contour which every sweep reaches and leaves clear. Records that are
+    left draw twice as often ahead each time, since most of the cost is to begin, and later draws are thrown away.
 
     The random numbers of a record follow from the seed and its index alone, and those of its contour are drawn before
     all others; rounding may depend on which records are made together, so that bit by bit only the same stretch gives
@@ -102,66 +104,82 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         If of 1000 draws of a record none is a contour that every sweep can reach.
     """
     index = np.arange(begin, end)
-    uniform = streams(spec.seed, index, CONTOUR)
-    keys = [key for key, _ in spec.laws]
-    free = {g: draw for g, group in enumerate(spec.groups) if (draw := FAMILIES[group.family].draw_log_radius)}
-    normal = streams(spec.seed, index, NORMAL) if free else []
-    turns = _turns(spec, index)
-    drawn = {key: np.full(index.size, np.nan) for key in keys}
-    drawn |= {f"contours[{g}].{LOG_RADIUS}": np.full((index.size, KNOTS.size), np.nan) for g in free}
-    family = np.zeros(index.size, dtype=np.intp)
-    sweep: dict[str, NDArray[Any]] = {}
-    sample: dict[str, NDArray[Any]] = {}
-    redrawn: Counter[str] = Counter()
+    drawn = {key: np.full(index.size, np.nan) for key, _ in spec.laws}
+    records = Records(index, np.zeros(index.size, dtype=np.intp), drawn, {}, {}, Counter())
+    uniform, turns = streams(spec.seed, index, CONTOUR), _turns(spec, index)
     in_vain: list[tuple[Index, NDArray[Any]]] = []
     left, draws, ahead = np.arange(index.size), 0, 1
     while left.size:
         if draws == _MOST_DRAWS:
             reasons = [why for rows, whys in in_vain for why in whys[rows == left[0]].ravel()]
             raise _hopeless(int(index[left[0]]), Counter(reasons))
-        of_record = np.repeat(left, ahead)
-        shares = np.array([_shares(uniform[i], 1 + len(keys)) for i in of_record])
-        group = _group(spec, shares[:, 0], turns.get("contours"), of_record)
-        values = {
-            key: law.at(shares[:, 1 + k], turns[law.axis or key][of_record] if law.kind == "each" else of_record)
-            for k, (key, law) in enumerate(spec.laws)
-        }
-        normals = np.full((of_record.size, KNOTS.size if free else 0), np.nan)
-        for k in np.flatnonzero(np.isin(group, list(free))):
-            normals[k] = normal[of_record[k]].standard_normal(KNOTS.size)
-        for g, draw_log_radius in free.items():
-            parameters = {name: values[f"contours[{g}].{name}"] for name in spec.groups[g].laws}
-            values[f"contours[{g}].{LOG_RADIUS}"] = draw_log_radius(parameters, normals)
-        why = np.empty(of_record.size, dtype=object)
-        found = []
-        for g in np.unique(group).tolist():
-            among = np.flatnonzero(group == g)
-            why[among], tried = _tried(spec, g, {k: v[among] for k, v in values.items()})
-            found.append((g, among, tried))
-        is_good = (why == _GOOD).reshape(left.size, ahead)
-        before = is_good.cumsum(axis=1)
-        in_vain.append((left, why.reshape(left.size, ahead)))
-        redrawn.update(in_vain[-1][1][before == 0].tolist())
-        first = (is_good & (before == 1)).ravel()
-        for g, among, tried in found:
-            taken = np.flatnonzero(first[among])
-            chosen = among[taken]
-            kept = of_record[chosen]
-            family[kept] = g
-            for key in drawn:
-                if not key.startswith("contours[") or key.startswith(f"contours[{g}]."):
-                    drawn[key][kept] = values[key][chosen]
-            if tried is None or not taken.size:
-                continue
-            sweeps = len(spec.sweeps)
-            lane = sweeps * np.searchsorted(tried.built, taken)[:, None] + np.arange(sweeps)
-            _put(sweep, {name: rows[lane] for name, rows in _of_sweeps(spec, tried).items()}, kept, index.size)
-            for some in spec.blocks(kept.size):
-                _put(sample, _of_samples(tried, lane[some]), kept[some], index.size)
+        candidates = _drawn(spec, uniform, turns, np.repeat(left, ahead))
+        whys, tried = _tried(spec, candidates)
+        whys = whys.reshape(left.size, ahead)
+        is_good = whys == _GOOD
+        good_so_far = is_good.cumsum(axis=1)
+        in_vain.append((left, whys))
+        records.redrawn.update(whys[good_so_far == 0].tolist())
+        _keep(spec, records, candidates, tried, (is_good & (good_so_far == 1)).ravel())
         left, draws = left[~is_good.any(axis=1)], draws + ahead
         ahead = max(1, min(2 * ahead, max(_AT_ONCE, index.size) // max(left.size, 1), _MOST_DRAWS - draws))
-    measure(spec, index, drawn, sample)
-    return Records(index, family, drawn, sweep, sample, redrawn)
+    measure(spec, index, records.drawn, records.sample)
+    return records
+
+
+class _Candidates(NamedTuple):
+    """The next draws of some records."""
+
+    row: Index
+    """Of which record each is."""
+    group: Index
+    """From which group of the specification its contour is."""
+    values: dict[str, Floats]
+    """By the keys of all laws."""
+
+
+def _drawn(
+    spec: Specification, uniform: list[np.random.Generator], turns: Mapping[str, Index], row: Index
+) -> _Candidates:
+    """The next draw of each of these records; one that is named more than once draws again."""
+    count = 1 + len(spec.laws)
+    shares = np.array([_shares(uniform[i], count) for i in row])
+    if "contours" in turns:
+        group = turns["contours"][row]
+    else:
+        weights = np.cumsum([group.weight for group in spec.groups])
+        group = np.searchsorted(weights, shares[:, 0] * weights[-1], side="right")
+        group = np.minimum(group, len(spec.groups) - 1)
+    values = {
+        key: law.at(shares[:, 1 + k], turns[law.axis or key][row] if law.kind == "each" else row)
+        for k, (key, law) in enumerate(spec.laws)
+    }
+    return _Candidates(row, group, values)
+
+
+def _keep(
+    spec: Specification,
+    records: Records,
+    candidates: _Candidates,
+    tried: Mapping[int, _Tried],
+    is_kept: NDArray[np.bool_],
+) -> None:
+    """Put candidates into their records."""
+    count, sweeps = records.index.size, len(spec.sweeps)
+    for g, its in tried.items():
+        taken = np.flatnonzero(is_kept[its.candidate])
+        chosen = its.candidate[taken]
+        kept = candidates.row[chosen]
+        records.family[kept] = g
+        for key, values in records.drawn.items():
+            if not key.startswith("contours[") or key.startswith(f"contours[{g}]."):
+                values[kept] = candidates.values[key][chosen]
+        if taken.size:
+            lane = sweeps * taken[:, None] + np.arange(sweeps)
+            found = {name: rows[lane] for name, rows in _of_sweeps(spec, its).items()}
+            _put(records.sweep, found, kept, count)
+            for some in spec.blocks(kept.size):
+                _put(records.sample, _of_samples(its, lane[some]), kept[some], count)
 
 
 def _shares(stream: np.random.Generator, count: int) -> Floats:
@@ -189,18 +207,11 @@ def _turns(spec: Specification, index: Index) -> dict[str, Index]:
     return turns
 
 
-def _group(spec: Specification, share: Floats, turns: Index | None, left: Index) -> Index:
-    if turns is not None:
-        return turns[left]
-    weights = np.cumsum([group.weight for group in spec.groups])
-    return np.minimum(np.searchsorted(weights, share * weights[-1], side="right"), len(spec.groups) - 1)
-
-
 class _Tried(NamedTuple):
-    """Sweeps along the draws of one group that are contours: a lane each, those of a draw side by side."""
+    """Sweeps along the candidates of one group that are contours: a lane each, those of a candidate side by side."""
 
-    built: Index
-    """Which draws these are."""
+    candidate: Index
+    """Which candidates these are."""
     paths: Paths
     drive: Floats
     """Drive angles as seen in forward sweeps, shape (lanes, k); or shares of the way from first contact to snap-off,
@@ -208,24 +219,49 @@ class _Tried(NamedTuple):
     units: ManyUnits
 
 
-def _tried(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[NDArray[Any], _Tried | None]:
-    """Draws of one group: why each comes to nothing, `_GOOD` if it does not, and their sweeps."""
-    prefix = f"contours[{g}]."
-    parameters = {key.removeprefix(prefix): v for key, v in values.items() if key.startswith(prefix)}
-    why, contours = _built(spec.groups[g].family, parameters, len(next(iter(parameters.values()))))
-    if contours is None:
-        return why, None
-    built, sweeps = np.flatnonzero(why == _GOOD), len(spec.sweeps)
-    draw, place = np.repeat(built, sweeps), np.repeat(np.arange(built.size), sweeps)
+def _tried(spec: Specification, candidates: _Candidates) -> tuple[NDArray[Any], dict[int, _Tried]]:
+    """Why each candidate comes to nothing, `_GOOD` if it does not, and sweeps along contours by group."""
+    why, tried = np.full(candidates.row.size, _GOOD, dtype=object), dict[int, _Tried]()
+    for g in np.unique(candidates.group).tolist():
+        contours, built = _built(spec, g, candidates, why)
+        if contours is not None:
+            tried[g] = _swept(spec, contours, built, {key: v[built] for key, v in candidates.values.items()})
+            why[built] = _judged(tried[g].paths, len(spec.sweeps))
+    return why, tried
+
+
+def _built(spec: Specification, g: int, candidates: _Candidates, why: NDArray[Any]) -> tuple[Contour | None, Index]:
+    """The contours of a group, with all parameters arrays, and which candidates they are; why others are none."""
+    family = FAMILIES[spec.groups[g].family]
+    its = np.flatnonzero(candidates.group == g)
+
+    def contour(some: Index) -> Contour:
+        return family.contour({name: candidates.values[f"contours[{g}].{name}"][some] for name in family.parameters})
+
+    try:
+        return contour(its).broadcast_to(its.shape), its
+    except ContourError:
+        pass
+    for i in its:
+        try:
+            contour(np.array([i]))
+        except ContourError as error:
+            why[i] = f"{_NO_CONTOUR} ({rule_of(error)})"
+    its = its[why[its] == _GOOD]
+    return (contour(its).broadcast_to(its.shape) if its.size else None), its
+
+
+def _swept(spec: Specification, contours: Contour, candidate: Index, values: Mapping[str, Floats]) -> _Tried:
+    """Every sweep along contours, of which the values of all laws are given."""
+    sweeps = len(spec.sweeps)
+    place = np.repeat(np.arange(candidate.size), sweeps)
     base_x, base_y = (
-        np.stack([values[f"scan.bases[{b}][{axis}]"][built] for b, _ in spec.sweeps], axis=1).ravel() for axis in (0, 1)
+        np.stack([values[f"scan.bases[{b}][{axis}]"] for b, _ in spec.sweeps], axis=1).ravel() for axis in (0, 1)
     )
-    backward = np.tile([direction == "backward" for _, direction in spec.sweeps], built.size)
-    length, standoff, units = np.ones(draw.size), np.zeros(draw.size), ManyUnits(1.0, 1.0, 1.0)
+    backward = np.tile([direction == "backward" for _, direction in spec.sweeps], candidate.size)
+    length, standoff, units = np.ones(place.size), np.zeros(place.size), ManyUnits(1.0, 1.0, 1.0)
     if spec.rod:
-        length, rigidity, diameter = (
-            values[f"rod.{name}"][draw] for name in ("length", "flexural_rigidity", "diameter")
-        )
+        length, rigidity, diameter = (values[f"rod.{name}"][place] for name in spec.rod)
         standoff, units = 0.5 * diameter, ManyUnits(length, rigidity / length, rigidity / length**2)
     drive, way = spec.drive, np.linspace(0.0, 1.0, spec.drive.samples)
     if drive.begin is None or drive.end is None:
@@ -240,32 +276,16 @@ def _tried(spec: Specification, g: int, values: Mapping[str, Floats]) -> tuple[N
         relative=as_seen.ndim == 1,
         polished=False,
     )
+    return _Tried(candidate, paths, as_seen, units)
+
+
+def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
+    """Why candidates come to nothing of which so many sweeps each are side by side."""
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
         clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
     reasons = np.array([reach.words for reach in Reach], dtype=object)[fate]
-    why[built] = np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
-    return why, _Tried(built, paths, as_seen, units)
-
-
-def _built(family: str, parameters: Mapping[str, Floats], count: int) -> tuple[NDArray[Any], Contour | None]:
-    """Why each draw is no contour, `_GOOD` if it is one, and the contours of these, with all parameters arrays."""
-    definition = FAMILIES[family]
-    why = np.full(count, _GOOD, dtype=object)
-    try:
-        return why, definition.build(parameters).broadcast_to((count,))
-    except ContourError:
-        pass
-    for i in range(count):
-        try:
-            definition.build({name: values[i : i + 1] for name, values in parameters.items()})
-        except ContourError as error:
-            why[i] = f"{_NO_CONTOUR} ({rule_of(error)})"
-    built = np.flatnonzero(why == _GOOD)
-    if not built.size:
-        return why, None
-    some = {name: values[built] for name, values in parameters.items()}
-    return why, definition.build(some).broadcast_to((built.size,))
+    return np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
 
 
 def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:

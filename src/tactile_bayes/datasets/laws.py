@@ -3,19 +3,59 @@
 from __future__ import annotations
 
 import math
-import sys
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_bayes.checks import as_number
 from tactile_bayes.errors import SpecificationError
 
 __all__ = ["Law", "law_of"]
 
 Floats = NDArray[np.float64]
+
+
+class _Kind(NamedTuple):
+    """A law of two numbers."""
+
+    is_possible: Callable[[float, float], bool]
+    rule: str
+    """What they must be."""
+    words: str
+    at: Callable[[float, float, Floats], Any]
+    """The numbers at shares of the probability."""
+
+
+_KINDS = {
+    "uniform": _Kind(
+        lambda low, high: low < high,
+        "the first must be below the second",
+        "uniform from {} to {}",
+        lambda low, high, share: low + (high - low) * share,
+    ),
+    "log_uniform": _Kind(
+        lambda low, high: 0.0 < low < high,
+        "both must be positive, the first below the second",
+        "log-uniform from {} to {}",
+        lambda low, high, share: np.exp(math.log(low) + math.log(high / low) * share),
+    ),
+    "normal": _Kind(
+        lambda mean, deviation: deviation >= 0.0,
+        "they are mean and standard deviation, which is not negative",
+        "normal, mean {}, standard deviation {}",
+        lambda mean, deviation, share: mean + deviation * ndtri(_open(share)),
+    ),
+    "log_normal": _Kind(
+        lambda median, deviation: median > 0.0 and deviation >= 0.0,
+        "they are the median, positive, and the logarithm's standard deviation, which is not negative",
+        "log-normal, median {}, standard deviation of the logarithm {}",
+        lambda median, deviation, share: median * np.exp(deviation * ndtri(_open(share))),
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -42,24 +82,33 @@ class Law:
     def is_drawn(self) -> bool:
         return self.kind not in ("constant", "each")
 
+    @property
+    def least(self) -> float:
+        """The least number that it may give; the median of a log_normal one, which is positive throughout."""
+        if self.kind == "normal" and self.numbers[1]:
+            return -math.inf
+        return self.numbers[0] if self.kind in ("normal", "log_normal") else min(self.numbers)
+
+    @property
+    def words(self) -> str:
+        """For people."""
+        numbers = [f"{number:g}" for number in self.numbers]
+        if self.kind == "choice":
+            return f"one of {', '.join(numbers)}"
+        if self.kind == "each":
+            return f"each of {', '.join(numbers)}" + (f", on the axis {self.axis}" if self.axis else "")
+        return _KINDS[self.kind].words.format(*numbers) if self.kind in _KINDS else numbers[0]
+
     def at(self, share: Floats, turn: NDArray[np.intp]) -> Floats:
         """The numbers at shares of the probability, in [0, 1), of records whose turn in the list is given."""
-        first, second = self.numbers[0], self.numbers[-1]
-        match self.kind:
-            case "uniform":
-                return first + (second - first) * share
-            case "log_uniform":
-                return np.exp(math.log(first) + math.log(second / first) * share)
-            case "normal":
-                return first + second * ndtri(_open(share))
-            case "log_normal":
-                return np.asarray(first * np.exp(second * ndtri(_open(share))))
-            case "choice":
-                return np.array(self.numbers)[(share * len(self.numbers)).astype(np.intp)]
-            case "each":
-                return np.array(self.numbers)[turn]
-            case _:
-                return np.full(share.shape, first)
+        if self.kind == "choice":
+            return np.array(self.numbers)[(share * len(self.numbers)).astype(np.intp)]
+        if self.kind == "each":
+            return np.array(self.numbers)[turn]
+        if self.kind == "constant":
+            return np.full(share.shape, self.numbers[0])
+        first, second = self.numbers
+        return np.asarray(_KINDS[self.kind].at(first, second, share))
 
 
 def law_of(value: Any, key: str) -> Law:
@@ -77,8 +126,8 @@ def law_of(value: Any, key: str) -> Law:
     """
     if _is_number(value):
         return Law("constant", (float(value),))
-    kinds = "uniform, log_uniform, normal, log_normal, choice, each"
-    hint = f"give a number, or a law such as {{ uniform = [0.3, 0.8] }} (laws: {kinds})"
+    kinds = (*_KINDS, "choice", "each")
+    hint = f"give a number, or a law such as {{ uniform = [0.3, 0.8] }} (laws: {', '.join(kinds)})"
     axis = None
     if isinstance(value, dict) and "each" in value and "axis" in value:
         value = dict(value)
@@ -88,31 +137,20 @@ def law_of(value: Any, key: str) -> Law:
     if not isinstance(value, dict) or len(value) != 1:
         raise SpecificationError(f"{key} is {value!r}: {hint}")
     ((kind, numbers),) = value.items()
-    if kind not in kinds.split(", "):
+    if kind not in kinds:
         raise SpecificationError(f"{key} has the law {kind!r}, which there is not: {hint}")
     if not isinstance(numbers, list) or not numbers or not all(map(_is_number, numbers)):
         raise SpecificationError(f"{key}.{kind} is {numbers!r}: give a list of finite numbers")
-    law = Law(kind, tuple(float(number) for number in numbers), axis)
-    if kind in ("choice", "each"):
-        return law
-    if len(numbers) != 2:
+    if kind in _KINDS and len(numbers) != 2:
         raise SpecificationError(f"{key}.{kind} has {len(numbers)} numbers: give two")
-    first, second = law.numbers
-    rules = {
-        "uniform": (first < second, "the first must be below the second"),
-        "log_uniform": (0.0 < first < second, "both must be positive, the first below the second"),
-        "normal": (second >= 0.0, "they are mean and standard deviation, which is not negative"),
-        "log_normal": (first > 0.0 and second >= 0.0, "they are the median, positive, and the logarithm's standard "
-                       "deviation, which is not negative"),
-    }  # fmt: skip
-    holds, rule = rules[kind]
-    if not holds:
-        raise SpecificationError(f"{key}.{kind} is {numbers!r}: {rule}")
-    return law
+    if kind in _KINDS and not _KINDS[kind].is_possible(*numbers):
+        raise SpecificationError(f"{key}.{kind} is {numbers!r}: {_KINDS[kind].rule}")
+    return Law(kind, tuple(float(number) for number in numbers), axis)
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    number = as_number(value)
+    return number is not None and math.isfinite(number)
 
 
 def _open(share: Floats) -> Floats:

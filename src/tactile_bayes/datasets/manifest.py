@@ -77,10 +77,7 @@ class Manifest:
     @property
     def redrawn(self) -> Counter[str]:
         """Draws that came to nothing, by the reason, in the files that are there."""
-        total: Counter[str] = Counter()
-        for shard in self.shards:
-            total.update(shard.redrawn)
-        return total
+        return sum((Counter(shard.redrawn) for shard in self.shards), Counter())
 
     @property
     def strained(self) -> int:

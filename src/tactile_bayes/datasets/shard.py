@@ -13,7 +13,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.datasets.families import KNOTS, LOG_RADIUS
+from tactile_bayes.contours.families import FAMILIES
+from tactile_bayes.contours.family import FamilyParameter
 from tactile_bayes.datasets.generation import Records, generate_records
 from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.datasets.specification import Specification, read_text
@@ -21,6 +22,8 @@ from tactile_bayes.files import write_atomically
 from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
+
+Floats = NDArray[np.float64]
 
 __all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]
 
@@ -30,19 +33,6 @@ _LONGEST = 9
 PHASE_SEQUENCES = tuple(
     "-".join("AB"[(start + k) % 2] for k in range(length)) for length in range(1, _LONGEST + 1) for start in (0, 1)
 )
-
-_PARAMETERS = {
-    "a": "coefficient a, or horizontal half-axis of an ellipse",
-    "b": "vertical half-axis",
-    "n": "exponent",
-    "q": "height of the vertex",
-    "r": "radius",
-    "x_c": "position of the vertex",
-    "radius": "typical radius of curvature",
-    "amplitude": "standard deviation of the logarithm of the radius of curvature",
-    "length_scale": "slope angle over which the radius of curvature changes",
-    LOG_RADIUS: "natural logarithm of the radius of curvature, a cubic spline over the slope angle, at its knots",
-}
 
 
 class Written(NamedTuple):
@@ -140,8 +130,6 @@ def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
         "record": ("record", records.index.astype(np.int64), {"long_name": "number of the record in the data set"}),
         "sweep": ("sweep", np.arange(len(spec.sweeps)), {"long_name": "number of the sweep in the record"}),
     }
-    if f"truth_contour_{LOG_RADIUS}" in variables:
-        coords["knot"] = ("knot", KNOTS, {"units": "rad", "long_name": "slope angle of a knot"})
     attrs: dict[str, str | float] = {
         "title": spec.name,
         "units": spec.units,
@@ -158,65 +146,50 @@ def _flags(long_name: str, meanings: list[str] | tuple[str, ...], kind: Any = np
     return {"long_name": long_name, "flag_values": np.arange(len(meanings), dtype=kind), "flag_meanings": words}
 
 
-def _parameters(spec: Specification, records: Records) -> dict[str, tuple[tuple[str, ...], NDArray[Any], Any]]:
+def _parameters(spec: Specification, records: Records) -> dict[str, tuple[str, Floats, dict[str, str]]]:
     """Parameters of the contours by name, NaN where a family has no such."""
-    found: dict[str, tuple[tuple[str, ...], NDArray[Any], Any]] = {}
-    for g, group in enumerate(spec.groups):
-        names = [name for name in (*group.laws, LOG_RADIUS) if f"contours[{g}].{name}" in records.drawn]
-        for name in names:
-            values = records.drawn[f"contours[{g}].{name}"]
-            stem = name.removeprefix("left_").removeprefix("right_")
-            side = f" of the {name.split('_')[0]} flank" if stem != name else ""
-            key = f"truth_contour_{name}"
-            if key in found:
-                values = np.where(np.isnan(values), found[key][1], values)
-            attrs = {"units": _parameter_unit(spec, name, stem), "long_name": _PARAMETERS[stem] + side}
-            found[key] = (("record", "knot")[: values.ndim], values, attrs)
+    found = {}
+    for name in dict.fromkeys(name for group in spec.groups for name in group.laws):
+        having = [g for g, group in enumerate(spec.groups) if name in group.laws]
+        values = np.full(records.index.size, np.nan)
+        for g in having:
+            drawn = records.drawn[f"contours[{g}].{name}"]
+            values = np.where(np.isnan(drawn), values, drawn)
+        entries = [FAMILIES[spec.groups[g].family].table[name] for g in having]
+        side = next((f" of the {side} flank" for side in ("left", "right") if name.startswith(f"{side}_")), "")
+        long_name = " or ".join(dict.fromkeys(entry.meaning for entry in entries)) + side
+        found[f"truth_contour_{name}"] = "record", values, {"units": _unit(spec, name, entries), "long_name": long_name}
     return found
 
 
-def _parameter_unit(spec: Specification, name: str, stem: str) -> str:
-    """Unit of a parameter, "see family" where families differ."""
-    if stem == "length_scale":
-        return "rad"
-    if spec.units != "SI" or stem in ("n", "amplitude", LOG_RADIUS):
-        return "1"
-    if stem != "a":
-        return "m"
-    families = {group.family for group in spec.groups if name in group.laws}
-    units = {"parabola": "1/m", "ellipse": "m"}
-    kinds = {units.get(f, "m^(1-n)" if f == "power-law" else "see family") for f in families}
-    return kinds.pop() if len(kinds) == 1 else "see family"
+def _unit(spec: Specification, name: str, entries: list[FamilyParameter]) -> str:
+    """Unit of a parameter of several families, "see family" where they differ; and of a flank's a, as it always was."""
+    powers = {1: "m", -1: "1/m"} if spec.units == "SI" else {}
+    units = {powers.get(entry.length_power, entry.unit) for entry in entries}
+    return units.pop() if len(units) == 1 and not (powers and name.endswith("_a")) else "see family"
 
 
 def _of_sweeps(spec: Specification, sweep: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    dims = ("record", "sweep")
     backward = np.array([direction == "backward" for _, direction in spec.sweeps], dtype=np.int8)
-    found: dict[str, Any] = {
-        "direction": ("sweep", backward, _flags("sense of the drive", ("forward", "backward"), np.int8))
-    }
+    attrs = _flags("sense of the drive", ("forward", "backward"), np.int8)
+    found: dict[str, Any] = {"direction": ("sweep", backward, attrs)}
     for name, values in sweep.items():
+        key = name if name in COLUMNS else f"truth_{name}"
         if name == "phases":
-            codes = np.array([[PHASE_SEQUENCES.index(word) for word in row] for row in values], dtype=np.int8)
-            long_name = "phases of the contact in their order: A tip, B tangential"
-            found["truth_phases"] = (dims, codes, _flags(long_name, PHASE_SEQUENCES, np.int8))
+            values = np.array([[PHASE_SEQUENCES.index(word) for word in row] for row in values], dtype=np.int8)
+            attrs = _flags("phases of the contact in their order: A tip, B tangential", PHASE_SEQUENCES, np.int8)
         elif name == "snap_off_kind":
-            kinds = [kind.name.lower() for kind in SnapOff]
-            found["truth_snap_off_kind"] = (
-                dims,
-                values.astype(np.int8),
-                _flags("kind of the snap-off", kinds, np.int8),
-            )
+            values = values.astype(np.int8)
+            attrs = _flags("kind of the snap-off", [kind.name.lower() for kind in SnapOff], np.int8)
         elif name == "largest_strain":
-            long_name = "largest bending strain of the rod up to snap-off"
-            found["truth_largest_strain"] = (dims, values, {"units": "1", "long_name": long_name})
+            attrs = {"units": "1", "long_name": "largest bending strain of the rod up to snap-off"}
         elif name in COLUMNS:
-            found[name] = (dims, values, _described(spec, name))
+            attrs = _described(spec, name)
         else:
             event = "first_contact" if name.startswith("first_contact") else "snap_off"
             attrs = _described(spec, name.removeprefix(f"{event}_"))
             attrs["long_name"] += f" at {event.replace('_', ' ').replace('snap off', 'snap-off')}"
-            found[f"truth_{name}"] = (dims, values, attrs)
+        found[key] = (("record", "sweep"), values, attrs)
     return found
 
 

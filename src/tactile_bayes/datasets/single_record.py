@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.datasets.collection import opened
-from tactile_bayes.datasets.families import FAMILIES, KNOTS, LOG_RADIUS
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import read_manifest
 from tactile_bayes.datasets.shard import records_as_dataset
@@ -103,10 +103,13 @@ def contour_of(record: xr.Dataset) -> Contour:
     family = FAMILIES.get(str(record.attrs.get("truth_family")))
     if family is None:
         raise ParameterError("the record's attributes name no contour: take it from a data set, with truth=True")
-    found = {name: record.attrs[f"truth_contour_{name}"] for name in (*family.parameters, *family.optional)}
-    if family.draw_log_radius is not None:
-        found[LOG_RADIUS] = np.array([record.attrs[f"truth_contour_{LOG_RADIUS}_{k}"] for k in range(KNOTS.size)])
-    return family.build(found)
+    prefix = "truth_contour_"
+    if missing := [name for name in family.parameters if f"{prefix}{name}" not in record.attrs]:
+        raise ParameterError(
+            f"the record's attributes name a {family.name} without {prefix}{missing[0]}: if an earlier version made "
+            "it, take that version, or make its data set again with the parameters of today"
+        )
+    return family.contour({name: record.attrs[f"{prefix}{name}"] for name in family.parameters})
 
 
 def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset:
@@ -127,10 +130,9 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
                 columns[name] = np.array(words)[values] if words else values.astype(np.float64)
         elif variable.dims == () and name.startswith(("truth_contour_", "load_cell_")) and np.isfinite(variable.values):
             attrs[name] = float(variable)
-        elif variable.dims == ("knot",) and np.all(np.isfinite(variable.values)):
-            attrs |= {f"{name}_{knot}": float(value) for knot, value in enumerate(variable.values)}
     if spec.single:
-        _restore_limits(columns, LoadCell.from_entries(_entries(attrs)))
+        entries = {n.removeprefix("load_cell_"): v for n, v in attrs.items() if n.startswith("load_cell_")}
+        _restore_limits(columns, LoadCell.from_entries(entries))
     if spec.friction:
         attrs["truth_friction"] = spec.friction
     if not truth:
@@ -141,12 +143,6 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
     order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
     known = {name: columns[name] for name in order if column_of(name) is not None}
     return make_record(known, rod=rod, attrs=attrs, load_cell_frame=spec.frame)
-
-
-def _entries(attrs: Mapping[str, Any]) -> dict[str, float]:
-    """The data sheet in a record's attributes."""
-    prefix = "load_cell_"
-    return {name.removeprefix(prefix): value for name, value in attrs.items() if name.startswith(prefix)}
 
 
 def _restore_limits(columns: dict[str, Any], cell: LoadCell) -> None:

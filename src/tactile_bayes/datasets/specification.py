@@ -8,15 +8,17 @@ import math
 import os
 import tomllib
 from collections.abc import Container, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.datasets.families import FAMILIES, FLANKS, Family, rule_of
+from tactile_bayes.checks import as_number, check_choice, check_kind, check_number, check_whole_number, refused
+from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
+from tactile_bayes.contours.family import Family
 from tactile_bayes.datasets.laws import Law, law_of
 from tactile_bayes.datasets.specification_text import canonical, toml_of, without
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
@@ -24,9 +26,17 @@ from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.rod import Rod
 
-__all__ = ["UNNAMED", "Drive", "Group", "Specification", "meaning", "read_specification", "read_text"]
-
-Floats = NDArray[np.float64]
+__all__ = [
+    "UNNAMED",
+    "Drive",
+    "Group",
+    "Specification",
+    "left_out",
+    "meaning",
+    "read_specification",
+    "read_text",
+    "rule_of",
+]
 
 UNNAMED = "unnamed"
 
@@ -39,13 +49,7 @@ _LARGEST_SEED = 2**63 - 1
 _AT_HAND = 2**14
 """Samples in a block: a column of them is 128 kB."""
 
-_SCAN = {
-    "bases": [[0.0, 0.0]],
-    "directions": ["forward", "backward"],
-    "samples": 180,
-    "margin": 0.1,
-    "friction": 0.0,
-}
+_SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1, "friction": 0.0}
 _DEFAULTS = {
     "name": UNNAMED,
     "description": "",
@@ -65,6 +69,12 @@ _TABLES: Mapping[str, Iterable[str]] = {
     "load_cell.": ("frame", *LOAD_CELL_UNITS),
 }
 """The keys of each table."""
+
+_REPLACED = {
+    "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
+    "shape-free": ("radius", "r", "its mean (geometric) over slope angles"),
+}
+"""By family: a parameter of earlier versions, the one in its place, and what that is."""
 
 
 @dataclass(frozen=True)
@@ -175,13 +185,13 @@ class Specification:
     @property
     def laws(self) -> tuple[tuple[str, Law], ...]:
         """Every law with its key, in the order in which numbers are drawn."""
-        found = [
-            (f"contours[{g}].{name}", law) for g, group in enumerate(self.groups) for name, law in group.laws.items()
-        ]
-        found += [(f"rod.{name}", law) for name, law in self.rod.items()]
-        for b, pair in enumerate(self.bases):
-            found += [(f"scan.bases[{b}][{axis}]", law) for axis, law in enumerate(pair)]
-        return (*found, *((f"load_cell.{name}", law) for name, law in self.load_cell.items()))
+        tables = {
+            **{f"contours[{g}].": group.laws for g, group in enumerate(self.groups)},
+            "rod.": self.rod,
+            **{f"scan.bases[{b}]": {"[0]": x, "[1]": y} for b, (x, y) in enumerate(self.bases)},
+            "load_cell.": self.load_cell,
+        }
+        return tuple((prefix + name, law) for prefix, laws in tables.items() for name, law in laws.items())
 
     @property
     def combinations(self) -> int:
@@ -241,7 +251,7 @@ def meaning(text: str) -> dict[str, Any]:
     is left out or written with the value that it has then, do not count."""
     said = without(_DEFAULTS, tomllib.loads(text))
     said["contours"] = [
-        without({"weight": 1.0, **FAMILIES[group["family"]].optional}, group) for group in said["contours"]
+        without({"weight": 1.0, **left_out(FAMILIES[group["family"]])}, group) for group in said["contours"]
     ]
     return dict(canonical(said))
 
@@ -254,119 +264,152 @@ def read_text(text: str) -> Specification:
         raise SpecificationError(f"not TOML: {error}") from error
     if not table:
         raise SpecificationError("it is empty: `tactile-bayes dataset example` prints one to start from")
-    return _Reader(table).specification(text)
+    try:
+        return _specification(table, text)
+    except ParameterError as error:
+        raise SpecificationError(str(error)) from error
 
 
-class _Reader:
-    """Takes a parsed specification apart."""
+def left_out(family: Family) -> dict[str, Any]:
+    """What is meant where a parameter of a family is left out: the middle, and what is standard normal."""
+    standard = {"normal": [0.0, 1.0]}
+    return {
+        "x_c": 0.0,
+        **{n: standard for n, entry in family.table.items() if entry.prior and entry.prior.distribution == "norm"},
+    }
 
-    def __init__(self, table: dict[str, Any]) -> None:
-        self.table = table
 
-    def specification(self, text: str) -> Specification:
-        table = self.table
-        _refuse_unknown(table, (*_TABLES[""], "contours", "rod", "scan", "load_cell"), "")
-        each = table.get("each_contour", _DEFAULTS["each_contour"])
-        if not isinstance(each, bool):
-            raise SpecificationError(f"each_contour is {each!r}: write true or false")
-        precision = table.get("precision", _DEFAULTS["precision"])
-        if precision not in ("double", "single"):
-            raise SpecificationError(f"precision is {precision!r}: write 'double' or 'single'")
-        scan = _table(table, "scan")
-        _refuse_unknown(scan, _TABLES["scan."], "scan.")
-        load_cell = dict(_table(table, "load_cell"))
-        frame = load_cell.pop("frame", "fixed")
-        if not isinstance(frame, str) or frame not in FRAMES:
-            raise SpecificationError(f"load_cell.frame is {frame!r}: write 'fixed' or 'turning'")
-        found = Specification(
-            text=text,
-            name=_text(table, "name"),
-            description=_text(table, "description"),
-            records=1,
-            shard_records=_whole(table.get("shard_records", _DEFAULTS["shard_records"]), "shard_records", 1, 100_000),
-            seed=_whole(table.get("seed"), "seed", 0, _LARGEST_SEED),
-            groups=self._groups(each),
-            each_group=each,
-            rod=self._rod(),
-            bases=_bases(scan.get("bases", _SCAN["bases"])),
-            directions=_directions(scan.get("directions", _SCAN["directions"])),
-            drive=_drive(scan),
-            friction=_number(scan.get("friction", _SCAN["friction"]), "scan.friction", 0.0, 0.84),
-            load_cell=_load_cell(load_cell),
-            frame=frame,
-            single=precision == "single",
+def rule_of(error: ContourError) -> str:
+    """The rule that parameters have broken, without their values, so that many breaches of it count as one."""
+    words = str(error).partition("; found ")[0]
+    return words.partition(": ")[2] or words
+
+
+def _specification(table: Mapping[str, Any], text: str) -> Specification:
+    _refuse_unknown(table, (*_TABLES[""], "contours", "rod", "scan", "load_cell"), "")
+    said = {**_DEFAULTS, **table}
+    check_kind("each_contour", said["each_contour"], bool, "write true or false")
+    for key in ("name", "description"):
+        check_kind(key, said[key], str, "give a text")
+    scan, load_cell = _table(table, "scan"), {"frame": "fixed", **_table(table, "load_cell")}
+    frame = check_choice("load_cell.frame", load_cell.pop("frame"), FRAMES)
+    found = Specification(
+        text=text,
+        name=said["name"],
+        description=said["description"],
+        records=1,
+        shard_records=_whole(said["shard_records"], "shard_records", 1, 100_000),
+        seed=_whole(said.get("seed"), "seed", 0, _LARGEST_SEED),
+        groups=_groups(said),
+        each_group=said["each_contour"],
+        rod=_rod(_table(table, "rod")),
+        bases=_bases((_SCAN | scan)["bases"]),
+        directions=_directions((_SCAN | scan)["directions"]),
+        drive=_drive(scan),
+        friction=_number((_SCAN | scan)["friction"], "scan.friction", 0.0, 0.84),
+        load_cell=_load_cell(load_cell),
+        frame=cast(Frame, frame),
+        single=check_choice("precision", said["precision"], ("double", "single")) == "single",
+    )
+    turns = found.combinations
+    records = table.get("records", turns if found.lists else None)
+    records = _whole(records, "records", 1, _MOST_SHARDS * found.shard_records)
+    if records % turns:
+        raise SpecificationError(
+            f"records is {records}, but the lists of 'each' make {turns} combinations: give a multiple of it"
         )
-        turns = found.combinations
-        records = table.get("records", turns if found.lists else None)
-        records = _whole(records, "records", 1, _MOST_SHARDS * found.shard_records)
-        if records % turns:
-            raise SpecificationError(
-                f"records is {records}, but the lists of 'each' make {turns} combinations: give a multiple of it"
-            )
-        return Specification(**{**vars(found), "records": records})
+    return replace(found, records=records)
 
-    def _groups(self, each: bool) -> tuple[Group, ...]:
-        groups = self.table.get("contours")
-        if isinstance(groups, dict):
-            raise SpecificationError(
-                "contours is one table: write [[contours]], in two pairs of brackets, for each family"
-            )
-        if not isinstance(groups, list) or not groups or not all(isinstance(group, dict) for group in groups):
-            raise SpecificationError("there are no contours: give at least one table [[contours]], with its family")
-        found = []
-        for index, group in enumerate(groups):
-            key = f"contours[{index}]"
-            name = group.get("family")
-            if not isinstance(name, str) or name not in FAMILIES:
-                joined = f"{' or '.join(FLANKS)} on either side, as in 'parabola/circle'"
-                found_is = f"is {name!r}" if "family" in group else "is missing"
-                raise SpecificationError(
-                    f"{key}.family {found_is}: choose from {', '.join(FLANKS)}, shape-free, or two flanks ({joined})"
-                )
-            family = FAMILIES[name]
-            _refuse_unknown(group, ("family", "weight", *family.parameters, *family.optional), f"{key}.")
-            missing = [parameter for parameter in family.parameters if parameter not in group]
-            if missing:
-                raise SpecificationError(f"{key} is a {name} and has no {missing[0]}: give a number or a law")
-            weight = _number(group.get("weight", 1.0), f"{key}.weight", 0.0, 1e9)
-            if weight == 0.0 or (each and "weight" in group):
-                why = "it must be positive" if not each else "with each_contour every family comes as often"
-                raise SpecificationError(f"{key}.weight is {weight!r}: {why}")
-            values = {**family.optional, **group}
-            names = (*family.parameters, *family.optional)
-            laws = {parameter: law_of(values[parameter], f"{key}.{parameter}") for parameter in names}
-            _refuse_negative({n: law for n, law in laws.items() if n in ("radius", "length_scale")}, f"{key}.")
-            _refuse_no_contour(family, laws, key)
-            found.append(Group(name, weight, laws))
-        return tuple(found)
 
-    def _rod(self) -> dict[str, Law]:
-        rod = _table(self.table, "rod")
-        _refuse_unknown(rod, _TABLES["rod."], "rod.")
-        if not rod:
-            return {}
-        if "length" not in rod or "flexural_rigidity" not in rod:
-            raise SpecificationError(
-                "rod needs length [m] and flexural_rigidity [N m²]; without [rod] lengths are in rod lengths"
-            )
-        laws = {name: law_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
-        _refuse_negative(laws, "rod.", or_zero={"diameter"})
-        try:
-            Rod(*(law.at(np.full(1, 0.5), np.zeros(1, dtype=np.intp))[0] for law in laws.values()))
-        except ParameterError as error:
-            raise SpecificationError(f"rod: {error}") from error
-        return laws
+def _groups(said: Mapping[str, Any]) -> tuple[Group, ...]:
+    groups = said.get("contours")
+    if isinstance(groups, dict):
+        raise SpecificationError("contours is one table: write [[contours]], in two pairs of brackets, for each family")
+    if not isinstance(groups, list) or not groups or not all(isinstance(group, dict) for group in groups):
+        raise SpecificationError("there are no contours: give at least one table [[contours]], with its family")
+    return tuple(_group(group, f"contours[{k}]", said["each_contour"]) for k, group in enumerate(groups))
+
+
+def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
+    name = group.get("family")
+    if not isinstance(name, str) or name not in FAMILIES:
+        found_is = f"is {name!r}" if "family" in group else "is missing"
+        raise SpecificationError(
+            f"{key}.family {found_is}: choose from {', '.join(FLANKS)}, shape-free, or two flanks "
+            f"({' or '.join(FLANKS)} on either side, as in 'parabola/circle')"
+        )
+    family = FAMILIES[name]
+    _refuse_replaced(group, name, key)
+    # In the order in which numbers are drawn.
+    names = sorted(family.parameters, key=lambda parameter: (parameter == "x_c", parameter.startswith("right_")))
+    _refuse_unknown(group, ("family", "weight", *names), f"{key}.")
+    values = {"weight": 1.0, **left_out(family), **group}
+    missing = [parameter for parameter in names if parameter not in values]
+    if missing:
+        raise SpecificationError(f"{key} is a {name} and has no {missing[0]}: give a number or a law")
+    weight = _number(values["weight"], f"{key}.weight", 0.0, 1e9)
+    if weight == 0.0 or (each and "weight" in group):
+        why = "it must be positive" if not each else "with each_contour every family comes as often"
+        raise SpecificationError(f"{key}.weight is {weight!r}: {why}")
+    laws = {parameter: law_of(values[parameter], f"{key}.{parameter}") for parameter in names}
+    _refuse_no_contour(family, laws, key)
+    return Group(name, weight, laws)
+
+
+def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
+    """Refuse parameters that families had in earlier versions, and say what to write instead."""
+    for side, flank in sides_of(name).items():
+        old, new, remedy = _REPLACED.get(flank, ("", "", ""))
+        if not old or side + old not in group:
+            continue
+        a, n = as_number(group[side + old]), as_number(group.get(f"{side}n"))
+        if flank == "power-law" and a is not None and n is not None and a > 0.0 and n > 1.0:
+            remedy += f", here {a ** (1.0 / (1.0 - n)):.12g}"
+        raise SpecificationError(
+            f"{key}.{side}{old} was a parameter of the family {flank} in earlier versions: write {side}{new} in its "
+            f"place, {remedy}"
+        )
+
+
+def _refuse_no_contour(family: Family, laws: Mapping[str, Law], key: str) -> None:
+    """Refuse parameters that no contour has, whatever the others are, by what a law may give at its ends; draws of laws
+    without end are tried as they come."""
+    possible = {name: np.full(1, 2.0 if name.endswith("n") else 1.0) for name in family.parameters}
+    for name, law in laws.items():
+        numbers = law.numbers
+        if law.kind in ("normal", "log_normal"):
+            numbers = () if law.numbers[1] else law.numbers[:1]
+        for number in numbers:
+            try:
+                family.contour(possible | {name: np.full(1, number)})
+            except ContourError as error:
+                verb = "is" if law.kind == "constant" else "may be"
+                raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
+
+
+def _rod(rod: Mapping[str, Any]) -> dict[str, Law]:
+    if not rod:
+        return {}
+    if "length" not in rod or "flexural_rigidity" not in rod:
+        raise SpecificationError(
+            "rod needs length [m] and flexural_rigidity [N m²]; without [rod] lengths are in rod lengths"
+        )
+    laws = {name: law_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
+    _refuse_negative(laws, "rod.", or_zero={"diameter"})
+    try:
+        Rod(*_at_share(laws, 0.5).values())
+    except ParameterError as error:
+        raise SpecificationError(f"rod: {error}") from error
+    return laws
 
 
 def _load_cell(table: Mapping[str, Any]) -> dict[str, Law]:
-    _refuse_unknown(table, _TABLES["load_cell."], "load_cell.")
     laws = {name: law_of(value, f"load_cell.{name}") for name, value in table.items()}
     if any(name.startswith("ornstein_uhlenbeck") for name in laws):
         laws.setdefault("ornstein_uhlenbeck_time", Law("constant", (OrnsteinUhlenbeck().time,)))
     for share in (0.05, 0.5, 0.95):
-        entries = {name: float(law.at(np.full(1, share), np.zeros(1, dtype=np.intp))[0]) for name, law in laws.items()}
         try:
-            LoadCell.from_entries(entries)
+            LoadCell.from_entries(_at_share(laws, share))
         except ParameterError as error:
             raise SpecificationError(f"load_cell: {error}") from error
     signed = ("bias_holding", "bias_force", "gain_", "lever_", "correlation_", "drive_angle_o", "drive_angle_b")
@@ -375,46 +418,29 @@ def _load_cell(table: Mapping[str, Any]) -> dict[str, Law]:
     return laws
 
 
-def _refuse_no_contour(family: Family, laws: Mapping[str, Law], key: str) -> None:
-    """Refuse parameters that no contour has, by what a law may give at its ends; draws of laws without end are
-    tried as they come."""
-    for name, law in laws.items():
-        numbers = law.numbers
-        if law.kind in ("normal", "log_normal"):
-            numbers = () if law.numbers[1] else law.numbers[:1]
-        for number in numbers:
-            try:
-                family.refuse(name, number)
-            except ContourError as error:
-                verb = "is" if law.kind == "constant" else "may be"
-                raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
+def _at_share(laws: Mapping[str, Law], share: float) -> dict[str, float]:
+    """The numbers of laws at a share of their probability."""
+    turn = np.zeros(1, dtype=np.intp)
+    return {name: float(law.at(np.full(1, share), turn)[0]) for name, law in laws.items()}
 
 
-def _refuse_negative(laws: Mapping[str, Law], prefix: str, or_zero: Container[str] = ()) -> None:
+def _refuse_negative(laws: Mapping[str, Law], prefix: str, or_zero: Container[str]) -> None:
     for name, law in laws.items():
-        low = _least(law)
+        low = law.least
         if low < 0.0 or (low == 0.0 and name not in or_zero):
             what = "negative" if low < 0.0 else "0"
             raise SpecificationError(f"{prefix}{name} may be {what}: choose a law of positive numbers, as log_normal")
 
 
-def _least(law: Law) -> float:
-    """The least number that a law may give; the median of a log_normal one, which is positive throughout."""
-    if law.kind == "normal" and law.numbers[1]:
-        return -math.inf
-    return law.numbers[0] if law.kind in ("normal", "log_normal") else min(law.numbers)
-
-
 def _bases(value: Any) -> tuple[tuple[Law, Law], ...]:
     if not isinstance(value, list) or not value or not all(isinstance(pair, list) and len(pair) == 2 for pair in value):
-        raise SpecificationError(f"scan.bases is {value!r}: give a list of pivots, each [x, y]")
+        raise refused("scan.bases", value, "give a list of pivots, each [x, y]")
     return tuple((law_of(x, f"scan.bases[{i}][0]"), law_of(y, f"scan.bases[{i}][1]")) for i, (x, y) in enumerate(value))
 
 
 def _directions(value: Any) -> tuple[str, ...]:
-    senses = ("forward", "backward")
-    if not isinstance(value, list) or not value or any(v not in senses for v in value) or len(set(value)) < len(value):
-        raise SpecificationError(f"scan.directions is {value!r}: give 'forward', 'backward' or both")
+    if value not in (["forward"], ["backward"], ["forward", "backward"], ["backward", "forward"]):
+        raise refused("scan.directions", value, "give 'forward', 'backward' or both")
     return tuple(value)
 
 
@@ -424,8 +450,7 @@ def _drive(scan: Mapping[str, Any]) -> Drive:
     given = [name for name in names if name in scan]
     if not given:
         return Drive(samples, None, None, _number(scan.get("margin", _SCAN["margin"]), "scan.margin", 0.0, 1.0))
-    if len(given) == 1:
-        missing = names[1 - names.index(given[0])]
+    for missing in set(names) - set(given):
         raise SpecificationError(
             f"scan.{missing} is missing: give it beside {given[0]}, or neither, and sweeps go from contact to snap-off"
         )
@@ -438,32 +463,22 @@ def _drive(scan: Mapping[str, Any]) -> Drive:
 
 
 def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """One of the tables inside, with keys that there are."""
     value = table.get(key, {})
-    if not isinstance(value, dict):
-        raise SpecificationError(f"{key} is {value!r}: write it as a table, [{key}]")
-    return value
-
-
-def _text(table: Mapping[str, Any], key: str) -> str:
-    value = table.get(key, _DEFAULTS[key])
-    if not isinstance(value, str):
-        raise SpecificationError(f"{key} is {value!r}: give a text")
-    return value
+    check_kind(key, value, dict, f"write it as a table, [{key}]")
+    _refuse_unknown(value, _TABLES[f"{key}."], f"{key}.")
+    return dict(value)
 
 
 def _whole(value: Any, key: str, least: int, most: int) -> int:
     if value is None:
         raise SpecificationError(f"{key} is missing: give a whole number")
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        largest = "2^63 - 1" if most == _LARGEST_SEED else most
-        raise SpecificationError(f"{key} is {value!r}: give a whole number from {least} to {largest}")
-    return value
+    largest = "2^63 - 1" if most == _LARGEST_SEED else most
+    return check_whole_number(key, value, least, f"give a whole number from {least} to {largest}", most=most)
 
 
 def _number(value: Any, key: str, least: float, most: float) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool) or not least <= value <= most:
-        raise SpecificationError(f"{key} is {value!r}: give a number from {least:g} to {most:g}")
-    return float(value)
+    return check_number(key, value, f"give a number from {least:g} to {most:g}", least=least, most=most)
 
 
 def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:

@@ -30,7 +30,7 @@ def without(defaults: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, A
     found = {}
     for key, value in said.items():
         default = defaults.get(key)
-        if isinstance(default, Mapping):
+        if isinstance(default, Mapping) and isinstance(value, Mapping):
             value = without(default, value)
             default = {}
         if canonical(value) != canonical(default):
@@ -61,20 +61,14 @@ def toml_of(table: Mapping[str, Any]) -> str:
     """A mapping of numbers, words, lists and mappings as TOML, each value in line."""
 
     def inline(value: Any) -> str:
-        if isinstance(value, bool):
-            return str(value).lower()
-        if isinstance(value, str):
+        if isinstance(value, bool | str):
             return json.dumps(value, ensure_ascii=False)
         if isinstance(value, int | np.integer):
             return str(int(value))
         if isinstance(value, float | np.floating):
             return repr(float(value))
         if isinstance(value, Mapping):
-            return (
-                "{ "
-                + ", ".join(f"{json.dumps(str(k), ensure_ascii=False)} = {inline(v)}" for k, v in value.items())
-                + " }"
-            )
+            return f"{{ {', '.join(f'{inline(str(k))} = {inline(v)}' for k, v in value.items())} }}"
         if isinstance(value, list | tuple | np.ndarray):
             return "[" + ", ".join(inline(v) for v in value) + "]"
         raise SpecificationError(

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 
-__all__ = ["CONTOUR", "NOISE", "NORMAL", "Together", "streams"]
+__all__ = ["CONTOUR", "NOISE", "Together", "streams"]
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint32]
 
-CONTOUR, NOISE, NORMAL = 0, 1, 2
-"""What streams are for: the laws of a specification, the load cell, the normal numbers of shape-free contours."""
+CONTOUR, NOISE = 0, 1
+"""What streams are for: the laws of a specification, and the load cell."""
 
 _POOL = 4
 """Words in which a `SeedSequence` gathers what it is given."""

@@ -20,8 +20,6 @@ from tactile_bayes.errors import ParameterError, SpecificationError
 
 __all__ = ["Verification", "verify"]
 
-_CHUNK = 2**22
-
 
 class Verification(NamedTuple):
     """How far a data set is verified."""
@@ -103,7 +101,9 @@ def verify(
 def _check(file: Path, sha256: str) -> None:
     if not file.is_file():
         raise SpecificationError(f"{file} is missing: dataset generate makes it again")
-    if _sha256(file) != sha256:
+    with open(file, "rb") as content:
+        found = hashlib.file_digest(content, "sha256").hexdigest()
+    if found != sha256:
         raise SpecificationError(f"{file} is not as it was written: delete it, and dataset generate makes it again")
 
 
@@ -117,11 +117,3 @@ def _compare(spec: Specification, manifest: Manifest, folder: Path, number: int)
                     f"{folder / shard.file}: {name} comes out otherwise when it is made again (it was made with "
                     f"{', '.join(f'{k} {v}' for k, v in manifest.versions.items())})"
                 )
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with open(path, "rb") as file:
-        while chunk := file.read(_CHUNK):
-            digest.update(chunk)
-    return digest.hexdigest()

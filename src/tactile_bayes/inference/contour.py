@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_function, check_path
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
 from tactile_bayes.inference.contour_problem import Assumptions, ContourProblem, contour_problem
@@ -30,7 +31,6 @@ from tactile_bayes.inference.ensembles import (
     spawn,
 )
 from tactile_bayes.inference.families import Prior
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.result import provenance

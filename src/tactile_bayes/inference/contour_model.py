@@ -10,11 +10,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import DriftWarning, ReachError
 from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Ends, Logarithms
-from tactile_bayes.inference.families import Family, Prior, support_of
+from tactile_bayes.inference.families import Prior, support_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
 from tactile_bayes.inference.nuisances import MAY_VANISH, Nuisances
@@ -52,9 +53,7 @@ class ContourModel:
         self.priors = priors
         self.located = (*family.parameters, *nuisances.names)
         self.names = (*self.located, *noise.names)
-        anything = (-np.inf, np.inf)
-        bounds = [family.bounds.get(name, anything) for name in family.parameters]
-        bounds += [nuisances.bounds(name) for name in nuisances.names]
+        bounds = [*family.bounds.values(), *(nuisances.bounds(name) for name in nuisances.names)]
         self.low, self.high = np.array([*bounds, *[(0.0, np.inf)] * len(noise.names)]).T
         # Parameters that share a prior are asked for at once: a call takes longer than many numbers.
         columns: dict[int, list[int]] = {}

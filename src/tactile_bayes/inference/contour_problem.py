@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from scipy.stats import rv_histogram
 
 from tactile_bayes.checks import check_mapping, check_optional, check_switch
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference import families
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.families import Family, Prior, refuse_wrong_priors
-from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.likelihood import without_errors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
@@ -173,7 +175,7 @@ def default_priors(
 def contour_priors(measured: xr.Dataset, family: Family) -> dict[str, Prior]:
     """Default priors of a contour, from where the pivots are, and how long the rod is."""
     base = float(measured.base_x.mean()), float(measured.base_y.mean())
-    return family.default_priors(base, rod_of(measured).length)
+    return families.default_priors(family, base, rod_of(measured).length)
 
 
 def prior_in_words(prior: Prior) -> str:

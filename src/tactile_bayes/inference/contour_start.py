@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optima_of, optimum_of
@@ -25,7 +26,6 @@ from tactile_bayes.inference.ensembles import (
     scatter_walkers,
 )
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.start import Cloud, gather
 

@@ -11,8 +11,9 @@ from scipy import stats
 from scipy.optimize import brentq
 
 from tactile_bayes.contours import Contour
-from tactile_bayes.inference.families import FLANKS, Family, FlankFamily, Prior
-from tactile_bayes.inference.family_names import family_named
+from tactile_bayes.contours.families import family_named, sides_of
+from tactile_bayes.contours.family import Family
+from tactile_bayes.inference.families import Prior, own_priors
 
 __all__ = ["matched_priors", "mean_log_radius", "widened"]
 
@@ -59,13 +60,9 @@ def matched_priors(family: str, length: float) -> dict[str, Prior]:
     >>> {name: round(float(p.median()), 3) for name, p in matched_priors("ellipse", 1.0).items()}
     {'a': 0.592, 'b': 0.592}
     """
-    chosen = family_named(family)
-    names = {"": chosen.name}
-    if isinstance(chosen, FlankFamily):
-        names = {side: next(n for n, f in FLANKS.items() if f is flank) for side, flank in chosen.flanks.items()}
     return {
         f"{side}{parameter}": prior
-        for side, name in names.items()
+        for side, name in sides_of(family_named(family).name).items()
         for parameter, prior in _of_flank(name, length).items()
     }
 
@@ -82,7 +79,7 @@ def widened(priors: Mapping[str, Prior], factor: float) -> dict[str, Prior]:
 
 def _of_flank(name: str, length: float) -> dict[str, Prior]:
     family = family_named(name)
-    priors = family._own_priors(length)
+    priors = own_priors(family, length)
     stretch, width = _matching(name)
     return {
         n: _log_normal(prior, width, stretch ** family.length_powers[n]) if family.length_powers[n] else prior
@@ -94,7 +91,7 @@ def _of_flank(name: str, length: float) -> dict[str, Prior]:
 def _matching(name: str) -> tuple[float, float]:
     """By how much sizes' medians and the standard deviations of their logarithms are to be multiplied."""
     family = family_named(name)
-    priors = family._own_priors(1.0)
+    priors = own_priors(family, 1.0)
     uniform = stats.qmc.Sobol(len(priors), seed=0).random(_DRAWS).T
 
     def drawn(width: float) -> Floats:
@@ -115,7 +112,7 @@ def _matching(name: str) -> tuple[float, float]:
 def _built(family: Family, values: Mapping[str, Floats]) -> Contour:
     """With the vertex at the origin; what no contour has is brought to the nearest that one has."""
     zeros = np.zeros(_DRAWS)
-    inside = {name: np.clip(value, *family.bounds.get(name, (-np.inf, np.inf))) for name, value in values.items()}
+    inside = {name: np.clip(value, *family.bounds[name]) for name, value in values.items()}
     return family.build(*(inside.get(name, zeros) for name in family.parameters))
 
 

@@ -16,9 +16,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_kind, check_path
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.netcdf import read_netcdf, write_netcdf
 
 __all__ = [

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from tactile_bayes.contours import Circle, Contour, Ellipse, Joined, Parabola, PowerLaw
+from tactile_bayes.contours import Contour, Joined
+from tactile_bayes.contours.families import FLANKS, family_named, sides_of
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.family_names import family_named
 
 __all__ = ["enlarged", "family_parameters"]
 
@@ -34,21 +34,20 @@ def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
         raise ParameterError(f"{contour!r} is no contour: give one of tb.contours, like paper_profile('II', q=0.5)")
     if contour.shape != ():
         raise ParameterError(f"{contour!r} is a list of contours: give a single one")
-    if isinstance(contour, Joined):
-        left, right = _flank(contour.left), _flank(contour.right)
-        if left is None or right is None or left[1:] != right[1:]:
-            raise _not_of_a_family(contour)
-        own = {
-            f"{side}_{name}": value
-            for side, flank in (("left", left), ("right", right))
-            for name, value in flank[0][1].items()
-        }
-        q, x_c = left[1:]
-        return f"{left[0][0]}/{right[0][0]}", {**own, "q": q, "x_c": x_c}
-    flank = _flank(contour)
-    if flank is None:
-        raise _not_of_a_family(contour)
-    (family, own), q, x_c = flank
+    halves: list[Any] = [contour.left, contour.right] if isinstance(contour, Joined) else [contour]
+    names = [name for half in halves for name, flank in FLANKS.items() if isinstance(half, flank.contour)]
+    if len(names) < len(halves) or len(vertices := {(float(half.q), float(half.x_c)) for half in halves}) > 1:
+        raise ParameterError(
+            f"{type(contour).__name__} is of no family with parameters: give a parabola, circle, ellipse or power law, "
+            "or two of these joined at their vertex"
+        )
+    ((q, x_c),) = vertices
+    family = "/".join(names)
+    own = {
+        f"{side}{parameter}": float(getattr(half, parameter))
+        for half, (side, flank) in zip(halves, sides_of(family).items(), strict=True)
+        for parameter in FLANKS[flank].table
+    }
     return family, {**own, "q": q, "x_c": x_c}
 
 
@@ -64,27 +63,3 @@ def enlarged(contour: Contour, factor: float) -> Contour:
     name, values = family_parameters(contour)
     family = family_named(name)
     return family.build(*(values[p] * factor ** family.length_powers[p] for p in family.parameters))
-
-
-def _flank(contour: Contour) -> tuple[tuple[str, dict[str, float]], float, float] | None:
-    """Family and parameters of its own, height and place of the vertex."""
-    match contour:
-        case Parabola():
-            own = "parabola", {"a": contour.a}
-        case Circle():
-            own = "circle", {"r": contour.r}
-        case Ellipse():
-            own = "ellipse", {"a": contour.a, "b": contour.b}
-        case PowerLaw():
-            own = "power-law", {"w": np.asarray(contour.a) ** (1.0 / (1.0 - np.asarray(contour.n))), "n": contour.n}
-        case _:
-            return None
-    numbers = {name: float(value) for name, value in own[1].items()}
-    return (own[0], numbers), float(contour.q), float(contour.x_c)
-
-
-def _not_of_a_family(contour: Contour) -> ParameterError:
-    return ParameterError(
-        f"{type(contour).__name__} is of no family with parameters: give a parabola, circle, ellipse or power law, or "
-        "two of these joined at their vertex"
-    )

@@ -12,15 +12,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.blank_record import blank_record
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_priors
 from tactile_bayes.inference.families import Prior, refuse_wrong_priors
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
-from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.planning.plan import usual_load_cell
 from tactile_bayes.record import rod_of

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.checks import check_mapping, check_names, check_optional
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_priors
 from tactile_bayes.inference.families import Prior, refuse_wrong_priors
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.load_cell import LoadCell

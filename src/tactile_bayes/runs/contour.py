@@ -18,9 +18,9 @@ import xarray as xr
 from tactile_bayes import plotting
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell

@@ -14,6 +14,8 @@ from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_function, check_mapping, check_names, check_probability, check_switch
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
@@ -22,10 +24,8 @@ from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
 from tactile_bayes.inference.families import Prior
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.inference.shape_free_posterior.family import SHAPE_FREE
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import record_hash, rod_of, validate, with_rod
 from tactile_bayes.rod import Rod

@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import DriftWarning, InferenceError
-from tactile_bayes.inference.family_names import family_named
 from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load

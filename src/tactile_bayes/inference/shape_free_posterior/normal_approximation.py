@@ -10,8 +10,8 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_triangular
 
 from tactile_bayes.contours import Contour, Smooth
+from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.shape_free_posterior.family import ShapeFreeFamily
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
 

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from tactile_bayes.contours import Smooth
+from tactile_bayes.contours.base import Floats
+from tactile_bayes.contours.smooth import Smooth
 
 __all__ = ["Directions", "RandomRadius"]
-
-Floats = NDArray[np.float64]
 
 _PLACES = 200
 """Slope angles at which the process is cut into directions."""
@@ -34,8 +32,6 @@ class Directions(NamedTuple):
     values: Floats
     """At the nodes of `Smooth`, shape (lengths, nodes, directions); times standard normal numbers, their sum has unit
     standard deviation on average over slope angles."""
-    left_over: Floats
-    """Share of the variance that further directions would have, shape (lengths,)."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,7 @@ def _directions(shortest: float, longest: float, count: int, nodes: int) -> Dire
     """The first directions for many length scales."""
     places, at = _places(), Smooth.nodes(nodes)
     log_lengths = np.linspace(np.log(shortest), np.log(longest), _LENGTHS)
-    values, left_over = np.empty((_LENGTHS, nodes, count)), np.empty(_LENGTHS)
+    values = np.empty((_LENGTHS, nodes, count))
     before: Floats | None = None
     for i, log_length in enumerate(log_lengths):
         variance, functions = _spectrum(float(np.exp(log_length)))
@@ -120,8 +116,7 @@ def _directions(shortest: float, longest: float, count: int, nodes: int) -> Dire
         mean = _covariance(places, places, float(np.exp(log_length))).mean(axis=0)
         across = across - (mean - mean.mean())
         values[i] = across @ chosen / (_PLACES * np.sqrt(variance[:count]))
-        left_over[i] = 1.0 - variance[:count].sum() / variance.sum()
-    return Directions(log_lengths, values, left_over)
+    return Directions(log_lengths, values)
 
 
 @functools.lru_cache(maxsize=8)

@@ -1,30 +1,27 @@
-"""Contours of any shape whose parameters can be inferred: a random radius of curvature, and the vertex."""
+"""Contours of any shape as a family: a random radius of curvature, and the vertex."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import stats
 from scipy.optimize import least_squares
+from scipy.special import ndtri
 
-from tactile_bayes.contours import Contour, Smooth
-from tactile_bayes.inference.families import Family, Prior, parabola_through
-from tactile_bayes.inference.shape_free_posterior.random_radius import RandomRadius
+from tactile_bayes.contours.base import Contour, Floats, refuse_unless
+from tactile_bayes.contours.family import VERTEX, DefaultPrior, Family, FamilyParameter, log_normal, parabola_through
+from tactile_bayes.contours.random_radius import RandomRadius
+from tactile_bayes.contours.smooth import Smooth
 
 __all__ = ["SHAPE_FREE", "ShapeFreeFamily"]
 
-Floats = NDArray[np.float64]
-
-_AMPLITUDE, _LENGTH = stats.lognorm(s=0.6, scale=0.7), stats.lognorm(s=0.4, scale=0.7)
+_AMPLITUDE, _LENGTH = log_normal(0.6, 0.7), log_normal(0.4, 0.7)
 """Priors of the standard deviation of log ρ, and of the length over which it changes [rad]."""
 
-_RADIUS = RandomRadius(shortest=0.15, longest=4.0, tolerance=0.01)
-
-_SCATTER, _BRAVE = 0.01, 2.0
+_SCATTER, _HUBER = 0.01, 2.0
 """Of points to be fitted, in rod lengths, as a first guess; and from how many times that on they pull less."""
 
 _STEP = 1e-5
@@ -46,23 +43,28 @@ class ShapeFreeFamily(Family):
 
     name: str
     radius: RandomRadius
-    length_powers: Mapping[str, int] = field(init=False)
-    bounds: Mapping[str, tuple[float, float]] = field(init=False)
 
-    def __post_init__(self) -> None:
-        weights = {f"z_{k + 1}": 0 for k in range(self.radius.count)}
-        powers = {"r": 1, "amplitude": 0, "length_scale": 0, **weights, "q": 1, "x_c": 1}
-        bounds = {
-            "r": (0.0, np.inf),
-            "amplitude": (0.0, np.inf),
-            "length_scale": (self.radius.shortest, self.radius.longest),
+    @cached_property
+    def table(self) -> dict[str, FamilyParameter]:  # type: ignore[override]
+        size, spread = "mean radius of curvature (geometric)", "standard deviation of the logarithm of the radius"
+        lengths = self.radius.shortest, self.radius.longest
+        weight = FamilyParameter("weight of a direction of the random radius", 0, DefaultPrior("norm", {}))
+        return {
+            "r": FamilyParameter(size, 1, log_normal(1.0, 0.5), (0.0, np.inf)),
+            "amplitude": FamilyParameter(spread, 0, _AMPLITUDE, (0.0, np.inf)),
+            "length_scale": FamilyParameter("slope angle over which it changes", 0, _LENGTH, lengths, "rad"),
+            **dict.fromkeys(self.directions, weight),
+            **VERTEX,
         }
-        object.__setattr__(self, "length_powers", powers)
-        object.__setattr__(self, "bounds", bounds)
+
+    @cached_property
+    def directions(self) -> tuple[str, ...]:
+        """Names of the weights of the random radius, which are standard normal."""
+        return tuple(f"z_{k + 1}" for k in range(self.radius.count))
 
     @property
     def roughness(self) -> tuple[str, ...]:
-        return ("amplitude", "length_scale", *(f"z_{k + 1}" for k in range(self.radius.count)))
+        return ("amplitude", "length_scale", *self.directions)
 
     @property
     def is_always_clear(self) -> bool:
@@ -73,15 +75,15 @@ class ShapeFreeFamily(Family):
         log_radius = self.radius.log_radius(np.log(r), amplitude, length, np.stack(weights, axis=-1))
         return Smooth(log_radius, q=q, x_c=x_c)
 
-    def _own_priors(self, length: float) -> dict[str, Prior]:
-        standard = stats.norm()
-        weights = {f"z_{k + 1}": standard for k in range(self.radius.count)}
-        return {
-            "r": stats.lognorm(s=1.0, scale=0.5 * length),
-            "amplitude": _AMPLITUDE,
-            "length_scale": _LENGTH,
-            **weights,
-        }
+    def contour(self, values: Mapping[str, Any]) -> Contour:
+        r, amplitude, length = (np.asarray(values[name]) for name in ("r", "amplitude", "length_scale"))
+        refuse_unless((r > 0.0) & np.isfinite(r), self.name, "r must be positive and finite", r=r)
+        rule = "amplitude must be finite and not negative"
+        refuse_unless((amplitude >= 0.0) & np.isfinite(amplitude), self.name, rule, amplitude=amplitude)
+        low, high = self.bounds["length_scale"]
+        rule = f"length_scale must be from {low:g} to {high:g} rad"
+        refuse_unless((length >= low) & (length <= high), self.name, rule, length_scale=length)
+        return super().contour(values)
 
     def fit(self, x: Floats, y: Floats) -> dict[str, float]:
         """From a circle that is as bent as the points, by distances along the normal and the directions' prior.
@@ -92,7 +94,8 @@ class ShapeFreeFamily(Family):
         x, y = x[picked], y[picked]
         a, q, x_c = parabola_through(x, y)
         middle = np.array([np.log(0.5 / a), *np.zeros(self.radius.count), q, x_c])
-        amplitude, length = float(_AMPLITUDE.ppf(0.9)), float(_LENGTH.median())
+        amplitude = float(np.exp(_AMPLITUDE.numbers["s"] * ndtri(0.9)) * _AMPLITUDE.numbers["scale"])  # the last decile
+        length = _LENGTH.numbers["scale"]
 
         def residuals(points: Floats, scatter: float) -> Floats:
             """Of points (n, d): (n, points + d)."""
@@ -109,11 +112,11 @@ class ShapeFreeFamily(Family):
 
         point, scatter = middle, _SCATTER
         for _ in range(2):
-            found = least_squares(of_one, point, jacobian, loss="soft_l1", f_scale=_BRAVE, args=(scatter,), max_nfev=40)
+            found = least_squares(of_one, point, jacobian, loss="soft_l1", f_scale=_HUBER, args=(scatter,), max_nfev=40)
             point = found.x
             left = residuals(point[None], 1.0)[0, : x.size]
             scatter = max(1.4826 * float(np.median(np.abs(left))), 0.1 * _SCATTER)
-        weights = {f"z_{k + 1}": float(z) for k, z in enumerate(point[1:-2])}
+        weights = dict(zip(self.directions, point[1:-2].tolist(), strict=True))
         sizes = {"r": float(np.exp(point[0])), "amplitude": amplitude, "length_scale": length}
         return {**sizes, **weights, "q": float(point[-2]), "x_c": float(point[-1])}
 
@@ -126,4 +129,4 @@ def _distances(contours: Contour, x: Floats, y: Floats) -> Floats:
     return ((y[:, None] - at.y) * np.cos(at.slope_angle) - (x[:, None] - at.x) * np.sin(at.slope_angle)).T
 
 
-SHAPE_FREE = ShapeFreeFamily("shape-free", _RADIUS)
+SHAPE_FREE = ShapeFreeFamily("shape-free", RandomRadius(shortest=0.15, longest=4.0, tolerance=0.01))

@@ -1,0 +1,225 @@
+"""The registry of families: contours by the names that users give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tactile_bayes.checks import shown
+from tactile_bayes.contours.base import Contour, Floats
+from tactile_bayes.contours.family import (
+    VERTEX,
+    Family,
+    FamilyParameter,
+    log_normal,
+    parabola_through,
+    robust_least_squares,
+)
+from tactile_bayes.contours.joined import Joined
+from tactile_bayes.contours.oval import Circle, Ellipse
+from tactile_bayes.contours.parabola import Parabola
+from tactile_bayes.contours.power_law import PowerLaw
+from tactile_bayes.contours.shape_free_family import SHAPE_FREE
+from tactile_bayes.errors import ParameterError
+
+__all__ = ["FAMILIES", "FLANKS", "Flank", "FlankFamily", "family_named", "sides_of"]
+
+_FAR = 1e3
+"""Widths from the vertex beyond which a power law is as high as here, or its height would overflow."""
+
+Values = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Flank:
+    """Contours with a vertex at height q above x_c, of one law on one side of it or on both.
+
+    Parameters
+    ----------
+    contour : type
+        Their class, which has the parameters as attributes.
+    table : mapping of str to FamilyParameter
+        Its own parameters by name.
+    start : callable
+        From a in y = a x² to values by name, in rod lengths, of a flank that is about as bent.
+    miss : callable
+        From places seen from the vertex, and values by name, to their distances from the flank, about.
+    build : callable, optional
+        From parameters by name, with q and x_c, to contours; by default the class.
+    is_always_clear : bool
+        Whether a rod that has snapped off is past every such contour.
+    """
+
+    contour: type[Contour]
+    table: Mapping[str, FamilyParameter]
+    start: Callable[[float], dict[str, float]]
+    miss: Callable[[Floats, Floats, Values], Floats]
+    build: Callable[..., Contour] | None = None
+    is_always_clear: bool = False
+
+
+@dataclass(frozen=True)
+class FlankFamily(Family):
+    """Contours of one flank on both sides, or of two.
+
+    Parameters
+    ----------
+    name : str
+        What users call it.
+    flanks : mapping of str to Flank
+        By what stands before the names of their parameters: "" of one flank, "left_" and "right_" of two.
+    """
+
+    name: str
+    flanks: Mapping[str, Flank]
+
+    @cached_property
+    def table(self) -> dict[str, FamilyParameter]:  # type: ignore[override]
+        return {f"{side}{name}": p for side, flank in self.flanks.items() for name, p in flank.table.items()} | VERTEX
+
+    @property
+    def is_always_clear(self) -> bool:
+        return all(flank.is_always_clear for flank in self.flanks.values())
+
+    def build(self, *values: Any) -> Contour:
+        by_name = dict(zip(self.parameters, values, strict=True))
+        halves = [(flank.build or flank.contour)(**self._own(side, by_name)) for side, flank in self.flanks.items()]
+        return halves[0] if len(halves) == 1 else Joined(halves[0], halves[1])
+
+    def fit(self, x: Floats, y: Floats) -> dict[str, float]:
+        a, q, x_c = parabola_through(x, y)
+        names = self.parameters[:-2]
+
+        def values_at(point: Floats) -> dict[str, float]:
+            own = {name: self._unfold(name, p) for name, p in zip(names, point[:-2], strict=True)}
+            return own | {"q": float(point[-2]), "x_c": float(point[-1])}
+
+        def miss(point: Floats) -> Floats:
+            values = values_at(point)
+            u, v = x - values["x_c"], y - values["q"]
+            parts = [flank.miss(u, v, self._own(side, values)) for side, flank in self.flanks.items()]
+            return parts[0] if len(parts) == 1 else np.where(u < 0.0, *parts)
+
+        found = []
+        for bend in (a, 0.4 * a, 2.5 * a):
+            start = {f"{side}{n}": v for side, flank in self.flanks.items() for n, v in flank.start(bend).items()}
+            point = np.array([*(self._fold(name, start[name]) for name in names), q, x_c])
+            found.append(robust_least_squares(miss, point))
+        return values_at(min(found, key=lambda point: float(np.median(np.abs(miss(point))))))
+
+    def _own(self, side: str, values: Values) -> dict[str, Any]:
+        """The parameters of one flank, by its own names, with those of the vertex."""
+        names = self.flanks[side].table
+        return {name: values[f"{side}{name}"] for name in names} | {"q": values["q"], "x_c": values["x_c"]}
+
+    def _fold(self, name: str, value: float) -> float:
+        """A bounded parameter as one that may have any value."""
+        return float(np.log(value - self.bounds[name][0]))
+
+    def _unfold(self, name: str, value: float) -> float:
+        low, high = self.bounds[name]
+        return float(min(low + np.exp(np.clip(value, -20.0, 20.0)), high))
+
+
+def _ellipse_miss(u: Floats, v: Floats, values: Values) -> Floats:
+    a, b = values["a"], values["b"]
+    across, up = u / a, (v - b) / b
+    share = np.hypot(across, up)
+    return (share - 1.0) * share / (np.hypot(across / a, up / b) + 1e-9)
+
+
+def _size(meaning: str, scale: float, length_power: int = 1) -> FamilyParameter:
+    """A positive parameter, as likely half as twice as large, or thereabouts, as `scale` in rod lengths."""
+    return FamilyParameter(meaning, length_power, log_normal(1.0, scale), (0.0, np.inf))
+
+
+_A = "coefficient a, or horizontal half-axis of an ellipse"
+
+FLANKS: dict[str, Flank] = {
+    # Radius of curvature at the vertex, 1/(2a), like the circle's: half a rod length, give or take a factor of e.
+    "parabola": Flank(
+        Parabola,
+        {"a": _size(_A, 1.0, -1)},
+        start=lambda a: {"a": a},
+        miss=lambda u, v, values: values["a"] * u * u - v,
+        is_always_clear=True,
+    ),
+    "circle": Flank(
+        Circle,
+        {"r": _size("radius", 0.5)},
+        start=lambda a: {"r": 0.5 / a},
+        miss=lambda u, v, values: np.hypot(u, v - values["r"]) - values["r"],
+        is_always_clear=True,
+    ),
+    "ellipse": Flank(
+        Ellipse,
+        {"a": _size(_A, 0.5), "b": _size("vertical half-axis", 0.5)},
+        start=lambda a: {"a": 0.5 / a, "b": 0.5 / a},
+        miss=_ellipse_miss,
+    ),
+    # The unit of a = w^(1 − n), by which PowerLaw goes, would depend on n.
+    "power-law": Flank(
+        PowerLaw,
+        {
+            "w": _size("width at which a power law is as high as wide", 1.0),
+            "n": FamilyParameter("exponent", 0, log_normal(0.7, 1.0, loc=1.0), (1.1, 50.0)),
+        },
+        start=lambda a: {"w": 1.0 / a, "n": 2.0},
+        miss=lambda u, v, values: (
+            values["w"] * np.minimum(np.abs(u / values["w"]), _FAR) ** np.minimum(values["n"], 50.0) - v
+        ),
+        build=PowerLaw.of_width,
+    ),
+}
+"""By name; any two make a joined family."""
+
+
+def sides_of(family: str) -> dict[str, str]:
+    """Names of the flanks of a family, by what stands before the names of their parameters.
+
+    Examples
+    --------
+    >>> sides_of("circle"), sides_of("circle/ellipse")
+    ({'': 'circle'}, {'left_': 'circle', 'right_': 'ellipse'})
+    """
+    names = family.split("/")
+    return dict(zip(("left_", "right_") if len(names) > 1 else ("",), names, strict=True))
+
+
+def _of_flanks(name: str) -> FlankFamily:
+    return FlankFamily(name, {side: FLANKS[flank] for side, flank in sides_of(name).items()})
+
+
+FAMILIES: dict[str, Family] = {
+    **{name: _of_flanks(name) for name in FLANKS},
+    SHAPE_FREE.name: SHAPE_FREE,
+    **{f"{left}/{right}": _of_flanks(f"{left}/{right}") for left in FLANKS for right in FLANKS},
+}
+"""Families by name; "parabola/circle" is a parabola on the left of its vertex, and a circle on the right."""
+
+
+def family_named(name: str) -> Family:
+    """The family of a name.
+
+    Raises
+    ------
+    ParameterError
+        If there is none.
+
+    Examples
+    --------
+    >>> family_named("circle").parameters
+    ('r', 'q', 'x_c')
+    >>> family_named("parabola/power-law").parameters
+    ('left_a', 'right_w', 'right_n', 'q', 'x_c')
+    """
+    if not isinstance(name, str) or name not in FAMILIES:
+        raise ParameterError(
+            f"there is no family {shown(name)}: choose {', '.join(FLANKS)}, one for each flank, like "
+            "parabola/power-law, or shape-free"
+        )
+    return FAMILIES[name]
