@@ -150,3 +150,12 @@ def test_an_interrupt_is_passed_on():
     start = np.random.default_rng(5).normal(size=(36, SIZE))
     with pytest.raises(KeyboardInterrupt):
         learned(interrupted_at(11, normal), PLAIN, start, SCALE, np.random.default_rng(1))
+
+
+def test_draws_of_which_the_nearest_lie_in_a_plane_are_refused():
+    points = np.random.default_rng(6).normal(size=(2000, SIZE))
+    flat = points.copy()
+    flat[:1500, -1] = flat[:1500, 0]
+    flat[1500:] *= 5.0
+    with pytest.raises(np.linalg.LinAlgError):
+        Straightened.fitted(PLAIN, flat, SCALE, len(flat))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.blocks import blocks
@@ -31,6 +32,9 @@ loaded or not holds the search up where it began too far away."""
 
 _SHARP = 0.1
 """Of the angle between the samples beside an event: how far it may be outside for a residual of one."""
+
+_LOUD = 1e-7
+"""Probability that noise makes a sample look loaded by itself."""
 
 _FARTHEST = 12.0
 """Standard deviations of the prior's logarithm that a size may be off on the way to where it is sought."""
@@ -96,8 +100,21 @@ def event_brackets(model: ContourModel) -> Brackets:
             if before < 0 or after < 0 or of_sample[before] != of_sample[after] or angle[before] >= angle[after]:
                 continue  # there is none, or the drive turns back
             rows.append((of_sample[before], ends, angle[before], angle[after], _SHARP * (angle[after] - angle[before])))
+    found = {row[0] for row in rows}
+    for stroke, (before, first, last, after) in enumerate(model.likelihood.event_samples(_loud(model))):
+        if stroke not in found and before >= 0 and after >= 0:  # contact so brief that loads before it tell nothing
+            step = _SHARP * (angle[after] - angle[before]) / 2.0
+            rows += [(stroke, 0, -np.inf, angle[first], step), (stroke, 1, angle[last], angle[after], step)]
     columns = np.array(rows, dtype=float).reshape(-1, 5).T
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
+
+
+def _loud(model: ContourModel) -> NDArray[np.bool_]:
+    """Samples whose load no noise explains, each for itself."""
+    measured, present = model.likelihood.measured[:, model.present], model.present
+    zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))
+    surprise = np.square((measured - zero) / model.deviation[present]).sum(axis=1)
+    return np.asarray(surprise > chdtri(np.count_nonzero(present), _LOUD))
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:

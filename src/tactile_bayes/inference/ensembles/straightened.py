@@ -128,7 +128,14 @@ def _solved(root: Floats, apart: Floats) -> Floats:
 
 
 def _principal(covariance: Floats, scale: Floats) -> Floats:
-    """Principal directions, a column each, the widest on the scale first."""
+    """Principal directions, a column each, the widest on the scale first.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If one of them is no wider than rounding.
+    """
     sizes, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
-    order = np.argsort(-sizes)
-    return np.asarray(scale[:, None] * axes[:, order] * np.sqrt(np.maximum(sizes[order], np.finfo(float).tiny)))
+    if not sizes[0] > np.finfo(float).eps * sizes[-1]:
+        raise np.linalg.LinAlgError("draws lie in a plane")
+    return np.asarray(scale[:, None] * axes[:, ::-1] * np.sqrt(sizes[::-1]))
