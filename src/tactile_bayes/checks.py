@@ -165,9 +165,10 @@ def check_pivots(name: str, values: Any) -> list[tuple[float, float]]:
     ([(0.0, 1.0)], [(0.0, 1.0), (2.0, 1.0)])
     """
     remedy = "give a pivot (x, y), or several: [(x, y), (x, y)]"
-    numbers = check_numbers(name, values, remedy)
-    pivots = check_numbers(name, numbers[None] if numbers.ndim == 1 else numbers, remedy, shape=(None, 2))
-    return [(float(x), float(y)) for x, y in pivots]
+    numbers = np.atleast_2d(check_numbers(name, values, remedy))
+    if not _is_of((None, 2), numbers.shape):
+        raise refused(name, values, remedy)
+    return [(float(x), float(y)) for x, y in numbers]
 
 
 def check_positive(name: str, value: Any, remedy: str = "give a positive number") -> float:
