@@ -22,6 +22,9 @@ BRIEF = 1e-6
 _NOTHING = 1e-13
 """Share of a path that is no stretch of it."""
 
+_SHORT = 1e-3
+"""Way along a contour on which it matters where tables put a change of the phase."""
+
 _HALVINGS = 8
 """How often a piece is halved in search of changes of the phase; where it is not smooth that is never enough."""
 
@@ -176,13 +179,17 @@ def _nearest_zero(nodes: Floats, values: Floats, k: int) -> float:
 
 @compiled
 def _polished(scene: Scene, begin: float, span: float, change: float, most: float, last_step: float) -> float:
-    """A change of the phase beyond the interpolant's answer, by secants until a step is as small as given."""
+    """A change of the phase beyond the interpolant's answer, by secants until a step is as small as given.
+
+    The tip may touch on so short a way that a table's error is a large share of it: then there is none.
+    """
+    scene = Scene(scene.outline, scene.rig, scene.exact or abs(span) * most < _SHORT, scene.known, scene.room)
     old, now = change + 1e-4 * most, change
     at_old = excess(scene, begin + span * old)
     at_now = excess(scene, begin + span * now)
     for _ in range(4):
         step = at_now * (now - old) / (at_now - at_old)
-        if not abs(step) < 0.1 * most:
+        if not abs(step) < 0.5 * most:
             break
         old, at_old, now = now, at_now, now - step
         if abs(step) <= last_step:
