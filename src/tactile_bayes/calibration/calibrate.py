@@ -25,7 +25,6 @@ from tactile_bayes.checks import (
     check_optional,
     check_path,
     check_pivots,
-    check_probability,
     check_seed,
     check_switch,
     check_whole_number,
@@ -234,12 +233,11 @@ def calibration_replicate(
     >>> list(again.truth), "posterior" in again.posterior
     (['a', 'q', 'x_c', 'noise_scale'], True)
     """
-    check_whole_number("number of the replicate", number, 0)
+    number = check_whole_number("number of the replicate", number, 0)
     experiment = experiment_of(**options)
-    Ledger(
-        experiment.words, None if out is None else check_path("out", out), REPLICATES
-    )  # refuses that of another experiment
-    return make_replicate(experiment, int(number), throw=throw)
+    folder = None if out is None else check_path("out", out)
+    Ledger(experiment.words, folder, REPLICATES)  # refuses that of another experiment
+    return make_replicate(experiment, number, throw=throw)
 
 
 def experiment_of(
@@ -270,15 +268,10 @@ def experiment_of(
     directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
     check_choice("direction", direction, directions)
     remedy = "give a list of at least 3 different finite numbers [rad]"
-    angles = np.unique(
-        np.radians(_ANGLES)
-        if drive_angles is None
-        else check_numbers("drive_angles", drive_angles, remedy, shape=(None,))
-    )
+    given = np.radians(_ANGLES) if drive_angles is None else drive_angles
+    angles = np.unique(check_numbers("drive_angles", given, remedy, shape=(None,)))
     if angles.size < 3:
         raise refused("drive_angles", drive_angles, remedy)
-    check_switch("events", events)
-    check_seed(seed)
     experiment = Experiment(
         family=family,
         load_cell=cell,
@@ -289,10 +282,10 @@ def experiment_of(
         priors=dict(priors or {}),
         nuisances=tuple(check_names("nuisances", nuisances)),
         friction=None if friction is None else check_number("friction", friction),
-        events=bool(events),
+        events=check_switch("events", events),
         settings=settings or _SETTINGS,
-        probability=check_probability("probability", probability),
-        seed=int(seed),
+        probability=probability,
+        seed=check_seed(seed),
         world=world or World(),
     )
     default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))

@@ -63,7 +63,7 @@ class Experiment:
     world: World = field(default_factory=World)
 
     def __post_init__(self) -> None:
-        check_probability("probability", self.probability)
+        object.__setattr__(self, "probability", check_probability("probability", self.probability))
         if not any(self.load_cell.standard_deviations.values()):
             raise ParameterError(
                 "the load cell has no noise, so that there is nothing to be calibrated: give "
