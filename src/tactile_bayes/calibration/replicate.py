@@ -17,7 +17,7 @@ from tactile_bayes.calibration.world import World
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
@@ -296,15 +296,9 @@ def _checks(tree: xr.DataTree, simulation: Simulation, experiment: Experiment) -
     if experiment.world == World():  # nothing to be noticed, and a tenth of the time
         return numbers
     try:
-        contacts = reconstruct(
-            simulation.measured,
-            method="constrained",
-            load_cell=experiment.load_cell,
-            friction=experiment.friction or 0.0,
-        )
+        contacts = contact_points(simulation.measured, experiment.load_cell, tree)
     except TactileBayesError:  # a channel without noise
         return numbers
-    return numbers | {
-        "misfit_probability": float(contacts.attrs["misfit_probability"]),
-        "axial_score": float(contacts.attrs["axial_score"]),
-    }
+    if contacts is None:
+        return numbers
+    return numbers | {name: float(contacts.attrs[name]) for name in ("misfit_probability", "axial_score")}
