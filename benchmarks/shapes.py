@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import tactile_bayes as tb
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw, Smooth, from_points, paper_profile
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.scanning import Scan
+from tactile_bayes.sweep import Scan
 from tactile_bayes.tasks import run_tasks
 
 Floats = NDArray[np.float64]

@@ -7,11 +7,10 @@ import math
 
 import pytest
 
-from tactile_bayes import files
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.errors import CalibrationError
-from tactile_bayes.ledger import Ledger, open_ledger
+from tactile_bayes.tasks import Ledger, files, open_ledger
 
 LEDGER = REPLICATES.file
 

@@ -16,8 +16,8 @@ from tactile_bayes.calibration.world import World
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ReachError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rod import Rod
 
 QUIET = LoadCell(force_noise=1e-12, moment_noise=1e-12)
 NOISY = LoadCell(force_noise=0.05, moment_noise=0.02)

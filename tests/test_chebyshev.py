@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from tactile_bayes import chebyshev
+from tactile_bayes.numerics import chebyshev
 
 EPS = np.finfo(float).eps
 

@@ -19,11 +19,11 @@ from helpers.report_pages import FEW
 from tactile_bayes import __version__, read_record
 from tactile_bayes.cli import app
 from tactile_bayes.cli.sampling_bar import remaining_seconds
-from tactile_bayes.demonstration import LOAD_CELL, ROD
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.record import write_record
 from tactile_bayes.runs import contour as contour_run
+from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 
 HEAVY = {"scipy", "xarray", "matplotlib", "emcee", "numpy", "arviz_stats"}
 COMMANDS = ["scan", "measure", "inspect", "reconstruct", "infer", "compare", "calibrate", "sensitivity", "design"]

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 import tactile_bayes as tb
-from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.record import CHANNELS, write_record
+from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from test_cli import assert_misused, assert_refused, call
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")

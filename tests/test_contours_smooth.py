@@ -10,8 +10,8 @@ from tactile_bayes.contours import Circle, Parabola, Smooth, check
 from tactile_bayes.errors import ContourError
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import scan
 
 NODES = 40
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import MEASURED, read_record, rod_of
-from tactile_bayes.scanning import scan
+from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
+from tactile_bayes.sweep import scan
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from tactile_bayes import files
-from tactile_bayes.files import alone_in, is_temporary, write_atomically
+from tactile_bayes.tasks import alone_in, files, is_temporary, write_atomically
 
 CHILD = """
 import sys, time
 from pathlib import Path
-from tactile_bayes.files import alone_in, write_atomically
+from tactile_bayes.tasks import alone_in, write_atomically
 
 with alone_in(Path(sys.argv[1]).parent, RuntimeError), write_atomically(sys.argv[1]) as temporary:
     temporary.write_text("half of the n")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.inference import blocks as module
-from tactile_bayes.inference.blocks import blocks
+from tactile_bayes.numerics.blocks import blocks
 
 
 @pytest.mark.parametrize(

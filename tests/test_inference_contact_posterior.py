@@ -19,7 +19,7 @@ from tactile_bayes.inference.result import posterior_draws, read_result, to_arvi
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, record_hash
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 SOME = np.array([2, 20, 21, 30, 61, 99, 120])
 """No contact; tip or tangential; clearly tangential; before snap-off; backward ones."""

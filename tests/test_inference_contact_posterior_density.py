@@ -119,7 +119,7 @@ def test_the_density_is_likelihood_times_prior_times_volume(i):
     density, sample = density_of(record, CELL, i), Sample(record, i, CELL)
     z, phase = random_coordinates(rng, 200)
     found = density.at(z[:, None, :], phase[:, None])
-    logs, places = found.log_density[:, 0], density.in_world(found.place)[:3, :, 0].T
+    logs, places = found.log_density[:, 0], density.to_lab_frame(found.place)[:3, :, 0].T
     expected, phases = sample.log_likelihood(places)
     use = np.isfinite(logs) & (logs > -1e4)
     assert use.sum() > 40
@@ -128,7 +128,9 @@ def test_the_density_is_likelihood_times_prior_times_volume(i):
     columns = []
     for step in range(4):
         moved = [z + sign * 1e-6 * np.eye(4)[step] for sign in (1.0, -1.0)]
-        ahead, behind = (density.in_world(density.at(m[:, None, :], phase[:, None]).place)[:3, :, 0].T for m in moved)
+        ahead, behind = (
+            density.to_lab_frame(density.at(m[:, None, :], phase[:, None]).place)[:3, :, 0].T for m in moved
+        )
         columns.append((ahead - behind) / 2e-6)
     slopes = np.stack(columns, axis=-1)
     free = np.where((phase == TIP)[:, None], [[0, 1, 3]], [[0, 2, 3]])

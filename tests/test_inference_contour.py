@@ -30,9 +30,9 @@ from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, in_frame, record_hash, to_si
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 NAMES = ["a", "q", "x_c", "noise_scale"]
 

@@ -9,11 +9,10 @@ from helpers.contour_posteriors import infer_as_stated
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.priors import default_priors
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.scanning import scan
-from tactile_bayes.scanning_many import scan_many
+from tactile_bayes.sweep import scan, scan_many
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 SETTINGS = SamplerSettings(min_ess=300.0, max_r_hat=1.02)

@@ -11,7 +11,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour_optimum import event_brackets, optima_of
 from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 TRUTH = {"a": 1.484, "q": 0.686, "x_c": -0.8774, "friction": 0.45}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.differences import central_slopes
+from tactile_bayes.numerics.differences import central_slopes
 
 
 def test_slopes_of_a_quadratic_form_are_exact():

@@ -15,9 +15,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tactile_bayes import files
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, block, checkpoint, sample
+from tactile_bayes.tasks import files
 
 SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
 STEADY = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=4000, min_ess=200, max_r_hat=1.05)

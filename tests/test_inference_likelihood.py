@@ -18,10 +18,10 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 SHARE = {False: 3e-4, True: 1e-6}
 """Error of the interpolated loads over their largest value, at worst, in 150 contours."""

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from helpers.comparisons import made_up
+from tactile_bayes.comparison.verdict import NONE_FITS, verdict_on
 from tactile_bayes.inference.misfit import what_to_try
-from tactile_bayes.uncertainty.family_verdict import NONE_FITS, verdict_on
 
 EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance"]
 

@@ -12,6 +12,7 @@ from scipy import stats
 
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
@@ -21,10 +22,9 @@ from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
-from tactile_bayes.uncertainty.record_check import check_record
+from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}

@@ -12,11 +12,11 @@ import xarray as xr
 from scipy import stats
 from scipy.integrate import solve_ivp
 
-from tactile_bayes.clamped_rod import base_curvature
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.point_load import default_priors, infer_point_load
 from tactile_bayes.inference.predictive import predictive_p_value
+from tactile_bayes.mechanics.clamped_rod import base_curvature
 
 ROOT = Path(__file__).resolve().parents[1]
 MEASURED = Path(os.environ.get("TACTILE_BAYES_MEASURED", ROOT.parent / "shared" / "data"))

@@ -10,6 +10,7 @@ from scipy.special import gamma, kv
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.random_radius import RandomRadius
+from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit
@@ -19,10 +20,9 @@ from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.record_check import check_record
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 RADIUS = RandomRadius(shortest=0.4, longest=4.0, tolerance=0.01)

@@ -11,9 +11,9 @@ from tactile_bayes import scan
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, frame_of, in_frame, present_channels, to_dimensionless, to_si
-from tactile_bayes.rod import Rod
 
 # --- The cell itself --------------------------------------------------------------------------------------------
 

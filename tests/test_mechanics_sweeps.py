@@ -15,15 +15,15 @@ from numba.core.errors import TypingError
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, Smooth
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.inference.families import default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
+from tactile_bayes.inference.priors import default_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler, sweeps
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import trace
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import in_frame
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 SWEEPS = "tactile_bayes.mechanics.sweeps"
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)

@@ -17,8 +17,8 @@ import xarray as xr
 from helpers.record_tables import WIRE, columns
 from tactile_bayes.errors import RecordError, TactileBayesError
 from tactile_bayes.inference.result import read_result, write_result
-from tactile_bayes.netcdf import read_netcdf, write_netcdf
 from tactile_bayes.record import make_record, read_record, write_record
+from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 
 SEAL = b"\ntactile_bayes: SHA-256 of all bytes before this line "
 

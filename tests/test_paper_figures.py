@@ -24,7 +24,7 @@ from tactile_bayes.paper_figures import NUMBERS, caption, draw_all, figure
 from tactile_bayes.plotting import PALETTE, style
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.scanning import equilibria, scan
+from tactile_bayes.sweep import equilibria, scan
 
 COARSE = np.radians(4.0)
 COARSER = np.radians(12.0)

@@ -32,8 +32,8 @@ from tactile_bayes.mechanics.elastica import tangential_arclength
 from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.scanning import equilibria, scan
-from tactile_bayes.sweep_path import sweep_paths
+from tactile_bayes.sweep import equilibria, scan
+from tactile_bayes.sweep.path import sweep_paths
 
 # Some of these objects are met again after snap-off, which is no concern of the path up to there.
 pytestmark = pytest.mark.filterwarnings("ignore::tactile_bayes.errors.ClearanceWarning")

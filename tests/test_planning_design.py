@@ -14,13 +14,13 @@ from tactile_bayes.errors import InferenceError, ParameterError, ReachError, Stu
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Question, _band_widths, expected_of
 from tactile_bayes.planning.design import design
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.knowledge import Knowledge, known_from_posterior, known_from_prior
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 PRIORS = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)

@@ -20,12 +20,12 @@ from tactile_bayes import plotting
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.plotting import posteriors, touch_map
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels
 from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.predictive import predictive_interval
 
 ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)

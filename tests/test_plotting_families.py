@@ -12,12 +12,12 @@ from matplotlib import pyplot as plt
 
 from helpers.comparisons import made_up
 from tactile_bayes import plotting
+from tactile_bayes.comparison.verdict import NONE_FITS
 from tactile_bayes.contours import Parabola
-from tactile_bayes.demonstration import CONTOUR, ROD
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.uncertainty.family_verdict import NONE_FITS
+from tactile_bayes.runs.demonstration import CONTOUR, ROD
 
 BRIEF = SamplerSettings(ensembles=2, max_steps=20)
 

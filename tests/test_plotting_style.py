@@ -19,7 +19,7 @@ from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting import style
 from tactile_bayes.plotting.style import STYLES
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 pytestmark = pytest.mark.usefixtures("settings_left_alone")
 

@@ -13,10 +13,10 @@ from scipy.stats import binomtest
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
 from tactile_bayes.record import in_frame, make_record
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 NUMBERS = ("contact_x", "contact_y", "contact_arclength", "slope_angle")
 CONTOUR = Parabola(0.5, 0.5)

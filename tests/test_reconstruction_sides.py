@@ -11,6 +11,7 @@ from scipy import stats
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.diagnostics.verdicts import doubtful_sides
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
@@ -18,8 +19,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides, doubtful_sweeps, reconstruct, with_sides
 from tactile_bayes.record import make_record
 from tactile_bayes.runs.reconstruction import reconstruction_in_words
-from tactile_bayes.scanning import scan
-from tactile_bayes.uncertainty.verdicts import doubtful_sides
+from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 

@@ -13,10 +13,10 @@ from helpers.load_cells import GAIN, SHARED
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 METHODS = pytest.mark.parametrize("method", ["raw", "constrained"])
 PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")

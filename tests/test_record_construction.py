@@ -8,8 +8,8 @@ import xarray as xr
 
 from helpers.record_tables import WIRE, columns, refused
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import MEASURED, make_record, present_channels, rod_of, validate
-from tactile_bayes.rod import Rod
 
 
 def test_a_record_without_a_rod_is_dimensionless():

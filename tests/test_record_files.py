@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis.extra import numpy as hnp
 
 from helpers.record_tables import WIRE, columns, refused
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import (
     CHANNELS,
     FRAMES,
@@ -24,7 +25,6 @@ from tactile_bayes.record import (
     rod_of,
     write_record,
 )
-from tactile_bayes.rod import Rod
 
 HEADER = "sweep,direction,drive_angle,holding_moment,force_x,force_y"
 ROW = "0,forward,1.25,0.5,0.125,0.25"

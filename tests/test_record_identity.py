@@ -8,8 +8,8 @@ import re
 import numpy as np
 
 from helpers.record_tables import WIRE, columns, edited
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record, record_hash
-from tactile_bayes.rod import Rod
 
 
 def test_the_hash_ignores_truth_order_and_remarks():

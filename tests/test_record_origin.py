@@ -10,10 +10,10 @@ import xarray as xr
 
 from helpers.record_tables import WIRE, columns, refused
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import make_record, read_record, rod_of, write_record
 from tactile_bayes.record.origin import Origin, origins_of
 from tactile_bayes.record.table import Source
-from tactile_bayes.rod import Rod
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, COLUMNS, column_of
-from tactile_bayes.rod import Rod
 
 
 def test_every_scaled_column_has_the_unit_that_its_scale_says():

@@ -9,8 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis.extra import numpy as hnp
 
 from helpers.record_tables import WIRE, columns, edited, refused
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record, rod_of, to_dimensionless, to_si
-from tactile_bayes.rod import Rod
 
 # Numbers whose quotients are far from underflow, where digits would be lost.
 moderate = st.floats(-1e6, 1e6).filter(lambda value: value == 0 or abs(value) > 1e-280)

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tactile_bayes.contours import Joined, Parabola, PowerLaw
-from tactile_bayes.roots import falling_root
+from tactile_bayes.numerics.roots import falling_root
 
 EPS = np.finfo(float).eps
 

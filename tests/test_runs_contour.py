@@ -10,7 +10,6 @@ import pytest
 
 from conftest import QUICK
 from tactile_bayes.contours import Circle, Parabola
-from tactile_bayes.demonstration import CONTOUR, ROD, TRUTH
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.result import read_result
@@ -19,7 +18,8 @@ from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import to_dimensionless
 from tactile_bayes.runs import contour as module
 from tactile_bayes.runs.contour import analyse
-from tactile_bayes.scanning import scan
+from tactile_bayes.runs.demonstration import CONTOUR, ROD, TRUTH
+from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.summary import summary
 
 FIGURES = ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs")

@@ -13,7 +13,7 @@ import xarray as xr
 from helpers.contour_posteriors import CELL
 from tactile_bayes.contours import Contour, Parabola, from_function
 from tactile_bayes.record import write_record
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="there is no wait4")]
 

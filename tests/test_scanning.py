@@ -13,8 +13,8 @@ from helpers.integration import shoot
 from helpers.legendre import equilibrium, tangential_arclength
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_function, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import equilibria, scan
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import equilibria, scan
 
 EPS = np.finfo(float).eps
 LOADS = ("holding_moment", "force_x", "force_y")

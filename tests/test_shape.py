@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.scanning import scan
-from tactile_bayes.shape import rod_shape
+from tactile_bayes.sweep import scan
 
 POINTS = 41
 ARCLENGTHS = np.linspace(0.0, 1.0, POINTS)

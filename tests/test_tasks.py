@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from helpers.tasks import alive, die, die_once, double, fail, fail_strangely, note_and_sleep, wait_until
-from tactile_bayes import tasks
 from tactile_bayes.errors import ParameterError, TaskError
 from tactile_bayes.tasks import run_tasks
+from tactile_bayes.tasks import workers as tasks
 
 TESTS = Path(__file__).resolve().parent
 on_linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")

@@ -7,12 +7,12 @@ import pytest
 from scipy.special import logsumexp
 
 from helpers.contour_posteriors import CELL, swept
+from tactile_bayes.comparison.left_out import foretold_samples
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell, RandomWalk
-from tactile_bayes.uncertainty.contour_left_out import foretold_samples
 
 SETTINGS = SamplerSettings(ensembles=2, walkers=20, min_ess=250, max_r_hat=1.05)
 

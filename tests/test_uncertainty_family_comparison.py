@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from helpers.contour_posteriors import CELL, swept
+from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Ellipse, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.uncertainty.family_comparison import compare_families
 
 BRIEF = SamplerSettings(ensembles=2, walkers=20, min_ess=100, max_r_hat=1.1, max_steps=40)
 

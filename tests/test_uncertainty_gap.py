@@ -9,7 +9,7 @@ import xarray as xr
 from helpers.contour_posteriors import TRUTH, posterior
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.gap import gap
 

@@ -15,9 +15,8 @@ from arviz_stats.base.array import array_stats
 from scipy import stats
 from tests.helpers.load_cells import CELL, SHARED, WALK, WANDER, moments
 
-from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.uncertainty import leave_one_out
-from tactile_bayes.uncertainty.leave_one_out import (
+from tactile_bayes.comparison import leave_one_out
+from tactile_bayes.comparison.leave_one_out import (
     difference,
     largest_k,
     left_out,
@@ -25,6 +24,7 @@ from tactile_bayes.uncertainty.leave_one_out import (
     reweighted,
     stacking_weights,
 )
+from tactile_bayes.errors import InferenceError, ParameterError
 
 SIGMAS = 5.0
 

@@ -9,13 +9,13 @@ from scipy import stats
 
 from helpers.predicted_records import CELL, ideal, predicted, with_readings
 from tactile_bayes.contours import paper_profile
+from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.scanning import scan
-from tactile_bayes.uncertainty.record_check import check_record
+from tactile_bayes.sweep import scan
 
 SHORT = SamplerSettings(ensembles=4, walkers=12, max_steps=60, min_ess=1e9)
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tactile_bayes.contours import Circle, paper_profile
-from tactile_bayes.demonstration import LOAD_CELL
+from tactile_bayes.diagnostics.suspicions import suspicions
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import in_frame
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
-from tactile_bayes.uncertainty.suspicions import suspicions
+from tactile_bayes.runs.demonstration import LOAD_CELL
+from tactile_bayes.sweep import scan
 
 STEP = 0.05
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)

@@ -10,12 +10,12 @@ import xarray as xr
 
 from helpers.predicted_records import CELL, ideal, predicted, with_readings
 from tactile_bayes.contours import paper_profile
+from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.scanning import scan
-from tactile_bayes.uncertainty.verdicts import verdicts
+from tactile_bayes.sweep import scan
 
 
 def changed(tree, group, **values):

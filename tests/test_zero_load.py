@@ -11,9 +11,9 @@ from tactile_bayes.contours import Circle, Ellipse, paper_profile
 from tactile_bayes.errors import DriftWarning, ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.load_cell.contact_bounds import contact_bounds
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, in_frame, make_record, to_si
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 RIG = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, -0.3, 0.7))
 SHARES = np.array([1.0, -0.6, 0.8])

@@ -11,7 +11,7 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 DEVIATIONS = np.array([0.02, 0.05, 0.05])

@@ -31,11 +31,11 @@ from tactile_bayes.checks import (
     refused,
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.ledger import Ledger, TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rod import Rod
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.tasks import Ledger, TaskProgress, keep_outcomes, open_ledger
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
 

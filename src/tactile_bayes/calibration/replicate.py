@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.calibration.world import World
+from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
@@ -21,7 +22,6 @@ from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
-from tactile_bayes.uncertainty.record_check import check_record
 
 __all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "Replicate", "make_replicate", "replicate"]
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.checks import as_numbers, shown
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
-from tactile_bayes.roots import falling_root
+from tactile_bayes.numerics.roots import falling_root
 
 __all__ = [
     "Contour",

@@ -20,8 +20,8 @@ from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import Paths, trace
-from tactile_bayes.rod import LARGEST_STRAIN
-from tactile_bayes.sweeps import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
+from tactile_bayes.mechanics.rod import LARGEST_STRAIN
+from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
 __all__ = ["Records", "generate_records"]
 

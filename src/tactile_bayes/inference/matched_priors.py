@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named, sides_of
 from tactile_bayes.contours.family import Family
-from tactile_bayes.inference.families import Prior, own_priors
+from tactile_bayes.inference.priors import Prior, own_priors
 
 __all__ = ["matched_priors", "mean_log_radius", "widened"]
 

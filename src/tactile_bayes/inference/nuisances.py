@@ -14,12 +14,12 @@ from scipy import stats
 
 from tactile_bayes.checks import check_names, check_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.likelihood import Rig, bases_of
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import present_channels, rod_of
-from tactile_bayes.rod import Rod
 
 __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 

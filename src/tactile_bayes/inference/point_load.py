@@ -34,10 +34,10 @@ from tactile_bayes.checks import (
     check_positive,
     refused,
 )
-from tactile_bayes.clamped_rod import base_curvature
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
 from tactile_bayes.inference.result import provenance, sample_stats
+from tactile_bayes.mechanics.clamped_rod import base_curvature
 
 __all__ = ["Prior", "default_priors", "infer_point_load"]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.priors import Prior
 
 __all__ = ["log_density_of"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.differences import central_slopes
 from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends
+from tactile_bayes.numerics.differences import central_slopes
 
 __all__ = ["Cloud", "Optimum", "descend", "gather", "optima"]
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes import chebyshev
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "Nodes",

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes import chebyshev
 from tactile_bayes.mechanics.arc import arc_to, chord_angle, slack
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "AMPLITUDE",

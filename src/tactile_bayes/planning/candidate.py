@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.differences import central_slopes
+from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
 from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information

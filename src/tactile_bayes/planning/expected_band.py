@@ -10,8 +10,8 @@ from scipy import stats
 from scipy.linalg import solve_triangular
 
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.differences import central_slopes
-from tactile_bayes.scanning import Scan
+from tactile_bayes.numerics.differences import central_slopes
+from tactile_bayes.sweep import Scan
 
 __all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "stretches"]
 

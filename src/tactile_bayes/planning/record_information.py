@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.differences import central_slopes
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.record import CHANNELS
 

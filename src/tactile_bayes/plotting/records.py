@@ -20,7 +20,7 @@ from tactile_bayes.record import CHANNELS, Frame, frame_of, validate
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.sweep_events import SweepEvents
+    from tactile_bayes.sweep import SweepEvents
 
 __all__ = ["observables", "predictive"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import UNITS, column_of
 from tactile_bayes.record.table import Cells, Table
-from tactile_bayes.rod import Rod
 
 __all__ = ["in_units_of_record"]
 

@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.files import write_atomically
 from tactile_bayes.record.csv_header import (
     FORMAT,
     KINDS,
@@ -29,6 +28,7 @@ from tactile_bayes.record.encoding import in_utf8, refuse_other_kinds
 from tactile_bayes.record.origin import any_meant, meant_kinds, origins_of
 from tactile_bayes.record.schema import MEASURED, Kind
 from tactile_bayes.record.table import Source, Table
+from tactile_bayes.tasks import write_atomically
 
 __all__ = ["read_csv", "write_csv"]
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import xarray as xr
 
-from tactile_bayes.netcdf import read_netcdf as read_dataset
-from tactile_bayes.netcdf import write_netcdf as write_dataset
+from tactile_bayes.record.netcdf import read_netcdf as read_dataset
+from tactile_bayes.record.netcdf import write_netcdf as write_dataset
 from tactile_bayes.record.table import Source, Table, table_of
 
 __all__ = ["read_netcdf", "write_netcdf"]

@@ -9,11 +9,11 @@ import xarray as xr
 
 from tactile_bayes.checks import check_optional
 from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod
 from tactile_bayes.record.schema import LOAD_CELL_UNITS, column_of
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.validation import validate
-from tactile_bayes.rod import Rod
 
 __all__ = ["rod_of", "to_dimensionless", "to_si", "with_rod"]
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.roots import falling_root
+from tactile_bayes.numerics.roots import falling_root
 from tactile_bayes.uncertainty.band import contours_drawn, length_unit, places
 from tactile_bayes.uncertainty.quantiles import quantile_band
 

@@ -1,4 +1,4 @@
-"""A record that is yet to be made: drive angles without loads."""
+"""The template of a record that is yet to be made: drive angles without loads."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record
-from tactile_bayes.rod import Rod
 
-__all__ = ["blank_record"]
+__all__ = ["record_template"]
 
 
-def blank_record(
+def record_template(
     bases: Sequence[tuple[float, float]],
     directions: Sequence[str],
     drive_angles: NDArray[np.float64],
     rod: Rod | None,
     load_cell: LoadCell,
 ) -> xr.Dataset:
-    """Every pivot in turn, swept in every direction; angles are those read where the encoder makes no error of its own.
+    """Return an empty record: every pivot in turn, swept in every direction, with loads of zero.
+
+    Angles are those that an encoder without an error of its own reads.
 
     Parameters
     ----------

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from tactile_bayes.errors import TactileBayesError
-from tactile_bayes.files import alone_in, write_atomically
-from tactile_bayes.tasks import run_tasks
+from tactile_bayes.tasks.files import alone_in, write_atomically
+from tactile_bayes.tasks.workers import run_tasks
 
 __all__ = ["Kind", "Ledger", "TaskProgress", "keep_outcomes", "open_ledger"]
 

@@ -11,9 +11,9 @@ from tactile_bayes.mechanics.elastica import Wrench
 from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.rod import Rod
-from tactile_bayes.sweep_path import Direction
-from tactile_bayes.world import in_world
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep.lab_frame import to_lab_frame
+from tactile_bayes.sweep.path import Direction
 
 __all__ = ["Event", "SweepEvents", "events_of"]
 
@@ -83,7 +83,7 @@ def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod
     states = paths.states_at(lane, parameters)
     # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
     wrench = _at_rest_first(states, bool(to_tip[0]))
-    columns = in_world(paths.seen, lane, states._replace(wrench=wrench), rod)
+    columns = to_lab_frame(paths.seen, lane, states._replace(wrench=wrench), rod)
     words = ["tip" if tip else "tangential" for tip in to_tip]
     kinds = [
         words[0],

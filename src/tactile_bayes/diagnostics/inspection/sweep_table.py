@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.inspection.stretches import Rows
+from tactile_bayes.diagnostics.inspection.stretches import Rows
 
 __all__ = ["sweep_table"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.inspection.stretches import Rows, autocorrelation
+from tactile_bayes.diagnostics.inspection.stretches import Rows, autocorrelation
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels
 

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, TypeVar
 
 import xarray as xr
 
-from tactile_bayes.files import write_atomically
+from tactile_bayes.tasks import write_atomically
 
 __all__ = ["read_netcdf", "reading", "write_netcdf"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from tactile_bayes.inspection.stretches import Rows, centred
+from tactile_bayes.diagnostics.inspection.stretches import Rows, centred
 
 __all__ = ["outliers", "repeat_chance", "repeated", "runs_of_equals", "stuck", "uneven_steps"]
 

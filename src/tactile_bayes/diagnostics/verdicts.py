@@ -13,14 +13,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
+from tactile_bayes.diagnostics.suspicions import suspicions
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.uncertainty.record_check import Residuals, check_record, residuals_of
-from tactile_bayes.uncertainty.suspicions import suspicions
 
 __all__ = ["doubtful_sides", "verdicts"]
 

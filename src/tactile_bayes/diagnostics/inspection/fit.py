@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.inspection.remedies import Remedy, as_it_is, remedies_for
+from tactile_bayes.diagnostics.inspection.remedies import Remedy, as_it_is, remedies_for
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.reconstruction import reconstruct

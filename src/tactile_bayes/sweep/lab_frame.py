@@ -1,4 +1,4 @@
-"""States as the world has them: its signs for both directions, and the rod's units."""
+"""States in the laboratory frame: its signs for both directions, and the rod's units."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.mechanics.paths import States
 
-__all__ = ["RodUnits", "in_world"]
+__all__ = ["RodUnits", "to_lab_frame"]
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -27,8 +27,8 @@ class RodUnits(Protocol):
     def force_unit(self) -> Any: ...
 
 
-def in_world(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
-    """States on lanes in the world's signs and units; the contact point is the object's, not the centreline's.
+def to_lab_frame(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
+    """States on lanes in the laboratory's signs and units; the contact point is the object's, not the centreline's.
 
     Parameters
     ----------

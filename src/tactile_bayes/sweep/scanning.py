@@ -18,11 +18,11 @@ from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
+from tactile_bayes.mechanics.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.record import COLUMNS, make_record
-from tactile_bayes.rod import LARGEST_STRAIN, Rod
-from tactile_bayes.sweep_events import SweepEvents, events_of
-from tactile_bayes.sweep_path import Direction, friction_angle_of, seen_from, sweep_paths
-from tactile_bayes.world import in_world
+from tactile_bayes.sweep.events import SweepEvents, events_of
+from tactile_bayes.sweep.lab_frame import to_lab_frame
+from tactile_bayes.sweep.path import Direction, friction_angle_of, seen_from, sweep_paths
 
 __all__ = ["Scan", "equilibria", "scan"]
 
@@ -132,7 +132,7 @@ def equilibria(
     locus = seen.locate(lane, parameter)
     wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle_of(friction))
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
-    columns = in_world(seen, lane, states, units)
+    columns = to_lab_frame(seen, lane, states, units)
     reached = wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
     data = {}
@@ -287,7 +287,7 @@ def _sweep(
 ) -> dict[str, NDArray[np.generic]]:
     lane = np.zeros(angles.size, dtype=np.intp)
     states = paths.states(lane, np.pi - angles if paths.seen.mirrored[0] else angles)
-    columns = in_world(paths.seen, lane, states, rod)
+    columns = to_lab_frame(paths.seen, lane, states, rod)
     loaded = states.wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[states.wrench.phase]
     sweep: dict[str, NDArray[np.generic]] = {

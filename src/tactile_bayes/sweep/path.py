@@ -13,7 +13,7 @@ from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.fates import CLEARANCE, Reach
 from tactile_bayes.mechanics.paths import Paths, trace
-from tactile_bayes.rod import Rod
+from tactile_bayes.mechanics.rod import Rod
 
 __all__ = ["Direction", "friction_angle_of", "seen_from", "sweep_paths"]
 

@@ -14,8 +14,12 @@ from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_function, check_mapping, check_names, check_probability, check_switch
+from tactile_bayes.comparison.leave_one_out import difference, stacking_weights
+from tactile_bayes.comparison.left_out import ForetoldSamples, foretold_samples
+from tactile_bayes.comparison.verdict import verdict_on
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
+from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
@@ -23,16 +27,12 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import record_hash, rod_of, validate, with_rod
-from tactile_bayes.rod import Rod
-from tactile_bayes.uncertainty.contour_left_out import ForetoldSamples, foretold_samples
-from tactile_bayes.uncertainty.family_verdict import verdict_on
-from tactile_bayes.uncertainty.leave_one_out import difference, stacking_weights
-from tactile_bayes.uncertainty.record_check import check_record
 
 __all__ = ["SHAPES", "compare_families"]
 

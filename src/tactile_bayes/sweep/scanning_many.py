@@ -14,10 +14,10 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import COLUMNS
-from tactile_bayes.rod import Rod
-from tactile_bayes.sweep_path import friction_angle_of
-from tactile_bayes.sweeps import ManyUnits, phases_of, sweep_events, sweep_samples
+from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
+from tactile_bayes.sweep.path import friction_angle_of
 
 __all__ = ["scan_many"]
 

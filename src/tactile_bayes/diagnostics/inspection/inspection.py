@@ -12,18 +12,18 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_optional, check_probability
+from tactile_bayes.diagnostics.inspection.channel_table import channel_table
+from tactile_bayes.diagnostics.inspection.fit import Fit, fit_of
+from tactile_bayes.diagnostics.inspection.known_cell import known_cell
+from tactile_bayes.diagnostics.inspection.sample_table import sample_table
+from tactile_bayes.diagnostics.inspection.stretches import rows_of_sweeps, unloaded_stretches
+from tactile_bayes.diagnostics.inspection.sweep_table import sweep_table
+from tactile_bayes.diagnostics.inspection.words import UNFIT, in_words
+from tactile_bayes.diagnostics.suspicions import suspicions
 from tactile_bayes.errors import DriftWarning
-from tactile_bayes.inspection.channel_table import channel_table
-from tactile_bayes.inspection.fit import Fit, fit_of
-from tactile_bayes.inspection.known_cell import known_cell
-from tactile_bayes.inspection.sample_table import sample_table
-from tactile_bayes.inspection.stretches import rows_of_sweeps, unloaded_stretches
-from tactile_bayes.inspection.sweep_table import sweep_table
-from tactile_bayes.inspection.words import UNFIT, in_words
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels, validate
-from tactile_bayes.uncertainty.suspicions import suspicions
 
 __all__ = ["Inspection", "inspect_record"]
 

@@ -9,13 +9,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_bayes.diagnostics.inspection.fit import Fit
+from tactile_bayes.diagnostics.inspection.remedies import OTHER_ANGLE
+from tactile_bayes.diagnostics.suspicions import CHECK_UNITS
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.nuisances import BIAS
-from tactile_bayes.inspection.fit import Fit
-from tactile_bayes.inspection.remedies import OTHER_ANGLE
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
-from tactile_bayes.uncertainty.suspicions import CHECK_UNITS
 
 __all__ = ["UNFIT", "in_words", "prefix_of", "quantity"]
 

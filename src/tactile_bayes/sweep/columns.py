@@ -1,4 +1,4 @@
-"""Many sweeps at once: arrays in the world's signs and units."""
+"""Columns of many sweeps at once: arrays in the laboratory's signs and units."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.mechanics.phases import NONE
-from tactile_bayes.world import in_world
+from tactile_bayes.sweep.lab_frame import to_lab_frame
 
 __all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
 
@@ -60,14 +60,14 @@ def sweep_samples(paths: Paths, units: ManyUnits, lane: NDArray[np.intp]) -> dic
         `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
     """
     states, each = paths.sampled_states(lane), lane[..., None]
-    found = in_world(paths.seen, each, states, units.of(each))
+    found = to_lab_frame(paths.seen, each, states, units.of(each))
     for name in LOADS:
         np.copyto(found[name], 0.0, where=states.wrench.phase == NONE)
     return {name: found[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
 
 
 def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:
-    """ "first_contact" and "snap_off" of every lane: `EVENT_COLUMNS` in the world's sense, NaN where there is none."""
+    """`EVENT_COLUMNS` of "first_contact" and "snap_off" of every lane in the laboratory frame, NaN where there is none."""
     lanes = np.arange(paths.seen.lanes)
     events = {}
     for name, angle, parameter in (
@@ -75,7 +75,7 @@ def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Fl
         ("snap_off", paths.snap_angle, paths.snap_parameter),
     ):
         states = paths.states_at(lanes, parameter)
-        world = in_world(paths.seen, lanes, states, units.of(lanes))
+        world = to_lab_frame(paths.seen, lanes, states, units.of(lanes))
         turned = np.where(paths.seen.mirrored, np.pi - angle, angle)
         events[name] = {**{column: world[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
     return events

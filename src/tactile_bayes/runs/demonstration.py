@@ -7,9 +7,9 @@ from pathlib import Path
 
 from tactile_bayes.contours import Parabola
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import write_record
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 __all__ = ["CONTOUR", "LOAD_CELL", "ROD", "TRUTH", "measure_demo"]
 
