@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ledger import REPLICATES
@@ -38,8 +38,6 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.tasks import Ledger, TaskProgress, keep_outcomes, open_ledger
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
-
-Floats = NDArray[np.float64]
 
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 """Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""

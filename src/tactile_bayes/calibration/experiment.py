@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from tactile_bayes.calibration.world import NUMBERS, World
 from tactile_bayes.checks import check_probability
@@ -35,8 +34,6 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.sweep import record_template
 
 __all__ = ["Experiment"]
-
-Floats = NDArray[np.float64]
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
 

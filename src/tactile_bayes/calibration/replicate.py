@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.calibration.world import World
@@ -24,8 +24,6 @@ from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
 
 __all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "Replicate", "make_replicate", "replicate"]
-
-Floats = NDArray[np.float64]
 
 DRAWS = 99
 """Thinned draws among which the truth has a rank, from 0 to this."""

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
@@ -35,8 +34,6 @@ from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import record_hash, rod_of, validate, with_rod
 
 __all__ = ["SHAPES", "compare_families"]
-
-Floats = NDArray[np.float64]
 
 SHAPES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 """Families that are compared by default: the last but one has flanks of two shapes."""

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from arviz_stats.base.array import array_stats
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, minimize
 from scipy.special import logsumexp
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
 
 __all__ = [
@@ -30,8 +30,6 @@ __all__ = [
     "reweighted",
     "stacking_weights",
 ]
-
-Floats = NDArray[np.float64]
 
 _LEAST_DRAWS = 25
 """Of which a fifth, the tail, is enough to fit two parameters to."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.comparison.leave_one_out import left_out, left_out_from_wider
 from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
@@ -15,8 +15,6 @@ from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, sample, spawn
 
 __all__ = ["ForetoldSamples", "foretold_samples"]
-
-Floats = NDArray[np.float64]
 
 _DRAWS = 2000
 """Of which densities are asked."""

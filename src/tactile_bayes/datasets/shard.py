@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.family import FamilyParameter
 from tactile_bayes.datasets.generation import Records, generate_records
@@ -22,8 +23,6 @@ from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
 from tactile_bayes.tasks import write_atomically
-
-Floats = NDArray[np.float64]
 
 __all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]
 

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.likelihood import RecordLikelihood
@@ -15,9 +16,6 @@ from tactile_bayes.inference.result import record_of, refuse_no_contour
 from tactile_bayes.load_cell import LoadCell, rough_noise
 
 __all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
 """Ways in which a record can differ from those that the posterior predicts."""
@@ -48,7 +46,7 @@ class Residuals(NamedTuple):
     """What one is in the record's units, shape (samples,)."""
     loaded: NDArray[np.bool_]
     """Which samples the posterior expects to carry a load, shape (samples,)."""
-    sweeps: tuple[Rows, ...]
+    sweeps: tuple[Index, ...]
     """Rows of each sweep, in the order of measurement."""
 
 
@@ -260,7 +258,7 @@ def _scores(discrepancies: Floats) -> Floats:
         return np.asarray((discrepancies - middle[..., None]) / (high - middle)[..., None])
 
 
-def _worst_stretch(residuals: Residuals) -> Rows:
+def _worst_stretch(residuals: Residuals) -> Index:
     """Samples of the real record, neighbours in the loaded part of a sweep, whose mean is furthest from zero."""
     parts = [rows[residuals.loaded[rows]] for rows in residuals.sweeps]
     parts = [rows for rows in parts if rows.size >= _FEWEST_SAMPLES] or list(residuals.sweeps)

@@ -6,13 +6,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
 __all__ = ["CHECK_UNITS", "suspicions"]
-
-Floats = NDArray[np.float64]
 
 _STRONGEST = 100.0
 """Force in EI/L² above which units are doubted: a tangential contact with more is within 0.37 L of the pivot."""

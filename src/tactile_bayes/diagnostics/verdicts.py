@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
 from tactile_bayes.diagnostics.suspicions import suspicions
@@ -23,8 +23,6 @@ from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["doubtful_sides", "verdicts"]
-
-Floats = NDArray[np.float64]
 
 _NOISES = ("noise_scale", "moment_noise", "force_noise")
 

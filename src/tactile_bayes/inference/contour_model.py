@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import DriftWarning, ReachError
@@ -24,8 +25,6 @@ from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["ContourModel"]
-
-Floats = NDArray[np.float64]
 
 _FEWEST_UNLOADED = 12
 """Unloaded samples that tell zero and noise of a channel."""

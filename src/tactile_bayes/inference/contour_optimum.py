@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -22,8 +23,6 @@ from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
 
 __all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
-
-Floats = NDArray[np.float64]
 
 _PRIOR_DRAWS = 1000
 _CANDIDATES = 24

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, check_choice, check_number, check_numbers, check_positive, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
@@ -20,7 +21,6 @@ from tactile_bayes.record.attributes import no_entry
 
 __all__ = ["CERTAIN", "DataSheet"]
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 CERTAIN = ("bias", "gain", "lever", "drive_angle_offset", "drive_angle_backlash")

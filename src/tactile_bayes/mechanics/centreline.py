@@ -8,15 +8,14 @@ contact is (F − C, S)/√f along and across the direction at the contact. Beyo
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ellipj
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 
 __all__ = ["rod_shape"]
-
-Floats = NDArray[np.float64]
 
 
 def rod_shape(

@@ -23,14 +23,13 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 
 __all__ = ["base_curvature"]
-
-Floats = NDArray[np.float64]
 
 _MAX_TURN = 1.5
 """Largest angle δ between chord and base [rad] that is modelled."""

@@ -6,7 +6,8 @@ import functools
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
 
 __all__ = [
     "basis",
@@ -20,8 +21,6 @@ __all__ = [
     "value_and_slope",
     "with_slope",
 ]
-
-Floats = NDArray[np.float64]
 
 
 @functools.cache

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
 
 __all__ = ["central_slopes"]
-
-Floats = NDArray[np.float64]
 
 _JUMP = 0.01
 """Bend of a value over a step, in its unit, from which on it may be a jump."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["ROUNDING", "falling_root"]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 ROUNDING = 1e-14
 """Step, as a share of the bracket, that is rounding."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import logsumexp
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
@@ -21,8 +22,6 @@ from tactile_bayes.planning.record_information import parameter_scales, reading_
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
-
-Floats = NDArray[np.float64]
 
 _ROUGH_STEP = 1e-3
 """Of the differences by which loads are made linear, over the scale of each parameter: they are interpolated."""

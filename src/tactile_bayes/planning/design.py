@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     TINY,
     check_choice,
@@ -34,8 +34,6 @@ from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge, known_from
 from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_ledger
 
 __all__ = ["CRITERIA", "design"]
-
-Floats = NDArray[np.float64]
 
 Criterion = Literal["band", "gap", "information"]
 CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")

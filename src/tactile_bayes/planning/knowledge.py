@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -27,8 +27,6 @@ from tactile_bayes.record import rod_of
 from tactile_bayes.sweep import record_template
 
 __all__ = ["COARSE", "Base", "Knowledge", "known_from_posterior", "known_from_prior"]
-
-Floats = NDArray[np.float64]
 
 Base = tuple[float, float]
 

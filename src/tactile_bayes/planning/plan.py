@@ -9,8 +9,9 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_mapping, check_names, check_optional
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
@@ -28,8 +29,6 @@ from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Scan, scan
 
 __all__ = ["Plan", "usual_load_cell"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import TINY, check_choice, check_kind, check_numbers, check_positive, check_probability
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, StrainWarning
 from tactile_bayes.mechanics.rod import Rod
@@ -24,7 +24,6 @@ from tactile_bayes.tasks import TaskProgress
 
 __all__ = ["Where", "required_noise", "required_rod"]
 
-Floats = NDArray[np.float64]
 Where = Literal["gap", "touched", "everywhere"]
 
 _SEEN = 0.5

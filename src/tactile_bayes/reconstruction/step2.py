@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_number, check_optional, refused
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
@@ -25,8 +25,6 @@ from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_do
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
 
 __all__ = ["AXIAL_ALARM", "reconstruct"]
-
-Floats = NDArray[np.float64]
 
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood
@@ -17,7 +18,6 @@ from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
-from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.record import rod_of
 from tactile_bayes.sweep import ManyUnits, to_lab_frame
 

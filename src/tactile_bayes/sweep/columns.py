@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 
 __all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
-
-Floats = NDArray[np.float64]
 
 LOADS = ("holding_moment", "force_x", "force_y")
 
@@ -67,7 +66,7 @@ def sweep_samples(paths: Paths, units: ManyUnits, lane: NDArray[np.intp]) -> dic
 
 
 def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:
-    """`EVENT_COLUMNS` of "first_contact" and "snap_off" of every lane in the laboratory frame, NaN where there is none."""
+    """`EVENT_COLUMNS` of every "first_contact" and "snap_off", in the laboratory frame; NaN where there is none."""
     lanes = np.arange(paths.seen.lanes)
     events = {}
     for name, angle, parameter in (
@@ -75,9 +74,9 @@ def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Fl
         ("snap_off", paths.snap_angle, paths.snap_parameter),
     ):
         states = paths.states_at(lanes, parameter)
-        world = to_lab_frame(paths.seen, lanes, states, units.of(lanes))
+        found = to_lab_frame(paths.seen, lanes, states, units.of(lanes))
         turned = np.where(paths.seen.mirrored, np.pi - angle, angle)
-        events[name] = {**{column: world[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
+        events[name] = {**{column: found[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
     return events
 
 

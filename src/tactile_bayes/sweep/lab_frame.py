@@ -7,13 +7,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.mechanics.paths import States
 
 __all__ = ["RodUnits", "to_lab_frame"]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 class RodUnits(Protocol):

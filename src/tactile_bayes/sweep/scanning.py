@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
@@ -25,8 +26,6 @@ from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction, friction_angle_of, seen_from, sweep_paths
 
 __all__ = ["Scan", "equilibria", "scan"]
-
-Floats = NDArray[np.float64]
 
 _MARGIN = 15
 """Steps of the drive before first contact and after snap-off."""

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
@@ -25,8 +25,6 @@ from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validat
 from tactile_bayes.sweep import to_lab_frame
 
 __all__ = ["contacts_of", "implied_contacts"]
-
-Floats = NDArray[np.float64]
 
 _BLOCK = 200
 """Contours whose paths are followed at a time."""

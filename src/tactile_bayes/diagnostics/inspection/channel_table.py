@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.diagnostics.inspection.stretches import Rows, autocorrelation
+from tactile_bayes.arrays import Index
+from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels
 
@@ -14,7 +15,7 @@ __all__ = ["channel_table"]
 _FROM_ZERO_LOAD = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "resolution", "same_bias_p_value")
 
 
-def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Rows], stated: LoadCell | None) -> xr.Dataset:
+def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index], stated: LoadCell | None) -> xr.Dataset:
     """See `Inspection`; `found` is what `zero_load` returns."""
     columns = {name: np.full(len(CHANNELS), np.nan) for name in ("smallest", "largest", "stated_noise", "stated_bias")}
     likeness = np.full((2, len(CHANNELS)), np.nan)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Index
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, repeated, stuck, uneven_steps
-from tactile_bayes.diagnostics.inspection.stretches import Rows
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels
 
@@ -16,8 +16,8 @@ __all__ = ["sample_table"]
 def sample_table(
     record: xr.Dataset,
     found: xr.Dataset,
-    sweeps: list[Rows],
-    stretches: list[Rows],
+    sweeps: list[Index],
+    stretches: list[Index],
     cell: LoadCell | None,
     *,
     false_alarm: float,

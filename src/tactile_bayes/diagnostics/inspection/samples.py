@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
-from tactile_bayes.diagnostics.inspection.stretches import Rows, centred
+from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.diagnostics.inspection.stretches import centred
 
 __all__ = ["outliers", "repeat_chance", "repeated", "runs_of_equals", "stuck", "uneven_steps"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _FEWEST = 8
 """Unloaded samples below which their scatter says nothing of single ones."""
@@ -34,7 +31,7 @@ _USUAL = 0.2
 """Share of steps that may be uneven: with more of them, the drive is meant to move so."""
 
 
-def outliers(reading: Floats, sweeps: list[Rows], stretches: list[Rows], step: float, *, false_alarm: float) -> Flags:
+def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step: float, *, false_alarm: float) -> Flags:
     """Readings far from the others: of their unloaded stretch, or in contact of both neighbours on either side.
 
     Parameters
@@ -77,7 +74,7 @@ def outliers(reading: Floats, sweeps: list[Rows], stretches: list[Rows], step: f
     return flags
 
 
-def repeat_chance(reading: Floats, stretches: list[Rows], step: float, noise: float) -> float:
+def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: float) -> float:
     """How often two unloaded readings are the same, as far as the steps of the reading make them so."""
     by_steps = min(1.0, step / (2.0 * math.sqrt(math.pi) * noise)) if noise > 0.0 else 1.0
     values = np.concatenate([reading[rows][np.append(True, np.diff(reading[rows]) != 0.0)] for rows in stretches])
@@ -88,13 +85,13 @@ def repeat_chance(reading: Floats, stretches: list[Rows], step: float, noise: fl
     return max(by_steps, found)
 
 
-def runs_of_equals(reading: Floats, rows: Rows) -> list[Rows]:
+def runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
     """Readings of a sweep that are the same one after the other, two and more."""
     parts = np.split(rows, np.flatnonzero(np.diff(reading[rows]) != 0.0) + 1)
     return [part for part in parts if part.size > 1]
 
 
-def stuck(reading: Floats, sweeps: list[Rows], chance: float, *, false_alarm: float) -> Flags:
+def stuck(reading: Floats, sweeps: list[Index], chance: float, *, false_alarm: float) -> Flags:
     """Readings that stay the same for longer than steps of the reading explain."""
     flags = np.zeros(reading.size, dtype=bool)
     for rows in sweeps:
@@ -104,7 +101,7 @@ def stuck(reading: Floats, sweeps: list[Rows], chance: float, *, false_alarm: fl
     return flags
 
 
-def repeated(readings: Floats, sweeps: list[Rows], chances: Floats, *, false_alarm: float) -> Flags:
+def repeated(readings: Floats, sweeps: list[Index], chances: Floats, *, false_alarm: float) -> Flags:
     """Samples of which all readings, shape (n_samples, n_channels), are those of the sample before."""
     flags = np.zeros(len(readings), dtype=bool)
     if len(readings) * float(np.prod(chances)) >= false_alarm:
@@ -115,7 +112,7 @@ def repeated(readings: Floats, sweeps: list[Rows], chances: Floats, *, false_ala
     return flags
 
 
-def uneven_steps(angle: Floats, rows: Rows, sense: int) -> Flags:
+def uneven_steps(angle: Floats, rows: Index, sense: int) -> Flags:
     """Whether the step up to each sample of a sweep differs from the others; all even where many do."""
     flags = np.zeros(rows.size, dtype=bool)
     step = sense * np.diff(angle[rows])

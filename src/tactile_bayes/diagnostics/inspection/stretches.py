@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Autocorrelation", "autocorrelation", "centred", "rows_of_sweeps", "unloaded_stretches"]
+from tactile_bayes.arrays import Floats, Index
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
+__all__ = ["Autocorrelation", "autocorrelation", "centred", "rows_of_sweeps", "unloaded_stretches"]
 
 _CUT = 4.0
 """Robust standard deviations at which residuals are cut off, lest one outlier rules."""
@@ -25,13 +24,13 @@ class Autocorrelation(NamedTuple):
     """In standard errors if the noise is white: about standard normal."""
 
 
-def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Rows]:
+def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
     """The samples of each sweep, in the order of their numbers."""
     order = np.argsort(sweep, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
-def unloaded_stretches(sweeps: list[Rows], unloaded: NDArray[np.bool_]) -> list[Rows]:
+def unloaded_stretches(sweeps: list[Index], unloaded: NDArray[np.bool_]) -> list[Index]:
     """Samples that follow each other in a sweep and are unloaded, each stretch by itself."""
     stretches = []
     for rows in sweeps:
@@ -41,7 +40,7 @@ def unloaded_stretches(sweeps: list[Rows], unloaded: NDArray[np.bool_]) -> list[
     return stretches
 
 
-def centred(reading: Floats, stretches: list[Rows]) -> tuple[Floats, float]:
+def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
     """Readings less the median of their stretch, stretch by stretch, and their robust standard deviation."""
     residuals = [reading[rows] - np.median(reading[rows]) for rows in stretches]
     together = np.concatenate(residuals) if residuals else np.zeros(0)
@@ -49,7 +48,7 @@ def centred(reading: Floats, stretches: list[Rows]) -> tuple[Floats, float]:
     return together, spread
 
 
-def autocorrelation(reading: Floats, stretches: list[Rows]) -> Autocorrelation:
+def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
     """Of neighbouring samples, over all stretches; NaN where most readings are on one step."""
     _, spread = centred(reading, stretches)
     if spread == 0.0:

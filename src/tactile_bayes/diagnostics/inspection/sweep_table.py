@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.diagnostics.inspection.stretches import Rows
+from tactile_bayes.arrays import Index
 
 __all__ = ["sweep_table"]
 
 
-def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Rows]) -> xr.Dataset:
+def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> xr.Dataset:
     """See `Inspection`; `found` is what `zero_load` returns."""
     angle, unloaded = record["drive_angle"].values, found["unloaded"].values
     first = np.array([rows[0] for rows in sweeps])

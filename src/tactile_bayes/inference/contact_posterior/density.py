@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
@@ -18,7 +19,6 @@ from tactile_bayes.record import turned
 
 __all__ = ["ContactDensity", "ContactPrior", "Evaluated"]
 
-Floats = NDArray[np.float64]
 LogPrior = Callable[[Floats, Floats, Floats], Floats]
 ContactPrior = Literal["flat", "polar"] | LogPrior
 

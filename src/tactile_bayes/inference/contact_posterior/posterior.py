@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_function, check_number, check_optional, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
@@ -36,8 +37,6 @@ from tactile_bayes.reconstruction import reconstruct, samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
 
 __all__ = ["infer_contacts"]
-
-Floats = NDArray[np.float64]
 
 _UNLIKELY = 1e-4
 """Probability of a misfit below which the loads are not those of the rod."""
