@@ -12,12 +12,10 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.checks import check_optional, check_probability
-from tactile_bayes.diagnostics.inspection.channel_table import channel_table
 from tactile_bayes.diagnostics.inspection.fit import Fit, fit_of
 from tactile_bayes.diagnostics.inspection.known_cell import known_cell
-from tactile_bayes.diagnostics.inspection.sample_table import sample_table
 from tactile_bayes.diagnostics.inspection.stretches import rows_of_sweeps, unloaded_stretches
-from tactile_bayes.diagnostics.inspection.sweep_table import sweep_table
+from tactile_bayes.diagnostics.inspection.tables import channel_table, sample_table, sweep_table
 from tactile_bayes.diagnostics.inspection.words import UNFIT, in_words
 from tactile_bayes.diagnostics.suspicions import suspicions
 from tactile_bayes.errors import DriftWarning

@@ -1,4 +1,4 @@
-"""The samples of a record in a table: which of them look wrong, and in what."""
+"""Tables of a record: its samples and what looks wrong in them, its channels, its sweeps."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import xarray as xr
 
 from tactile_bayes.arrays import Index
 from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, repeated, stuck, uneven_steps
+from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels
 
-__all__ = ["sample_table"]
+__all__ = ["channel_table", "sample_table", "sweep_table"]
+
+_FROM_ZERO_LOAD = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "resolution", "same_bias_p_value")
 
 
 def sample_table(
@@ -70,3 +73,51 @@ def sample_table(
         },
         coords={"channel": list(CHANNELS)},
     )
+
+
+def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index], stated: LoadCell | None) -> xr.Dataset:
+    """See `Inspection`; `found` is what `zero_load` returns."""
+    columns = {name: np.full(len(CHANNELS), np.nan) for name in ("smallest", "largest", "stated_noise", "stated_bias")}
+    likeness = np.full((2, len(CHANNELS)), np.nan)
+    for index, name in enumerate(CHANNELS):
+        if name not in present_channels(record):
+            continue
+        reading = record[name].values
+        columns["smallest"][index], columns["largest"][index] = reading.min(), reading.max()
+        likeness[:, index] = autocorrelation(reading, stretches)
+        if stated is not None:
+            step = stated.resolution[index] / np.sqrt(12.0)
+            noise = float(np.hypot(stated.standard_deviations[name], step))
+            columns["stated_noise"][index] = noise if 0.0 < noise < np.inf else np.nan
+            columns["stated_bias"][index] = stated.bias[index]
+    columns["neighbour_correlation"], columns["neighbour_score"] = likeness
+    table = xr.Dataset(
+        {name: ("channel", values) for name, values in columns.items()},
+        coords={"channel": list(CHANNELS), "unit": ("channel", found["unit"].values)},
+        attrs={"units": record.attrs["units"]},
+    )
+    return table.assign({name: found[name].variable for name in _FROM_ZERO_LOAD})
+
+
+def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> xr.Dataset:
+    """See `Inspection`; `found` is what `zero_load` returns."""
+    angle, unloaded = record["drive_angle"].values, found["unloaded"].values
+    first = np.array([rows[0] for rows in sweeps])
+    steps = [float(np.median(np.abs(np.diff(angle[rows])))) if rows.size > 1 else np.nan for rows in sweeps]
+    length = {"units": record["base_x"].attrs["units"]}
+    of_angle = {"units": "rad"}
+    table = xr.Dataset(
+        {
+            "direction": ("sweep", record["direction"].values[first]),
+            "samples": ("sweep", [rows.size for rows in sweeps]),
+            "base_x": ("sweep", record["base_x"].values[first], length),
+            "base_y": ("sweep", record["base_y"].values[first], length),
+            "drive_angle_from": ("sweep", angle[first], of_angle),
+            "drive_angle_to": ("sweep", angle[[rows[-1] for rows in sweeps]], of_angle),
+            "drive_step": ("sweep", steps, of_angle),
+            "unloaded": ("sweep", [int(np.count_nonzero(unloaded[rows])) for rows in sweeps]),
+        },
+        coords={"sweep": found["sweep"].values, "side": found["side"].values},
+    )
+    names = ("contact", "p_value", "onset_drive_angle", "snap_off_drive_angle")
+    return table.assign({name: found[name].variable for name in names})
