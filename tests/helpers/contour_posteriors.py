@@ -18,6 +18,9 @@ DEVIATIONS = np.array([0.02, 0.05, 0.05])
 STEP = float(np.radians(2.0))
 TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}
 
+QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
+"""Enough for files and messages, not for numbers."""
+
 BRIEF = SamplerSettings(ensembles=2, walkers=16, block_steps=30, max_steps=30, min_ess=1e9)
 """Too short for anything but the layout of results."""
 
