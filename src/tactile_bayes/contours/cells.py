@@ -74,8 +74,14 @@ def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:
 
 
 def _series(contour: Contour, owner: NDArray[np.intp], begin: Floats, end: Floats) -> Floats:
-    """Coefficients of x, y and slope angle, shape (cells, 3, order)."""
+    """Coefficients of x, y and slope angle, shape (cells, 3, order).
+
+    Of what each differs from its value amid the cell, so that rounding is that of the difference.
+    """
     parameter = begin[:, None] + (end - begin)[:, None] * chebyshev.nodes(_ORDER)
     locus = contour.take(np.broadcast_to(owner[:, None], parameter.shape)).locate(parameter)
     values = np.stack([locus.x, locus.y, locus.slope_angle], axis=1)
-    return np.ascontiguousarray(np.moveaxis(chebyshev.coefficients(values), 0, -1))
+    amid = values[..., _ORDER // 2].copy()
+    series = np.ascontiguousarray(np.moveaxis(chebyshev.coefficients(values - amid[..., None]), 0, -1))
+    series[..., 0] += amid
+    return series
