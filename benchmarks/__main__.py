@@ -26,13 +26,13 @@ from benchmarks.starting import starting
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
 from tactile_bayes.contours.seen import SeenContour
-from tactile_bayes.demonstration import CONTOUR as DEMONSTRATED
-from tactile_bayes.demonstration import LOAD_CELL, ROD
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import spawn
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.record import make_record
+from tactile_bayes.runs.demonstration import CONTOUR as DEMONSTRATED
+from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 
 CONTOUR = tb.contours.paper_profile("II", q=0.6)
 """Its forward sweep is in tip, then tangential, then tip contact again."""

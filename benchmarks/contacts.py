@@ -14,10 +14,9 @@ from scipy.stats import binom
 from threadpoolctl import threadpool_limits
 
 import tactile_bayes as tb
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw
 from tactile_bayes.record import make_record
-
-Floats = NDArray[np.float64]
 
 REFERENCE = Path(__file__).parents[1] / "data" / "synthetic" / "reference"
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)

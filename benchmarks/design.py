@@ -12,18 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import stats
 
 import tactile_bayes as tb
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.planning.candidate import measured_of
 from tactile_bayes.planning.knowledge import known_from_prior
 from tactile_bayes.tasks import run_tasks
-
-Floats = NDArray[np.float64]
 
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.35, 0.3), "x_c": stats.norm(0.0, 0.1)}
 STEP = float(np.radians(2.0))

@@ -10,13 +10,11 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from numpy.typing import NDArray
 
 import tactile_bayes as tb
+from tactile_bayes.arrays import Floats
 from tactile_bayes.planning.information import information
 from tactile_bayes.tasks import run_tasks
-
-Floats = NDArray[np.float64]
 
 FACTORS = (3.0, 1.0, 0.1, 0.01)
 """On a noise of 0.05 EI/L² and 0.02 EI/L."""

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 import tactile_bayes as tb
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Joined
 from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.tasks import run_tasks
-
-Floats = NDArray[np.float64]
 
 FAMILIES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 NONE = "edge"

@@ -14,15 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 import tactile_bayes as tb
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Ellipse, Parabola, PowerLaw, Smooth, from_points, paper_profile
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.scanning import Scan
+from tactile_bayes.sweep import Scan
 from tactile_bayes.tasks import run_tasks
-
-Floats = NDArray[np.float64]
 
 NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.06)}
 """Of forces [EI/L²] and of the moment [EI/L]."""

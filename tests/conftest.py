@@ -10,13 +10,9 @@ import pytest
 import typer.testing
 from hypothesis import settings
 
-from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
-from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.scanning import scan
-
-QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
-"""Enough for files and messages, not for numbers."""
-
+from helpers.contour_posteriors import QUICK
+from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.sweep import scan
 
 settings.register_profile("few", max_examples=15, derandomize=True)
 

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from tactile_bayes.cli import app
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError, RecordError
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import present_channels, read_record, write_record
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 NAMES = ["sweep", "direction", "base_x", "base_y", "drive_angle", "holding_moment", "force_x", "force_y"]
 

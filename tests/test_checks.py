@@ -32,10 +32,10 @@ from tactile_bayes.checks import (
     check_whole_number,
     shown,
 )
+from tactile_bayes.comparison import families as family_comparison
 from tactile_bayes.errors import ParameterError, TactileBayesError, TactileBayesWarning
 from tactile_bayes.inference import contour
 from tactile_bayes.inference.contact_posterior import posterior as contact_posterior
-from tactile_bayes.uncertainty import family_comparison
 
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 

@@ -94,11 +94,13 @@ def test_a_change_that_does_not_fit_is_told() -> None:
         patched("a\na\n", "-a\n+d\n")
 
 
-def test_the_rooms_are_there() -> None:
-    """Of the table of the house."""
-    rooms = re.findall(r"`([\w/]+(?:\.py)?)`", re.search(r"\| floor.*?\n\n", TEXT, flags=re.DOTALL)[0])
-    assert rooms
-    assert [room for room in rooms if not (ROOT / "src" / "tactile_bayes" / room).exists()] == []
+def test_every_room_and_every_file_beside_them_is_in_the_house() -> None:
+    """As the table and the line below it draw it."""
+    drawn = re.search(r"\| floor.*?\n\n.*?\n\n", TEXT, flags=re.DOTALL)[0]
+    package = ROOT / "src" / "tactile_bayes"
+    rooms = {f"{path.parent.name}/" for path in package.glob("*/__init__.py")}
+    files = {path.name for path in package.glob("*.py")}
+    assert sorted(re.findall(r"`(\w+/|\w+\.py)`", drawn)) == sorted(rooms | files)
 
 
 def test_the_targets_are_there() -> None:

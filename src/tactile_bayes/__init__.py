@@ -24,19 +24,19 @@ _HOMES = {
     "OrnsteinUhlenbeck": "load_cell",
     "Plan": "planning.plan",
     "RandomWalk": "load_cell",
-    "Rod": "rod",
+    "Rod": "mechanics.rod",
     "SamplerSettings": "inference.ensembles",
     "World": "calibration.world",
     "calibrate": "calibration.calibrate",
     "calibration_replicate": "calibration.calibrate",
-    "check_record": "uncertainty.record_check",
-    "compare_families": "uncertainty.family_comparison",
+    "check_record": "diagnostics.record_check",
+    "compare_families": "comparison.families",
     "contact_moments": "uncertainty.contact_moments",
     "contact_region": "uncertainty.contact_region",
     "contour_band": "uncertainty.band",
     "design": "planning.design",
     "elastica": "mechanics",
-    "equilibria": "scanning",
+    "equilibria": "sweep",
     "error_map": "planning.error_map",
     "gap": "uncertainty.gap",
     "implied_contacts": "uncertainty.implied_contacts",
@@ -44,7 +44,7 @@ _HOMES = {
     "infer_contacts": "inference.contact_posterior",
     "infer_contour": "inference.contour",
     "infer_point_load": "inference.point_load",
-    "inspect_record": "inspection",
+    "inspect_record": "diagnostics.inspection",
     "make_record": "record",
     "normal_band": "uncertainty.normal_band",
     "predictive_interval": "uncertainty.predictive",
@@ -53,12 +53,12 @@ _HOMES = {
     "reconstruct": "reconstruction",
     "required_noise": "planning.requirement",
     "required_rod": "planning.requirement",
-    "scan": "scanning",
-    "scan_many": "scanning_many",
+    "scan": "sweep",
+    "scan_many": "sweep",
     "sensitivity": "planning.sensitivity",
-    "suspicions": "uncertainty.suspicions",
+    "suspicions": "diagnostics.suspicions",
     "to_arviz": "inference.result",
-    "verdicts": "uncertainty.verdicts",
+    "verdicts": "diagnostics.verdicts",
     "write_record": "record",
     "write_report": "report",
     "write_result": "inference.result",
@@ -76,6 +76,11 @@ if TYPE_CHECKING:
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
     from tactile_bayes.calibration.calibrate import calibration_replicate as calibration_replicate
     from tactile_bayes.calibration.world import World as World
+    from tactile_bayes.comparison.families import compare_families as compare_families
+    from tactile_bayes.diagnostics.inspection import inspect_record as inspect_record
+    from tactile_bayes.diagnostics.record_check import check_record as check_record
+    from tactile_bayes.diagnostics.suspicions import suspicions as suspicions
+    from tactile_bayes.diagnostics.verdicts import verdicts as verdicts
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour
     from tactile_bayes.inference.ensembles import SamplerSettings as SamplerSettings
@@ -83,12 +88,12 @@ if TYPE_CHECKING:
     from tactile_bayes.inference.result import read_result as read_result
     from tactile_bayes.inference.result import to_arviz as to_arviz
     from tactile_bayes.inference.result import write_result as write_result
-    from tactile_bayes.inspection import inspect_record as inspect_record
     from tactile_bayes.load_cell import LoadCell as LoadCell
     from tactile_bayes.load_cell import OrnsteinUhlenbeck as OrnsteinUhlenbeck
     from tactile_bayes.load_cell import RandomWalk as RandomWalk
     from tactile_bayes.load_cell import zero_load as zero_load
     from tactile_bayes.mechanics import elastica as elastica
+    from tactile_bayes.mechanics.rod import Rod as Rod
     from tactile_bayes.planning.design import design as design
     from tactile_bayes.planning.error_map import error_map as error_map
     from tactile_bayes.planning.plan import Plan as Plan
@@ -101,21 +106,16 @@ if TYPE_CHECKING:
     from tactile_bayes.record import read_record as read_record
     from tactile_bayes.record import write_record as write_record
     from tactile_bayes.report import write_report as write_report
-    from tactile_bayes.rod import Rod as Rod
-    from tactile_bayes.scanning import equilibria as equilibria
-    from tactile_bayes.scanning import scan as scan
-    from tactile_bayes.scanning_many import scan_many as scan_many
+    from tactile_bayes.sweep import equilibria as equilibria
+    from tactile_bayes.sweep import scan as scan
+    from tactile_bayes.sweep import scan_many as scan_many
     from tactile_bayes.uncertainty.band import contour_band as contour_band
     from tactile_bayes.uncertainty.contact_moments import contact_moments as contact_moments
     from tactile_bayes.uncertainty.contact_region import contact_region as contact_region
-    from tactile_bayes.uncertainty.family_comparison import compare_families as compare_families
     from tactile_bayes.uncertainty.gap import gap as gap
     from tactile_bayes.uncertainty.implied_contacts import implied_contacts as implied_contacts
     from tactile_bayes.uncertainty.normal_band import normal_band as normal_band
     from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval
-    from tactile_bayes.uncertainty.record_check import check_record as check_record
-    from tactile_bayes.uncertainty.suspicions import suspicions as suspicions
-    from tactile_bayes.uncertainty.verdicts import verdicts as verdicts
 
 
 def __getattr__(name: str) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.uncertainty.family_verdict import verdict_on
+from tactile_bayes.comparison.verdict import verdict_on
 
 NAMES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
 

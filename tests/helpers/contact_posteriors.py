@@ -21,10 +21,10 @@ from tactile_bayes.inference.contact_posterior.importance import weigh_contacts
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import samples_of
 from tactile_bayes.record import CHANNELS, frame_of, in_frame, rod_of
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 NAMES = ("contact_x", "contact_y", "slope_angle")
 
@@ -295,7 +295,7 @@ def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", frict
 def weighed_moments(density: ContactDensity, draws=16000, seed=1):
     """The ten numbers of each sample from weighted proposals, and the number of draws that these are worth."""
     weights = weigh_contacts(density, draws, np.random.SeedSequence(seed))
-    places = density.in_world(weights.place)[:3]
+    places = density.to_lab_frame(weights.place)[:3]
     tangential = weights.points[..., 0] < 0.0
     each = []
     for i, log_weight in enumerate(weights.log_weight.T):

@@ -11,12 +11,15 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 DEVIATIONS = np.array([0.02, 0.05, 0.05])
 STEP = float(np.radians(2.0))
 TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}
+
+QUICK = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=30)
+"""Enough for files and messages, not for numbers."""
 
 BRIEF = SamplerSettings(ensembles=2, walkers=16, block_steps=30, max_steps=30, min_ess=1e9)
 """Too short for anything but the layout of results."""

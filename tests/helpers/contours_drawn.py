@@ -25,7 +25,7 @@ from tactile_bayes.contours import (
 from tactile_bayes.contours.function import FunctionContour
 from tactile_bayes.errors import ContourError, ReachError
 from tactile_bayes.mechanics.paths import Paths
-from tactile_bayes.sweep_path import sweep_paths
+from tactile_bayes.sweep.path import sweep_paths
 
 
 class Scene(NamedTuple):

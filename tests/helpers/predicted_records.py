@@ -10,7 +10,7 @@ import xarray as xr
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.scanning import Scan, scan
+from tactile_bayes.sweep import Scan, scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
 STEP = float(np.radians(3.0))

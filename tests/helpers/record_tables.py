@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.errors import RecordError
-from tactile_bayes.rod import Rod
+from tactile_bayes.mechanics.rod import Rod
 
 WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=0.7e-3)
 

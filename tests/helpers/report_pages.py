@@ -9,11 +9,11 @@ from unittest import mock
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.record import read_record, write_record
 from tactile_bayes.runs import contour as run
-from tactile_bayes.scanning import scan
+from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
+from tactile_bayes.sweep import scan
 
 FEW = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
 

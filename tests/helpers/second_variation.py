@@ -36,11 +36,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, null_space
 
-Floats = NDArray[np.float64]
+from tactile_bayes.arrays import Floats
 
 
 class Held(NamedTuple):

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ledger import REPLICATES
@@ -31,15 +31,13 @@ from tactile_bayes.checks import (
     refused,
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.ledger import Ledger, TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rod import Rod
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.tasks import Ledger, TaskProgress, keep_outcomes, open_ledger
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
-
-Floats = NDArray[np.float64]
 
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
 """Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import betaincinv, rel_entr
 
-__all__ = ["coverage_p_value", "noticed_coverage"]
+from tactile_bayes.arrays import Floats
 
-Floats = NDArray[np.float64]
+__all__ = ["coverage_p_value", "noticed_coverage"]
 
 _MARGIN = 0.01
 """What quantiles of some hundred draws may miss of a probability."""

@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.blank_record import blank_record
 from tactile_bayes.calibration.world import NUMBERS, World
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours.families import family_named
@@ -27,16 +25,15 @@ from tactile_bayes.inference.contour_problem import (
     prior_in_words,
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.rod import Rod
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import record_template
 
 __all__ = ["Experiment"]
-
-Floats = NDArray[np.float64]
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
 
@@ -81,7 +78,7 @@ class Experiment:
     def template(self) -> xr.Dataset:
         """The record without loads: its drive angles are those read where the encoder makes no error of its own."""
         angles = np.asarray(self.drive_angles, dtype=float)
-        return blank_record(self.bases, self.directions, angles, self.rod, self.load_cell)
+        return record_template(self.bases, self.directions, angles, self.rod, self.load_cell)
 
     @cached_property
     def model(self) -> ContourModel:

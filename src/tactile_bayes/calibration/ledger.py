@@ -8,7 +8,7 @@ from typing import Any
 
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.errors import CalibrationError
-from tactile_bayes.ledger import Kind
+from tactile_bayes.tasks import Kind
 
 __all__ = ["REPLICATES"]
 

@@ -11,9 +11,9 @@ from scipy import stats
 from scipy.optimize import brentq
 from scipy.special import bdtr, gammaln, log_ndtr
 
-__all__ = ["NoticedRanks", "expected_shares", "noticed_ranks", "simultaneous_band", "uniformity_p_value"]
+from tactile_bayes.arrays import Floats
 
-Floats = NDArray[np.float64]
+__all__ = ["NoticedRanks", "expected_shares", "noticed_ranks", "simultaneous_band", "uniformity_p_value"]
 
 _SIMULATIONS = 20_000
 """Sets of uniform ranks, by which it is judged how unusual one is."""

@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.calibration.world import World
+from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
 from tactile_bayes.inference.contour_model import ContourModel
@@ -21,11 +22,8 @@ from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.contact_region import contact_region
 from tactile_bayes.uncertainty.implied_contacts import contacts_of
-from tactile_bayes.uncertainty.record_check import check_record
 
 __all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "Replicate", "make_replicate", "replicate"]
-
-Floats = NDArray[np.float64]
 
 DRAWS = 99
 """Thinned draws among which the truth has a rank, from 0 to this."""

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ReachError
@@ -19,8 +19,6 @@ from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["Simulation", "simulate"]
-
-Floats = NDArray[np.float64]
 
 _TRIALS = 200
 """Truths drawn until the rod reaches one in the world as it is."""

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverage
 from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniformity_p_value
@@ -24,8 +25,6 @@ from tactile_bayes.calibration.verdict import (
 )
 
 __all__ = ["CLAIMS", "FALSE_ALARM", "summary"]
-
-Floats = NDArray[np.float64]
 
 FALSE_ALARM = 0.01
 """Probability, at most, that the verdict finds fault with posteriors that are right."""

@@ -12,8 +12,8 @@ from tactile_bayes.checks import check_kind, check_number, check_numbers, check_
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.likelihood import Rig
+from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
 from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["NUMBERS", "World"]

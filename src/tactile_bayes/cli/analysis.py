@@ -95,9 +95,9 @@ def demo(
     output: Output,
 ) -> Answer:
     """A steel wire sweeps along a parabola; its noisy record is turned into a contour with a band."""
-    from tactile_bayes.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
     from tactile_bayes.record import read_record
     from tactile_bayes.runs.contour import analyse
+    from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
 
     path = measure_demo(out, seed=seed)
     if not output.is_silent:

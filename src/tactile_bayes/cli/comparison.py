@@ -54,9 +54,9 @@ def compare(
     output: Output,
 ) -> Answer:
     """Compare shapes of contours: which of them a measured record is of, and whether any fits."""
+    from tactile_bayes.comparison.families import SHAPES
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.comparison import compare_into
-    from tactile_bayes.uncertainty.family_comparison import SHAPES
 
     nuisances = unknown.nuisances
     measured, cell = reading.read(record)

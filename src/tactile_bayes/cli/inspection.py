@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.inspection import Inspection
+    from tactile_bayes.diagnostics.inspection import Inspection
 
 __all__ = ["inspect"]
 
@@ -49,7 +49,7 @@ def inspect(
     It takes the options of infer that say how a file is read; the last line is the command to go on with.
     """
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.inspection import inspect_record
+        from tactile_bayes.diagnostics.inspection import inspect_record
 
         measured, cell = reading.read(record)
         found = inspect_record(measured, load_cell=cell, friction=friction, progress=show)
@@ -86,7 +86,7 @@ def _as_options(reading: RecordOptions, friction: float) -> str:
 
 def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
     """What is in the file, except its sweeps and channels; origins are what the options say of columns."""
-    from tactile_bayes.inspection.words import quantity
+    from tactile_bayes.diagnostics.inspection.words import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
     record, rod = found.record, rod_of(found.record)
@@ -149,7 +149,7 @@ def _place(beside: Any) -> str:
 
 def _channels(channels: xr.Dataset) -> Table:
     """Numbers of a channel all in one unit; the last is the correlation of unloaded neighbours."""
-    from tactile_bayes.inspection.words import prefix_of
+    from tactile_bayes.diagnostics.inspection.words import prefix_of
 
     rows = []
     for row in columns_of(channels, "channel"):

@@ -11,7 +11,7 @@ from tactile_bayes.cli.numbers import numbers_asked
 
 if TYPE_CHECKING:
     from tactile_bayes.load_cell import LoadCell
-    from tactile_bayes.rod import Rod
+    from tactile_bayes.mechanics.rod import Rod
 
 __all__ = ["Friction", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions", "rod_asked"]
 
@@ -124,7 +124,7 @@ def rod_asked(length: float | None, flexural_rigidity: float | None, diameter: f
         If it is not given whole.
     """
     from tactile_bayes.errors import ParameterError
-    from tactile_bayes.rod import Rod
+    from tactile_bayes.mechanics.rod import Rod
 
     if (length is None) != (flexural_rigidity is None):
         raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from tactile_bayes.rod import Rod
-    from tactile_bayes.scanning import Scan
+    from tactile_bayes.mechanics.rod import Rod
+    from tactile_bayes.sweep import Scan
 
 __all__ = ["RecordFile", "refuse_other_suffix", "scan"]
 
@@ -53,9 +53,9 @@ def scan(
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
     with step_bar(output.is_silent) as show:
+        from tactile_bayes.mechanics.rod import Rod
         from tactile_bayes.record import write_record
-        from tactile_bayes.rod import Rod
-        from tactile_bayes.scanning import scan as sweep
+        from tactile_bayes.sweep import scan as sweep
 
         rod = rig.rod or Rod()
         made = sweep(
@@ -157,7 +157,7 @@ def _draw(made: Scan, path: Path) -> None:
     from matplotlib.figure import Figure
 
     from tactile_bayes import plotting
-    from tactile_bayes.files import write_atomically
+    from tactile_bayes.tasks import write_atomically
 
     shown = [number for number, sweep in enumerate(made.sweeps) if sweep.base == made.sweeps[0].base]
     figure = Figure(figsize=(7.0, 5.0 + 3.4 * len(shown)), layout="constrained")

@@ -9,16 +9,15 @@ from typing import Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_numbers, shown
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
-from tactile_bayes.roots import falling_root
+from tactile_bayes.numerics.roots import falling_root
 
 __all__ = [
     "Contour",
-    "Floats",
     "Graph",
-    "Index",
     "Locus",
     "Parameter",
     "Single",
@@ -30,9 +29,7 @@ __all__ = [
     "refuse_unless",
 ]
 
-Floats = NDArray[np.float64]
 Parameter = float | Floats
-Index = NDArray[np.intp] | tuple[NDArray[np.intp], ...]
 
 _FARTHEST = 2.0**60
 """Where the search for a slope or a place on an endless contour is given up."""
@@ -138,7 +135,7 @@ class Contour(ABC):
         """The same contours with every parameter an array of one shape, as `take` wants them."""
         return self._each(lambda value: np.broadcast_to(value, (*shape, *np.shape(value)[len(self.shape) :])))
 
-    def take(self, index: Index) -> Self:
+    def take(self, index: Index | tuple[Index, ...]) -> Self:
         """The contours at `index`, of a contour whose parameters are all arrays of one shape."""
         return self._each(lambda value: value[index])
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.stats import t as student_t
 
-from tactile_bayes.contours.base import Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ContourError
 
 __all__ = ["FALSE_ALARM", "STRAIGHT", "Bends", "refuse_two_bands", "refuse_unless_convex"]

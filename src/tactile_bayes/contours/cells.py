@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes import chebyshev
-from tactile_bayes.contours.base import Contour, Floats
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.halves import CELLS, Half, Halves
+from tactile_bayes.numerics import chebyshev
 
 __all__ = ["in_cells"]
 

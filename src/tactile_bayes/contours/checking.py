@@ -9,7 +9,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.contours.base import Contour, Floats, Graph, Locus
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Contour, Graph, Locus
 from tactile_bayes.contours.rates import Rate, mismatch, probes
 from tactile_bayes.errors import ContourError
 

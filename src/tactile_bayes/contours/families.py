@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import shown
-from tactile_bayes.contours.base import Contour, Floats
+from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.family import (
     VERTEX,
     Family,

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from tactile_bayes.contours.base import Contour, Floats
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Contour
 
 __all__ = ["DefaultPrior", "Family", "FamilyParameter", "log_normal", "parabola_through", "robust_least_squares"]
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.contours.base import Floats, Graph, Single
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Graph, Single
 from tactile_bayes.contours.joined import SAME_SLOPE
 from tactile_bayes.contours.rates import mismatch, probes
 from tactile_bayes.errors import ContourError

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from tactile_bayes.arrays import Floats
 
 __all__ = ["CELLS", "OVAL", "PARABOLA", "POWER_LAW", "SLOPES", "Half", "Halves"]
-
-Floats = NDArray[np.float64]
 
 PARABOLA, OVAL, POWER_LAW, SLOPES, CELLS = 0, 1, 2, 3, 4
 

@@ -9,10 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.base import (
     Contour,
-    Floats,
-    Index,
     Locus,
     Parameter,
     as_parameter,
@@ -166,7 +165,7 @@ class Joined(Contour):
     def broadcast_to(self, shape: tuple[int, ...]) -> Joined:
         return self._both(lambda half: half.broadcast_to(shape), lambda value: np.broadcast_to(value, shape))
 
-    def take(self, index: Index) -> Joined:
+    def take(self, index: Index | tuple[Index, ...]) -> Joined:
         return self._both(lambda half: half.take(index), lambda value: value[index])
 
     def _both(self, of_half: Callable[[Contour], Contour], of_value: Callable[[Floats], Floats]) -> Joined:

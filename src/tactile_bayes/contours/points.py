@@ -13,7 +13,8 @@ from scipy.linalg import null_space
 from scipy.optimize import minimize_scalar, nnls
 from threadpoolctl import threadpool_limits
 
-from tactile_bayes.contours.base import Floats, Graph, Parameter, Single
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Graph, Parameter, Single
 from tactile_bayes.contours.bends import STRAIGHT, Bends, refuse_two_bands, refuse_unless_convex
 from tactile_bayes.errors import ContourError
 

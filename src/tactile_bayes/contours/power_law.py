@@ -8,7 +8,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes.contours.base import Floats, Locus, Parameter, Vertexed, alike, refuse_unless
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Locus, Parameter, Vertexed, alike, refuse_unless
 from tactile_bayes.contours.halves import POWER_LAW, Half, Halves
 
 __all__ = ["PowerLaw"]

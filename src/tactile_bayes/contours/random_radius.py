@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from tactile_bayes.contours.base import Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.smooth import Smooth
 
 __all__ = ["Directions", "RandomRadius"]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.contours.base import Floats
+from tactile_bayes.arrays import Floats
 
 __all__ = ["Mismatch", "Rate", "mismatch", "probes"]
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.contours.base import Contour, Floats, Index, Locus, Parameter
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.contours.base import Contour, Locus, Parameter
 
 __all__ = ["SeenContour"]
 

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from tactile_bayes import chebyshev
-from tactile_bayes.contours.base import Floats, Locus, Parameter
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Locus, Parameter
 from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
+from tactile_bayes.numerics import chebyshev
 
 __all__ = ["ShapeFree"]
 

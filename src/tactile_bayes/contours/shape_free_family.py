@@ -11,7 +11,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import ndtri
 
-from tactile_bayes.contours.base import Contour, Floats, refuse_unless
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Contour, refuse_unless
 from tactile_bayes.contours.family import VERTEX, DefaultPrior, Family, FamilyParameter, log_normal, parabola_through
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.contours.smooth import Smooth

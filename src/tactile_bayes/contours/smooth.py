@@ -9,12 +9,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tactile_bayes import chebyshev
-from tactile_bayes.contours.base import Floats, Index, Locus, Parameter
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.contours.base import Locus, Parameter
 from tactile_bayes.contours.halves import SLOPES, Half, Halves
 from tactile_bayes.contours.tabled import Tabled
 from tactile_bayes.errors import ContourError
-from tactile_bayes.roots import falling_root
+from tactile_bayes.numerics import chebyshev
+from tactile_bayes.numerics.roots import falling_root
 
 __all__ = ["Smooth"]
 

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from tactile_bayes.contours.base import Contour, Floats, as_parameter, common_shape, finite, refuse_unless
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.base import Contour, as_parameter, common_shape, finite, refuse_unless
 
 __all__ = ["Tabled"]
 

@@ -18,7 +18,7 @@ from xarray.core import indexing
 
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.netcdf import reading
+from tactile_bayes.record.netcdf import reading
 
 __all__ = ["open_dataset", "opened", "opened_shard"]
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.seen import SeenContour
@@ -20,14 +21,10 @@ from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import Paths, trace
-from tactile_bayes.rod import LARGEST_STRAIN
-from tactile_bayes.sweeps import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
+from tactile_bayes.mechanics.rod import LARGEST_STRAIN
+from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
 __all__ = ["Records", "generate_records"]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
-
 
 _MOST_DRAWS = 1000
 """Draws of one record before the specification is given up."""

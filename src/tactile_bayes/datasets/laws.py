@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number
 from tactile_bayes.errors import SpecificationError
 
 __all__ = ["Law", "law_of"]
-
-Floats = NDArray[np.float64]
 
 
 class _Kind(NamedTuple):

@@ -15,7 +15,7 @@ from typing import Any
 from tactile_bayes.datasets.shard import Written
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.files import write_atomically
+from tactile_bayes.tasks import write_atomically
 
 __all__ = ["MANIFEST", "Manifest", "read_manifest", "versions_here", "write_manifest"]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.datasets.specification import Specification
 from tactile_bayes.datasets.streams import NOISE, Together, streams
 from tactile_bayes.errors import ParameterError, SpecificationError
@@ -16,9 +17,6 @@ from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.record import CHANNELS, turned
 
 __all__ = ["measure"]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 _HARMLESS: dict[str, tuple[str, int | None]] = {
     **{

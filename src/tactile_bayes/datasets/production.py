@@ -18,8 +18,7 @@ from tactile_bayes.datasets.shard import Written, shard_file, write_shard
 from tactile_bayes.datasets.specification import UNNAMED, Specification, meaning, read_specification
 from tactile_bayes.datasets.specification_text import differences
 from tactile_bayes.errors import SpecificationError
-from tactile_bayes.files import alone_in, write_atomically
-from tactile_bayes.tasks import run_tasks
+from tactile_bayes.tasks import alone_in, run_tasks, write_atomically
 
 __all__ = ["Production", "generate"]
 

@@ -13,17 +13,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.family import FamilyParameter
 from tactile_bayes.datasets.generation import Records, generate_records
 from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.datasets.specification import Specification, read_text
-from tactile_bayes.files import write_atomically
 from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
-
-Floats = NDArray[np.float64]
+from tactile_bayes.tasks import write_atomically
 
 __all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]
 

@@ -19,8 +19,8 @@ from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification import Specification, read_specification, read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, COLUMNS, column_of, make_record
-from tactile_bayes.rod import Rod
 
 __all__ = ["contour_of", "record"]
 

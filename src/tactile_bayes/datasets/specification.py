@@ -23,8 +23,8 @@ from tactile_bayes.datasets.laws import Law, law_of
 from tactile_bayes.datasets.specification_text import canonical, toml_of, without
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
-from tactile_bayes.rod import Rod
 
 __all__ = [
     "UNNAMED",

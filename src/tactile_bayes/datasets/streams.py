@@ -9,9 +9,10 @@ import numpy as np
 from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
+
 __all__ = ["CONTOUR", "NOISE", "Together", "streams"]
 
-Floats = NDArray[np.float64]
 Words = NDArray[np.uint32]
 
 CONTOUR, NOISE = 0, 1

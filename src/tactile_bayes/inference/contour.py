@@ -30,13 +30,13 @@ from tactile_bayes.inference.ensembles import (
     settings_of,
     spawn,
 )
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.inference.result import provenance
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
-from tactile_bayes.rod import Rod
 
 __all__ = ["Sampled", "contours_of", "infer_contour", "sampled"]
 

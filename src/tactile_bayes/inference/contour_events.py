@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 
 __all__ = ["events_of"]
-
-Floats = NDArray[np.float64]
 
 
 def events_of(

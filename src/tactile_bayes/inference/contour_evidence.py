@@ -6,19 +6,17 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour import Sampled
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import in_coordinates
 from tactile_bayes.inference.evidence import bridge_evidence
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.matched_priors import widened
+from tactile_bayes.inference.priors import Prior
 
 __all__ = ["WIDTHS", "ContourEvidence", "contour_evidence"]
-
-Floats = NDArray[np.float64]
 
 WIDTHS = (0.5, 1.0, 2.0)
 """Of the priors of sizes, exponents, amplitude and length scale: factors on what is stated."""

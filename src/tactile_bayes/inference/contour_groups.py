@@ -9,17 +9,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.inference.blocks import blocks
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Draws
 from tactile_bayes.inference.result import sample_stats
+from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 
 __all__ = ["drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
-
-Floats = NDArray[np.float64]
 
 _KEPT_DRAWS = 250
 """Draws of each chain for which predictions and events are stored, at most."""

@@ -9,23 +9,22 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import DriftWarning, ReachError
-from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Ends, Logarithms
-from tactile_bayes.inference.families import Prior, support_of
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import Noise
 from tactile_bayes.inference.nuisances import MAY_VANISH, Nuisances
 from tactile_bayes.inference.prior_density import log_density_of
+from tactile_bayes.inference.priors import Prior, support_of
 from tactile_bayes.load_cell import rough_noise, zero_load
+from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["ContourModel"]
-
-Floats = NDArray[np.float64]
 
 _FEWEST_UNLOADED = 12
 """Unloaded samples that tell zero and noise of a channel."""

@@ -10,20 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Logarithms
 from tactile_bayes.inference.nuisances import BIASES
 from tactile_bayes.inference.start import descend, optima
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
 
 __all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
-
-Floats = NDArray[np.float64]
 
 _PRIOR_DRAWS = 1000
 _CANDIDATES = 24

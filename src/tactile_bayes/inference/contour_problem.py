@@ -19,13 +19,14 @@ from tactile_bayes.checks import check_mapping, check_optional, check_switch
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference import families
+from tactile_bayes.inference import priors as families
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.likelihood import without_errors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import (
     CONTACT_SIDES,
     OTHER_SIDE,
@@ -35,7 +36,6 @@ from tactile_bayes.reconstruction import (
     with_sides,
 )
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
-from tactile_bayes.rod import Rod
 
 __all__ = ["Assumptions", "ContourProblem", "contour_priors", "contour_problem", "default_priors", "prior_in_words"]
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
@@ -30,8 +30,6 @@ from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.start import Cloud, gather
 
 __all__ = ["Walk", "walk_of"]
-
-Floats = NDArray[np.float64]
 
 _OF_ROUGHNESS, _OF_NOISE, _OF_REST = 0.3, 0.1, 0.7
 """Standard deviations, half those of the walkers, of the logarithms of amplitude, length scale and noise, and of

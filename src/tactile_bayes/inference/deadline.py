@@ -8,13 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-__all__ = ["NEVER", "Deadline"]
+from tactile_bayes.arrays import Floats
 
-Floats = NDArray[np.float64]
+__all__ = ["NEVER", "Deadline"]
 
 
 class _PassedError(Exception):

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp, ndtr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["EncoderErrors"]
-
-Floats = NDArray[np.float64]
 
 _WIDEST, _NARROWEST = 0.75, 0.1
 """Distance between neighbouring errors, in standard deviations, at most and at least."""

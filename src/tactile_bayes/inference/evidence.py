@@ -12,11 +12,10 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 from scipy.special import expit, ndtr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 
 __all__ = ["Evidence", "bridge_evidence"]
-
-Floats = NDArray[np.float64]
 
 _KNOTS = np.linspace(-2.0, 2.0, 7)
 """Normal scores between which a parameter's score is linear: more would follow noise, fewer would miss walls."""

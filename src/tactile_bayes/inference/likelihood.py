@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.errors import ParameterError
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.sweeps import Answers, Lanes, Shapes, Strokes
 
 __all__ = ["RecordLikelihood", "Rig", "bases_of", "without_errors"]
-
-Floats = NDArray[np.float64]
 
 _UNFELT = 2e-3
 """Error of loads over their noise that 360 samples together do not show: it moves their log-likelihood by less than

@@ -6,18 +6,16 @@ import functools
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.optimize import brentq
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named, sides_of
 from tactile_bayes.contours.family import Family
-from tactile_bayes.inference.families import Prior, own_priors
+from tactile_bayes.inference.priors import Prior, own_priors
 
 __all__ = ["matched_priors", "mean_log_radius", "widened"]
-
-Floats = NDArray[np.float64]
 
 _SLOPES = np.linspace(0.0, 0.25 * np.pi, 9, endpoint=False) + np.pi / 72.0
 """Slope angles over which a flank's radius of curvature is averaged [rad]."""

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy import stats
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.families import Prior
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 

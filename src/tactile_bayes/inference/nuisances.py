@@ -9,21 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import stats
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_names, check_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.likelihood import Rig, bases_of
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import present_channels, rod_of
-from tactile_bayes.rod import Rod
 
 __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
-
-Floats = NDArray[np.float64]
 
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
 """What is inferred unless something else is asked for, as far as the record can tell it."""

@@ -21,10 +21,11 @@ from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.optimize import least_squares
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     as_number,
     as_numbers,
@@ -34,14 +35,12 @@ from tactile_bayes.checks import (
     check_positive,
     refused,
 )
-from tactile_bayes.clamped_rod import base_curvature
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, sample, scatter_walkers, spawn
 from tactile_bayes.inference.result import provenance, sample_stats
+from tactile_bayes.mechanics.clamped_rod import base_curvature
 
 __all__ = ["Prior", "default_priors", "infer_point_load"]
-
-Floats = NDArray[np.float64]
 
 _GEOMETRY = ("clamp_axial", "clamp_lateral", "clamp_angle", "compliance")
 _UNITS = {"clamp_axial": "mm", "clamp_lateral": "mm", "clamp_angle": "rad", "compliance": "mm"}

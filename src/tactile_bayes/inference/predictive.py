@@ -7,11 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
 
 __all__ = ["predictive_p_value"]
-
-Floats = NDArray[np.float64]
 
 
 def _sum_of_squares(residuals: Floats) -> Floats:

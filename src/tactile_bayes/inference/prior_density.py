@@ -8,14 +8,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
-from tactile_bayes.inference.families import Prior
+from tactile_bayes.arrays import Floats
+from tactile_bayes.inference.priors import Prior
 
 __all__ = ["log_density_of"]
-
-Floats = NDArray[np.float64]
 
 _ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 

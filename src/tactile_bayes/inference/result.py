@@ -19,7 +19,7 @@ from tactile_bayes.checks import check_kind, check_path
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed
-from tactile_bayes.netcdf import read_netcdf, write_netcdf
+from tactile_bayes.record.netcdf import read_netcdf, write_netcdf
 
 __all__ = [
     "contact_draws",

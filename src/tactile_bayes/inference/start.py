@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.differences import central_slopes
 from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends
+from tactile_bayes.numerics.differences import central_slopes
 
 __all__ = ["Cloud", "Optimum", "descend", "gather", "optima"]
 
-Floats = NDArray[np.float64]
 Residuals = Callable[[Floats], Floats]
 
 _BRAVE = 2.0

@@ -9,8 +9,9 @@ from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
@@ -27,8 +28,6 @@ from tactile_bayes.load_cell.zero_load import found_cell
 from tactile_bayes.record import CHANNELS, frame_of, validate
 
 __all__ = ["LoadCell"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc, betaln, fdtri, stdtrit
 
-__all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
+from tactile_bayes.arrays import Floats
 
-Floats = NDArray[np.float64]
+__all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
 
 FEWEST = 3
 """Fewest samples that tell bias and noise."""

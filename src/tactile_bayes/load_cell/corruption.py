@@ -6,13 +6,12 @@ import math
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.data_sheet import DataSheet
 
 __all__ = ["Draws", "corrupted_angles", "corrupted_loads"]
-
-Floats = NDArray[np.float64]
 
 
 class Draws(Protocol):

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri, stdtr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.data_sheet import DataSheet
 
 __all__ = ["covariance", "surprise", "wandering_deviation"]
-
-Floats = NDArray[np.float64]
 
 _BEYOND_ALL = 1e100
 """Standard deviations that make no difference any more, and of which sums of products are still numbers."""

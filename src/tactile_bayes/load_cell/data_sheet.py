@@ -11,16 +11,16 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, check_choice, check_number, check_numbers, check_positive, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, FRAMES, LOAD_CELL_UNITS, Frame
 from tactile_bayes.record.attributes import no_entry
-from tactile_bayes.rod import Rod
 
 __all__ = ["CERTAIN", "DataSheet"]
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 CERTAIN = ("bias", "gain", "lever", "drive_angle_offset", "drive_angle_backlash")

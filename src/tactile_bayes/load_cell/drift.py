@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number
 from tactile_bayes.errors import ParameterError
 
 __all__ = ["Drift", "OrnsteinUhlenbeck", "RandomWalk"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaln, gammaln, hyp2f1, log_ndtr, stdtr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.record import CHANNELS
@@ -24,8 +25,6 @@ __all__ = [
     "refuse_inexact",
     "refuse_silent",
 ]
-
-Floats = NDArray[np.float64]
 
 Given = Callable[[Floats, Floats, Floats, float, Floats, Floats], tuple[Floats, Floats]]
 """What is new in each sample given others, and its variance, as `_given_before`."""

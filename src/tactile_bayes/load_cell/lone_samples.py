@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.likelihood import (
@@ -17,8 +18,6 @@ from tactile_bayes.load_cell.likelihood import (
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["LoneSamples"]
-
-Floats = NDArray[np.float64]
 
 
 class LoneSamples:

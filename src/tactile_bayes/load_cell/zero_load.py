@@ -11,14 +11,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell.contact_bounds import FEWEST, ContactBounds, contact_bounds
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, present_channels, validate
 
 __all__ = ["found_cell", "zero_load"]
-
-Floats = NDArray[np.float64]
 
 _TELLING = 12
 """Fewest samples of a sweep that is taken for unloaded because no contact was found in it: in shorter ones a strong

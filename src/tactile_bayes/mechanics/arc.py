@@ -22,8 +22,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = [
@@ -38,8 +38,6 @@ __all__ = [
     "slack_rate",
     "slopes_by_chi",
 ]
-
-Floats = NDArray[np.float64]
 
 SHORT_COSINE = math.cos(1.0)
 """Cosine of the amplitude below which an arc is short: quadrature then, since the closed forms of C and S cancel."""

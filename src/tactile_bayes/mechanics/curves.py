@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.outline import Place, frame, place
 from tactile_bayes.mechanics.series import Nodes, change_of, crossing, nodes_of, tail, value, value_and_slope, weighted
@@ -40,8 +40,6 @@ __all__ = [
     "regained",
     "sample",
 ]
-
-Floats = NDArray[np.float64]
 
 REST, ANGLE = 3, 4
 """Rows after those of the three loads: what else tells a state (the arc length of the contact, or where the tip touches

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.phases import NONE
 
@@ -23,8 +24,6 @@ __all__ = [
     "tangential_arclength",
     "wrench_from_contact",
 ]
-
-Floats = NDArray[np.float64]
 
 MAX_FRICTION_ANGLE = 0.7
 """Largest friction angle δ [rad]: 2 E(m) > K(m) must hold for m = (1 + sin δ)/2, else the map of Phase B folds."""

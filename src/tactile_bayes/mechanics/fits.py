@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import compiled, kept
 from tactile_bayes.mechanics.fitting import RawFit, Reading
 from tactile_bayes.mechanics.states import contact
 from tactile_bayes.mechanics.touches import moved, touch
 
 __all__ = ["Room", "descents", "raw_fits"]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 _MOST_SWEEPS = 30
 

@@ -10,14 +10,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
 
 __all__ = ["Half", "Outline", "Place", "bearing", "ends", "frame", "mirrored", "place"]
-
-Floats = NDArray[np.float64]
 
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3

@@ -18,8 +18,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
@@ -55,8 +55,6 @@ from tactile_bayes.mechanics.states import Scene
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 
 __all__ = ["MOST_CHANGES", "Ends", "Work", "follow", "work"]
-
-Floats = NDArray[np.float64]
 
 MOST_CHANGES = 16
 """Phases of a path, one after the other, of which an account is kept."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.seen import SeenContour
 from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.sweeps import Answers, Lanes, Shapes
 
 __all__ = ["Paths", "States", "trace"]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 class States(NamedTuple):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, MISS, REST, WAY, Course, Curves, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import Place, place
@@ -28,8 +29,6 @@ __all__ = [
     "write_loads",
     "write_states",
 ]
-
-Floats = NDArray[np.float64]
 
 STATE_COLUMNS = 13
 """Numbers that are kept of a state: phase, parameter, point, slope angle, and those of `State`."""

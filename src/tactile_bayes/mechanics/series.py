@@ -6,10 +6,10 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes import chebyshev
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "Nodes",
@@ -22,8 +22,6 @@ __all__ = [
     "value_and_slope",
     "weighted",
 ]
-
-Floats = NDArray[np.float64]
 
 
 class Nodes(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.cells import in_cells
 
 if TYPE_CHECKING:
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from tactile_bayes.mechanics.sweeps import Shapes
 
 __all__ = ["shapes_of"]
-
-Floats = NDArray[np.float64]
 
 
 def shapes_of(contours: Contour, low: Floats | None = None, high: Floats | None = None) -> Shapes:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.arc import (
     SHORT_COSINE,
     Arc,
@@ -53,8 +54,6 @@ __all__ = [
     "tabled_state",
     "wrenches",
 ]
-
-Floats = NDArray[np.float64]
 
 _BEYOND = 1e-12
 """By how much rounding may turn a chord beyond where the line of force passes through the pivot [rad]."""

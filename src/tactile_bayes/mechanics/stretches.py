@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.reach import Limits
 from tactile_bayes.mechanics.series import Nodes, change_of, crossing, tail, value, weighted
 from tactile_bayes.mechanics.states import Scene, excess
 
 __all__ = ["BRIEF", "Accuracy", "Stretch", "along", "along_rate", "cut"]
-
-Floats = NDArray[np.float64]
 
 BRIEF = 1e-6
 """Share of a path so short that what changes on it may be lost in rounding."""

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled, kept
 from tactile_bayes.mechanics.fates import Reach
@@ -20,9 +21,6 @@ from tactile_bayes.mechanics.stretches import Accuracy
 from tactile_bayes.mechanics.tables import MOST_FRICTION, Room, Tables, prepare, room, tables
 
 __all__ = ["Answers", "Lanes", "Shapes", "Strokes", "answered"]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 _TOUCHES = int(Reach.TOUCHES)
 

@@ -14,12 +14,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes import chebyshev
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.arc import arc_to, chord_angle, slack
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "AMPLITUDE",
@@ -36,8 +36,6 @@ __all__ = [
     "series",
     "tables",
 ]
-
-Floats = NDArray[np.float64]
 
 MOST_FRICTION = 0.58
 """Friction angle up to which there are tables [rad]: the nearer to where the map folds, the longer their series."""

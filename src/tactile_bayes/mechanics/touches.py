@@ -9,15 +9,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.arc import arc_and_slopes, arc_to
 from tactile_bayes.mechanics.compiler import compiled, kept
 
 __all__ = ["chords", "moved", "touch", "touches", "wrench_slopes"]
-
-Floats = NDArray[np.float64]
 
 _EPSILON = 1e-16
 """Half the difference of two means, over the mean, below which they are one."""

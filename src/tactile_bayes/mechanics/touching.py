@@ -13,7 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
 
 __all__ = [
     "ARCLENGTH",
@@ -28,8 +29,6 @@ __all__ = [
     "touching",
     "touching_and_slopes",
 ]
-
-Floats = NDArray[np.float64]
 
 FORCE, PSI1, ARCLENGTH, DRIVE_ANGLE = range(4)
 """The coordinates, in the order in which derivatives by them stand."""

@@ -14,7 +14,7 @@ from tactile_bayes.errors import ContourError, ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.plotting.axes import AxesArray
 from tactile_bayes.plotting.style import COLUMN_WIDTH, PAGE_WIDTH
-from tactile_bayes.scanning import Scan, scan
+from tactile_bayes.sweep import Scan, scan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.paper_figures.choice import Choice, Profile
-from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.plotting.maps import draw_object, draw_pivot, label_map
 from tactile_bayes.plotting.marks import PALETTE, PHASES
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.scanning import Scan
-from tactile_bayes.shape import rod_shape
+from tactile_bayes.sweep import Scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.paper_figures.choice import Choice, Direction, Limits, Profile
 from tactile_bayes.plotting.legends import legend_entries, legend_in_rows
 from tactile_bayes.plotting.marks import PHASES
 from tactile_bayes.plotting.rod_map import rods
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.shape import rod_shape
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tactile_bayes.scanning import Scan
+    from tactile_bayes.sweep import Scan
 
 __all__ = ["draw_deformed_rods"]
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.files import write_atomically
 from tactile_bayes.paper_figures.catalogue import NUMBERS, caption, figure
 from tactile_bayes.plotting.style import Style
 from tactile_bayes.plotting.style import style as styled
+from tactile_bayes.tasks import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

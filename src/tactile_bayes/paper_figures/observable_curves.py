@@ -13,14 +13,13 @@ from tactile_bayes.plotting.legends import legend_entries, legend_entry, legend_
 from tactile_bayes.plotting.marks import PHASES
 from tactile_bayes.plotting.sweep_lines import EVENT_MARKERS, draw_events, phase_runs, with_events
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.scanning import scan
+from tactile_bayes.sweep import scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tactile_bayes.scanning import Scan
-    from tactile_bayes.sweep_events import SweepEvents
+    from tactile_bayes.sweep import Scan, SweepEvents
 
 __all__ = ["draw_observable_curves"]
 

@@ -9,14 +9,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, place_by_wrench, touching_and_slopes
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["METHODS", "SOURCES", "Method", "amplification"]
-
-Floats = NDArray[np.float64]
 
 Method = Literal["raw", "constrained"]
 METHODS: tuple[Method, ...] = ("raw", "constrained")

@@ -11,18 +11,17 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import logsumexp
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.differences import central_slopes
+from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge
 from tactile_bayes.planning.record_information import parameter_scales, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
-
-Floats = NDArray[np.float64]
 
 _ROUGH_STEP = 1e-3
 """Of the differences by which loads are made linear, over the scale of each parameter: they are interpolated."""

@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import (
     TINY,
     check_choice,
@@ -23,19 +23,17 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.errors import ParameterError, ReachError
 from tactile_bayes.inference.contour_events import events_of
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.ledger import TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
 from tactile_bayes.planning.design_ledger import CANDIDATES, question_in_words
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge, known_from_posterior, known_from_prior
-from tactile_bayes.rod import Rod
+from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_ledger
 
 __all__ = ["CRITERIA", "design"]
-
-Floats = NDArray[np.float64]
 
 Criterion = Literal["band", "gap", "information"]
 CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")

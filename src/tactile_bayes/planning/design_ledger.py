@@ -11,8 +11,8 @@ from typing import Any
 
 from tactile_bayes.errors import StudyError
 from tactile_bayes.inference.contour_problem import prior_in_words
-from tactile_bayes.ledger import Kind
 from tactile_bayes.planning.candidate import Expected, Question
+from tactile_bayes.tasks import Kind
 
 __all__ = ["CANDIDATES", "question_in_words"]
 

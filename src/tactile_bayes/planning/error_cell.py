@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ContourError, InferenceError, ReachError
 from tactile_bayes.inference.contour import infer_contour
@@ -24,8 +24,6 @@ from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.uncertainty.band import contour_band
 
 __all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
-
-Floats = NDArray[np.float64]
 
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
 """Of posteriors, of which only a band is wanted."""

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 
 __all__ = ["Whitening", "whitening"]
-
-Floats = NDArray[np.float64]
 
 
 class Whitening(NamedTuple):

@@ -30,15 +30,15 @@ from tactile_bayes.checks import (
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
 from tactile_bayes.inference.contour_problem import prior_in_words
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.ledger import Kind, TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.rod import Rod
+from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_ledger
 
 __all__ = ["CELLS", "error_map"]
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.linalg import solve_triangular
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.differences import central_slopes
-from tactile_bayes.scanning import Scan
+from tactile_bayes.numerics.differences import central_slopes
+from tactile_bayes.sweep import Scan
 
 __all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "stretches"]
-
-Floats = NDArray[np.float64]
 
 _STEP = 1e-5
 _PLACES = 25

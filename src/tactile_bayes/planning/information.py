@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_groups import unit_of
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
@@ -13,8 +13,6 @@ from tactile_bayes.planning.record_information import prior_precision, record_in
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["information"]
-
-Floats = NDArray[np.float64]
 
 
 def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:

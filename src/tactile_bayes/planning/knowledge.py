@@ -9,26 +9,24 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.blank_record import blank_record
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_priors
-from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.plan import usual_load_cell
 from tactile_bayes.record import rod_of
-from tactile_bayes.rod import Rod
+from tactile_bayes.sweep import record_template
 
 __all__ = ["COARSE", "Base", "Knowledge", "known_from_posterior", "known_from_prior"]
-
-Floats = NDArray[np.float64]
 
 Base = tuple[float, float]
 
@@ -67,7 +65,7 @@ class Knowledge:
 
     def blank(self, bases: Sequence[Base], drive_step: float) -> xr.Dataset:
         """A record from these pivots, each swept forward and backward, that is yet to be made."""
-        return blank_record(bases, ("forward", "backward"), _angles(drive_step), self.rod, self.load_cell)
+        return record_template(bases, ("forward", "backward"), _angles(drive_step), self.rod, self.load_cell)
 
     def model(self, record: xr.Dataset) -> ContourModel:
         """Of a record, blank or measured."""

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import stats
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
@@ -19,8 +19,6 @@ from tactile_bayes.planning.plan import Plan
 from tactile_bayes.reconstruction import reconstruct
 
 __all__ = ["noise_shares"]
-
-Floats = NDArray[np.float64]
 
 _PLACES = 15
 """Of each sweep, where none are given."""

@@ -9,27 +9,26 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_mapping, check_names, check_optional
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_problem import contour_priors
-from tactile_bayes.inference.families import Prior, refuse_wrong_priors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.family_parameters import family_parameters
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.rod import Rod
-from tactile_bayes.scanning import Scan, scan
+from tactile_bayes.sweep import Scan, scan
 
 __all__ = ["Plan", "usual_load_cell"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,16 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.differences import central_slopes
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.numerics.differences import central_slopes
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["ReadingSlopes", "RecordInformation", "prior_precision", "reading_slopes", "record_information"]
-
-Floats = NDArray[np.float64]
 
 _STEP = 1e-5
 """Of the differences, over the scale of each parameter."""

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from tactile_bayes.checks import check_names, check_optional, refused
 from tactile_bayes.contours import Contour, paper_profile
-from tactile_bayes.inference.families import Prior
 from tactile_bayes.inference.nuisances import STANDARD
-from tactile_bayes.ledger import TaskProgress
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.amplification import amplification
 from tactile_bayes.planning.family_parameters import enlarged
 from tactile_bayes.planning.information import information
@@ -23,7 +23,7 @@ from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise
 from tactile_bayes.planning.sensitivity_words import sensitivity_in_words
-from tactile_bayes.rod import Rod
+from tactile_bayes.tasks import TaskProgress
 
 __all__ = ["PARTS", "sensitivity"]
 

@@ -6,13 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.planning.plan import Plan
 
 __all__ = ["sensitivity_in_words"]
-
-Floats = NDArray[np.float64]
 
 _NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "force_y", "drive_angle": "the drive angle"}
 

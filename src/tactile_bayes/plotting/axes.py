@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.marks import PALETTE
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AxesArray",
-    "Floats",
     "check_dataset",
     "check_panels",
     "new_panels",
@@ -27,7 +27,6 @@ __all__ = [
     "write_not_measured",
 ]
 
-Floats = NDArray[np.float64]
 AxesArray = NDArray[np.object_]
 
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.ranks import expected_shares, simultaneous_band
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, Floats, check_dataset, check_panels, new_panels, write_instead
+from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_panels, new_panels, write_instead
 from tactile_bayes.plotting.labels import number, percent
 from tactile_bayes.plotting.marks import PALETTE
 

@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import Floats, single_axes, write_instead
+from tactile_bayes.plotting.axes import single_axes, write_instead
 from tactile_bayes.plotting.labels import LABELS, number, percent, set_unit, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entries, legend_entry
 from tactile_bayes.plotting.maps import draw_gap, draw_pivot, finish_map, outline

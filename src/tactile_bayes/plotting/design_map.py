@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, tile_edges
+from tactile_bayes.arrays import Floats
+from tactile_bayes.plotting.axes import check_dataset, single_axes, tile_edges
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend, legend_above, legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, label_map

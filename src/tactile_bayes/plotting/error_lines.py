@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice
-from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, write_instead
+from tactile_bayes.plotting.axes import check_dataset, single_axes, write_instead
 from tactile_bayes.plotting.labels import number, percent, shown_unit
 from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.marks import BASES

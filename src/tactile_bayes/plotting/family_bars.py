@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.comparison.verdict import NONE_FITS
 from tactile_bayes.plotting.axes import AxesArray, check_dataset, check_panels, new_panels
 from tactile_bayes.plotting.labels import number, show_numbers
 from tactile_bayes.plotting.legends import legend
 from tactile_bayes.plotting.marks import PALETTE
-from tactile_bayes.uncertainty.family_verdict import NONE_FITS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from tactile_bayes.record import CHANNELS, present_channels
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.inspection import Inspection
+    from tactile_bayes.diagnostics.inspection import Inspection
 
 __all__ = ["inspection"]
 

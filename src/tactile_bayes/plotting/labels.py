@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.record import COLUMNS
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.labels import LABELS, set_unit
 from tactile_bayes.plotting.legends import legend, legend_above, legend_entries
 from tactile_bayes.plotting.marks import PALETTE

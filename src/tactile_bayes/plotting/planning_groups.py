@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.plotting.labels import show_numbers, shown_unit
 
 if TYPE_CHECKING:

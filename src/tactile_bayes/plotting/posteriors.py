@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, Floats, check_panels, new_panels
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels
 from tactile_bayes.plotting.labels import number
 from tactile_bayes.plotting.marks import PALETTE
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.axes import single_axes
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
 from tactile_bayes.plotting.marks import PALETTE, TRUTH

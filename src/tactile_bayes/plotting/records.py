@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import AxesArray, Floats, check_panels, new_panels, write_not_measured
+from tactile_bayes.plotting.axes import AxesArray, check_panels, new_panels, write_not_measured
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, set_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.marks import PALETTE, PHASES, SWEEP_LINES, SWEEP_MARKERS
@@ -20,7 +21,7 @@ from tactile_bayes.record import CHANNELS, Frame, frame_of, validate
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.sweep_events import SweepEvents
+    from tactile_bayes.sweep import SweepEvents
 
 __all__ = ["observables", "predictive"]
 

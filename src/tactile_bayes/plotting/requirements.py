@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.plotting.axes import Floats, check_dataset, single_axes, tile_edges, write_instead
+from tactile_bayes.arrays import Floats
+from tactile_bayes.plotting.axes import check_dataset, single_axes, tile_edges, write_instead
 from tactile_bayes.plotting.labels import number, percent, set_unit, show_numbers, shown_unit
 from tactile_bayes.plotting.legends import legend, legend_above
 from tactile_bayes.plotting.marks import BEST, PALETTE

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.mechanics.centreline import rod_shape
+from tactile_bayes.plotting.axes import single_axes
 from tactile_bayes.plotting.maps import draw_object, draw_pivot, finish_map
 from tactile_bayes.plotting.marks import CONTACT_MARKERS, PALETTE, PHASES
 from tactile_bayes.record import CHANNELS, in_frame, rod_of
-from tactile_bayes.shape import rod_shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tactile_bayes.scanning import Scan
-    from tactile_bayes.sweep_events import Event
+    from tactile_bayes.sweep import Event, Scan
 
 __all__ = ["rods"]
 

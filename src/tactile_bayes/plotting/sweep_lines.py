@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.legends import legend_above, legend_entries
 from tactile_bayes.plotting.marks import PALETTE, SWEEP_MARKERS
 from tactile_bayes.record import CHANNELS, Frame, turned
-from tactile_bayes.sweep_events import Event, SweepEvents
+from tactile_bayes.sweep import Event, SweepEvents
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

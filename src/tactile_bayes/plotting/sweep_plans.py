@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.axes import single_axes
 from tactile_bayes.plotting.labels import DRIVE_ANGLE, LABELS, number
 from tactile_bayes.plotting.legends import legend_above, legend_entry
 from tactile_bayes.plotting.marks import BASES, SWEEP_LINES

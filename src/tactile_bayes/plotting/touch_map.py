@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.plotting.axes import Floats, single_axes
+from tactile_bayes.plotting.axes import single_axes
 from tactile_bayes.plotting.labels import number, shown_unit
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_gap, draw_object, draw_pivot, finish_map, limits_of, outline, write_on_top
 from tactile_bayes.plotting.marks import BASES
 from tactile_bayes.record import rod_of
-from tactile_bayes.scanning import Scan
+from tactile_bayes.sweep import Scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
     from tactile_bayes.contours.base import Contour
-    from tactile_bayes.sweep_events import SweepEvents
+    from tactile_bayes.sweep import SweepEvents
 
 __all__ = ["touched"]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.fitting import ContactFit, fit_contacts
 from tactile_bayes.mechanics.touching import touching, touching_and_slopes
@@ -23,8 +23,6 @@ from tactile_bayes.reconstruction.estimate import (
 from tactile_bayes.reconstruction.samples import Samples
 
 __all__ = ["are_weighed", "constrained_estimate", "refuse_without_noise"]
-
-Floats = NDArray[np.float64]
 
 _CLEARANCE = 2.0
 """Standard deviations from the edge between the phases below which a contact may well be of the other one."""

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
+
 __all__ = [
     "AT_EDGE",
     "BEYOND_TIP",
@@ -25,8 +27,6 @@ __all__ = [
     "spread_across",
     "unanswered",
 ]
-
-Floats = NDArray[np.float64]
 
 NO_CONTACT, CUT_OFF, NO_ZERO, OK, NONLINEAR, BEYOND_TIP, AT_EDGE, EITHER_PHASE, NO_FIT = range(9)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.fitting import raw_contacts
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.reconstruction.estimate import (
@@ -19,8 +19,6 @@ from tactile_bayes.reconstruction.estimate import (
 from tactile_bayes.reconstruction.samples import Samples
 
 __all__ = ["raw_estimate"]
-
-Floats = NDArray[np.float64]
 
 _ROUNDING = 1e-9
 

@@ -9,17 +9,15 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.fitting import Reading
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
-from tactile_bayes.rod import Rod
 
 __all__ = ["FALSE_ALARM", "Samples", "loaded_samples", "samples_of"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 FALSE_ALARM = 1e-3
 """Share of unloaded samples that noise makes look loaded."""

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, rough_noise
 from tactile_bayes.load_cell.contact_bounds import FEWEST, contact_bounds
@@ -24,9 +24,6 @@ __all__ = [
     "sides_and_doubts",
     "with_sides",
 ]
-
-Floats = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 CONTACT_SIDES = "contact_sides"
 """Of a record: a JSON object from sweep to the direction of a sweep that touches the object from that side."""

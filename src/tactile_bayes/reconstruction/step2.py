@@ -7,14 +7,15 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_number, check_optional, refused
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.fitting import Reading
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
 from tactile_bayes.reconstruction.estimate import STATUSES, Estimate, spread_across
@@ -22,11 +23,8 @@ from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
 from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
-from tactile_bayes.rod import Rod
 
 __all__ = ["AXIAL_ALARM", "reconstruct"]
-
-Floats = NDArray[np.float64]
 
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.quantity import unit_of
 from tactile_bayes.record.schema import ATTRIBUTE_UNITS, FRAMES, LOAD_CELL_UNITS, UNITS, Frame
 from tactile_bayes.record.spelling import nearest
 from tactile_bayes.record.storable import not_storable
 from tactile_bayes.record.table import Source
-from tactile_bayes.rod import Rod
 
 _QUANTITY = re.compile(
     r"[+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s*"

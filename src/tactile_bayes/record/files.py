@@ -18,20 +18,20 @@ from tactile_bayes.checks import (
     check_switch,
 )
 from tactile_bayes.errors import RecordError
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record.construction import completed_record
-from tactile_bayes.record.conversion import in_units_of_record
 from tactile_bayes.record.csv_format import read_csv, write_csv
-from tactile_bayes.record.netcdf_format import read_netcdf, write_netcdf
+from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
 from tactile_bayes.record.origin import renamed
 from tactile_bayes.record.schema import FRAMES, Frame
 from tactile_bayes.record.stroke import split_at_turns
+from tactile_bayes.record.units import in_units_of_record
 from tactile_bayes.record.validation import validate
-from tactile_bayes.rod import Rod
 
 __all__ = ["read_record", "write_record"]
 
-_READERS = {".csv": read_csv, ".nc": read_netcdf}
-_WRITERS = {".csv": write_csv, ".nc": write_netcdf}
+_READERS = {".csv": read_csv, ".nc": read_netcdf_table}
+_WRITERS = {".csv": write_csv, ".nc": write_netcdf_record}
 
 
 def read_record(

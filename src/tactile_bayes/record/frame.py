@@ -6,8 +6,9 @@ from itertools import permutations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record.attributes import stated_frame
@@ -16,8 +17,6 @@ from tactile_bayes.record.table import Source
 from tactile_bayes.record.validation import validate
 
 __all__ = ["frame_of", "in_frame", "turned"]
-
-Floats = NDArray[np.float64]
 
 _BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"} | {
     "degrees_of_freedom",

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike
 
-from tactile_bayes.plotting.axes import Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.plotting.labels import number
 from tactile_bayes.report.wording import Shown
 

@@ -10,18 +10,18 @@ from pathlib import Path
 
 import xarray as xr
 
+from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import read_result, record_of
 from tactile_bayes.load_cell import zero_load
-from tactile_bayes.netcdf import read_netcdf
 from tactile_bayes.record import record_hash
+from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive import predictive_interval
-from tactile_bayes.uncertainty.record_check import check_record
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
-from tactile_bayes.uncertainty.verdicts import verdicts
 
 __all__ = ["FINDING_STEPS", "Findings", "findings_of"]
 

@@ -9,18 +9,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.inference.nuisances import nuisances_of
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
-from tactile_bayes.plotting.axes import Floats
 from tactile_bayes.record import rod_of
-from tactile_bayes.shape import rod_shape
-from tactile_bayes.sweeps import ManyUnits
-from tactile_bayes.world import in_world
+from tactile_bayes.sweep import ManyUnits, to_lab_frame
 
 __all__ = ["Motion", "motion_of"]
 
@@ -116,7 +115,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     states = paths.states(lane, seen_angle)
     rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
-    world = in_world(paths.seen, lane, states, units)
+    world = to_lab_frame(paths.seen, lane, states, units)
     loaded = states.wrench.phase != NONE
     slope = np.where(loaded, states.wrench.drive_angle, seen_angle)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))

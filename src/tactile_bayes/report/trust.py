@@ -7,12 +7,12 @@ from collections import Counter
 
 import numpy as np
 
+from tactile_bayes.diagnostics.record_check import DISCREPANCIES
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.readings_figure import channel_words
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
-from tactile_bayes.uncertainty.record_check import DISCREPANCIES
 
 __all__ = ["check_table", "check_words", "contacts_words", "convergence"]
 

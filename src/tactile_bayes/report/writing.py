@@ -11,9 +11,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from tactile_bayes.files import write_atomically
 from tactile_bayes.report.findings import FINDING_STEPS, findings_of
 from tactile_bayes.report.page import page_of
+from tactile_bayes.tasks import write_atomically
 
 __all__ = ["write_report"]
 

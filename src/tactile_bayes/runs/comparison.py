@@ -11,12 +11,12 @@ from typing import Any
 import xarray as xr
 
 from tactile_bayes import plotting
+from tactile_bayes.comparison.families import compare_families
+from tactile_bayes.diagnostics.suspicions import suspicions
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.runs.folder import Folder, Run
-from tactile_bayes.uncertainty.family_comparison import compare_families
-from tactile_bayes.uncertainty.suspicions import suspicions
 
 __all__ = ["compare_into", "write_comparison"]
 

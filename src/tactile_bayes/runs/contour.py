@@ -19,21 +19,21 @@ from tactile_bayes import plotting
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.suspicions import suspicions
+from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import posterior_draws, write_result
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.record import rod_of, validate, with_rod
-from tactile_bayes.rod import Rod
 from tactile_bayes.runs.folder import Folder, panels
-from tactile_bayes.scanning import Scan, scan
+from tactile_bayes.sweep import Scan, scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.predictive import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
-from tactile_bayes.uncertainty.suspicions import suspicions
-from tactile_bayes.uncertainty.verdicts import verdicts
 
 __all__ = ["ContourRun", "analyse"]
 

@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.files import write_atomically
-from tactile_bayes.netcdf import write_netcdf
+from tactile_bayes.record.netcdf import write_netcdf
+from tactile_bayes.tasks import write_atomically
 
 __all__ = ["Folder", "Run", "panels", "posterior_in"]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tactile_bayes import plotting
-from tactile_bayes.inspection import Inspection
+from tactile_bayes.diagnostics.inspection import Inspection
 from tactile_bayes.runs.folder import Folder
 
 __all__ = ["write_inspection"]

@@ -13,13 +13,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes import plotting
+from tactile_bayes.diagnostics.inspection import CellSource, known_cell
+from tactile_bayes.diagnostics.verdicts import doubtful_sides
 from tactile_bayes.inference.misfit import CHECK_RIG
-from tactile_bayes.inspection import CellSource, known_cell
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import AXIAL_ALARM, reconstruct
 from tactile_bayes.record import validate
 from tactile_bayes.runs.folder import Folder, Run, panels
-from tactile_bayes.uncertainty.verdicts import doubtful_sides
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

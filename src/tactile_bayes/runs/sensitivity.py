@@ -13,13 +13,13 @@ import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.ledger import TaskProgress
 from tactile_bayes.planning.error_map import CELLS, error_map
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_rod
 from tactile_bayes.planning.sensitivity import PARTS, sensitivity
 from tactile_bayes.runs.folder import Folder, Run, panels
 from tactile_bayes.runs.outermost import outermost
+from tactile_bayes.tasks import TaskProgress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,19 +6,18 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_numbers
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.blocks import blocks
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws
+from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 __all__ = ["contour_band", "contour_heights", "contours_drawn", "length_unit", "places"]
-
-Floats = NDArray[np.float64]
 
 _DRAWS = 4000
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Locus
 
 __all__ = ["Triangle", "triangle"]
-
-Floats = NDArray[np.float64]
 
 
 class Triangle(NamedTuple):

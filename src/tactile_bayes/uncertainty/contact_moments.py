@@ -7,15 +7,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from tactile_bayes.inference.result import contact_draws
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES, TANGENTIAL, TIP
 from tactile_bayes.reconstruction.estimate import spread_across
 
 __all__ = ["LEAST_DRAWS", "contact_moments"]
-
-Floats = NDArray[np.float64]
 
 _DRAWS = ("chain", "draw")
 LEAST_DRAWS = 10

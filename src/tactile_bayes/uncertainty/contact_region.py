@@ -8,13 +8,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import contact_draws
 
 __all__ = ["ContactRegion", "contact_region"]
-
-Floats = NDArray[np.float64]
 
 _BLOCK = 1_000_000
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws, contour_events
@@ -16,8 +16,6 @@ from tactile_bayes.uncertainty.certificate import triangle
 from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["gap"]
-
-Floats = NDArray[np.float64]
 
 _PLACES = 101
 """Values of x across the gap."""

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import InferenceError
@@ -22,11 +22,9 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
-from tactile_bayes.world import in_world
+from tactile_bayes.sweep import to_lab_frame
 
 __all__ = ["contacts_of", "implied_contacts"]
-
-Floats = NDArray[np.float64]
 
 _BLOCK = 200
 """Contours whose paths are followed at a time."""
@@ -196,7 +194,7 @@ def contacts_of(
         angles[:, : stroke.samples.size] = np.pi - of_stroke if stroke.backward else of_stroke
     paths = likelihood.paths(contours, rig, exact=exact, drive_angles=seen.reshape(-1, shape[1]))
     lane, rank, states = paths.loaded_states()
-    columns = in_world(paths.seen, lane, states, likelihood.rod)
+    columns = to_lab_frame(paths.seen, lane, states, likelihood.rod)
     columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
     out = {name: np.full(read.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}
     for name, values in out.items():

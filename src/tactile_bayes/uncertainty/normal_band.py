@@ -6,15 +6,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.roots import falling_root
+from tactile_bayes.numerics.roots import falling_root
 from tactile_bayes.uncertainty.band import contours_drawn, length_unit, places
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 __all__ = ["normal_band", "normal_offsets"]
-
-Floats = NDArray[np.float64]
 
 _BLOCK = 100_000
 """Normals of contours that are searched at once."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_probability, check_switch
 
 __all__ = ["central_levels", "quantile_band"]
-
-Floats = NDArray[np.float64]
 
 _ROUNDING = 1e-9
 """Where a band is narrower than this share of its widest place, its draws differ by rounding."""

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
@@ -18,7 +19,6 @@ from tactile_bayes.record import turned
 
 __all__ = ["ContactDensity", "ContactPrior", "Evaluated"]
 
-Floats = NDArray[np.float64]
 LogPrior = Callable[[Floats, Floats, Floats], Floats]
 ContactPrior = Literal["flat", "polar"] | LogPrior
 
@@ -114,11 +114,11 @@ class ContactDensity:
         return Evaluated(density, rod.place.reshape(4, *shape))
 
     def places(self, coordinates: Floats) -> Floats:
-        """Places of contacts by coordinates, shape (..., n, 4), as `in_world` has them."""
+        """Places of contacts by coordinates, shape (..., n, 4), as `to_lab_frame` has them."""
         place = touching(coordinates.reshape(-1, 4), self.delta).place
-        return self.in_world(place.reshape(4, *coordinates.shape[:-1]))
+        return self.to_lab_frame(place.reshape(4, *coordinates.shape[:-1]))
 
-    def in_world(self, place: Floats) -> Floats:
+    def to_lab_frame(self, place: Floats) -> Floats:
         """Places on the object's surface, in the record's unit and the axes of the world, shape (4, ..., n)."""
         rod, side = self.samples.rod, self.samples.side
         x, y, alpha, arclength = place
@@ -132,7 +132,7 @@ class ContactDensity:
         place = place.reshape(4, *shape)
         if not callable(self._prior):
             return np.asarray(-np.log(np.hypot(place[0], place[1])))
-        values = np.asarray(self._prior(*self.in_world(place)[:3]), dtype=float)
+        values = np.asarray(self._prior(*self.to_lab_frame(place)[:3]), dtype=float)
         if values.shape != shape:
             raise ParameterError(
                 f"the prior gave an array of shape {values.shape} for arguments of shape {shape}: it has to work "

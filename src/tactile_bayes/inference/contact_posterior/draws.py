@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.importance import ContactWeights, weigh_contacts
@@ -15,7 +16,6 @@ from tactile_bayes.inference.ensembles import SamplerSettings, sample, scatter_w
 
 __all__ = ["CHAINS", "EMCEE", "EMCEE_SETTINGS", "IMPORTANCE", "ContactDraws", "Method", "draw_contacts"]
 
-Floats = NDArray[np.float64]
 Method = Literal["auto", "importance", "emcee"]
 
 CHAINS = 4

@@ -9,6 +9,7 @@ from arviz_stats.base.array import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
 from tactile_bayes.mechanics.fitting import fit_sheet
@@ -16,8 +17,6 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 
 __all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
-
-Floats = NDArray[np.float64]
 
 LARGEST_K = 0.7
 """Pareto k̂ above which weights are not to be trusted (Vehtari et al. 2024, JMLR 25(72))."""

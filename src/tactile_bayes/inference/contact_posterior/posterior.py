@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_choice, check_function, check_number, check_optional, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
@@ -30,14 +31,12 @@ from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.reconstruction import reconstruct, samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
-from tactile_bayes.rod import Rod
 
 __all__ = ["infer_contacts"]
-
-Floats = NDArray[np.float64]
 
 _UNLIKELY = 1e-4
 """Probability of a misfit below which the loads are not those of the rod."""

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
-__all__ = ["ContactProposal", "Proposed"]
+from tactile_bayes.arrays import Floats
 
-Floats = NDArray[np.float64]
+__all__ = ["ContactProposal", "Proposed"]
 
 _WIDTHS = np.array([1.15, 3.0])
 """Widths of the normal densities of a phase, in standard deviations of the posterior's approximation."""

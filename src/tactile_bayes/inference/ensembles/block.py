@@ -10,16 +10,14 @@ from typing import Any
 
 import emcee
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.moves import Abreast, Moves
 from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import RandomState
 
 __all__ = ["Block", "WalkingEnsembles", "next_look"]
 
-
-Floats = NDArray[np.float64]
 
 _GROWTH = 1.25
 """Steps at one diagnosis over steps at the one before: all diagnoses together then cost five times the last."""

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.files import alone_in, is_temporary, write_atomically
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.identity import changes
 from tactile_bayes.inference.ensembles.walkers import RandomState
+from tactile_bayes.tasks import alone_in, is_temporary, write_atomically
 
 __all__ = ["Checkpoint", "open_checkpoint"]
 

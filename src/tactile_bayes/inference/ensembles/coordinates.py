@@ -7,13 +7,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.moves import standard_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["Coordinates", "Logarithms", "Plain", "in_coordinates"]
-
-Floats = NDArray[np.float64]
 
 
 class Coordinates(Protocol):

@@ -7,12 +7,11 @@ from collections.abc import Callable, Sequence
 import emcee
 import numpy as np
 from arviz_stats.base.array import array_stats
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
 
 __all__ = ["Diagnosis", "autocorrelation_time", "lost_walkers", "walker_major"]
 
-
-Floats = NDArray[np.float64]
 
 _TAIL = (0.05, 0.95)
 """Quantiles whose effective sample size is the tail's."""

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
@@ -16,8 +16,6 @@ from tactile_bayes.inference.ensembles.walkers import Seed, seed_sequence
 
 __all__ = ["changes", "identity_of_run"]
 
-
-Floats = NDArray[np.float64]
 
 _START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
 """They follow from the rest, if that is all told."""

@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
 
 __all__ = ["KeptSteps"]
 
-
-Floats = NDArray[np.float64]
 
 _MOST = 4_000_000
 """Numbers of all ensembles, above which only every second step is kept, and so on: 32 MB, and 6 s for a diagnosis."""

@@ -9,11 +9,11 @@ import emcee
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 
 __all__ = ["Abreast", "FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
 
-Floats = NDArray[np.float64]
 Moves = Callable[[], list[tuple[Any, float]]]
 """Makes the moves of one ensemble, with their shares."""
 

@@ -6,8 +6,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.block import WalkingEnsembles
 from tactile_bayes.inference.ensembles.coordinates import Logarithms, in_coordinates
@@ -18,8 +18,6 @@ from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import first_random_state
 
 __all__ = ["learned"]
-
-Floats = NDArray[np.float64]
 
 _STEPS = (60, 120, 240, 480, 960)
 """Of the stages, in each of which walkers walk in the best coordinates so far."""

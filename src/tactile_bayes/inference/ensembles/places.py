@@ -9,10 +9,10 @@ import numpy as np
 from arviz_stats.base.array import array_stats
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
+
 __all__ = ["Place", "places_in_words", "places_of"]
 
-
-Floats = NDArray[np.float64]
 
 _APART = 5.0
 """Distance of two ensembles' means, in the larger of their standard deviations, from which they are apart."""

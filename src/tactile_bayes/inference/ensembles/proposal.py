@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp, ndtr
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
 __all__ = ["ANYTHING", "GOOD", "Ends", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
-
-Floats = NDArray[np.float64]
 
 _DEGREES_OF_FREEDOM = 10.0
 """Of the t distribution: tails heavier than a normal posterior's, at little cost where it is one."""

@@ -10,8 +10,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.block import Block, WalkingEnsembles, next_look
 from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, open_checkpoint
@@ -27,8 +28,6 @@ from tactile_bayes.inference.ensembles.walkers import Seed, checked_start, first
 
 __all__ = ["Progress", "sample"]
 
-
-Floats = NDArray[np.float64]
 
 _DRAWS_PER_WALKER = 5
 """Effective draws that the mean walker must have given: what is discarded then outlasts five autocorrelation times."""

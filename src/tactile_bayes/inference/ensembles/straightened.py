@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.moves import standard_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture
 
 __all__ = ["Straightened"]
-
-Floats = NDArray[np.float64]
 
 _FARTHEST = 1e100
 """Coordinate of what is further off: its square is a number still."""

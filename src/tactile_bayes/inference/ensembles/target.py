@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 
 __all__ = ["CheckedTarget", "LogProbability"]
 
 
-Floats = NDArray[np.float64]
 LogProbability = Callable[[Floats], Floats]
 
 

@@ -9,6 +9,7 @@ import emcee
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
@@ -25,7 +26,6 @@ __all__ = [
 ]
 
 
-Floats = NDArray[np.float64]
 Seed = int | np.random.SeedSequence
 
 

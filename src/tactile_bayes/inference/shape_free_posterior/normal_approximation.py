@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_triangular
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
@@ -16,8 +17,6 @@ from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_names", "scale_names", "split"]
-
-Floats = NDArray[np.float64]
 
 _OF_ROUGHNESS = ("amplitude", "length_scale")
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
@@ -20,8 +20,6 @@ from tactile_bayes.inference.shape_free_posterior.normal_approximation import (
 from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 
 __all__ = ["whitening_at"]
-
-Floats = NDArray[np.float64]
 
 _ROUNDS = 20
 """Times that the place where loads are made linear moves, at most."""

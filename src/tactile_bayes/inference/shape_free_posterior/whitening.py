@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles import whitened_moves
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation, joined, split
 
 __all__ = ["Whitening"]
-
-Floats = NDArray[np.float64]
 
 _FAR = 4.0
 """Logarithm of how far from where walkers start a scale may be: beyond, all is taken for impossible."""

@@ -1,0 +1,376 @@
+"""Leave-one-out cross-validation: how well a model foretells each sample from all the others.
+
+Of a model that treats samples as independent, log-densities are log p(y_i | θ), as of `LoadCell.log_likelihood`; of one
+in which they know of one another, log p(y_i | all other y, θ), as of `LoadCell.log_density_left_out` (Bürkner, Gabry &
+Vehtari 2021, doi 10.1007/s00180-020-01045-4). In both, a posterior draw has the weight 1 / p(y_i | θ) under the
+posterior without sample i.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from arviz_stats.base.array import array_stats
+from scipy.optimize import Bounds, LinearConstraint, minimize
+from scipy.special import logsumexp
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.errors import InferenceError, ParameterError
+
+__all__ = [
+    "Difference",
+    "FromWider",
+    "LeftOut",
+    "difference",
+    "largest_k",
+    "left_out",
+    "left_out_from_wider",
+    "reweighted",
+    "stacking_weights",
+]
+
+_LEAST_DRAWS = 25
+"""Of which a fifth, the tail, is enough to fit two parameters to."""
+
+_LEAST_EFFECTIVE = 10.0
+"""Effective draws below which their scatter does not tell how far their mean is off."""
+
+_SAME = 1e-12
+"""Difference of logarithms below which weights are the same."""
+
+_OFF = 1e-5
+"""Log-density per sample by which the weights of a stack may be worse than the best."""
+
+
+class LeftOut(NamedTuple):
+    """Predictive densities of each sample given all the others."""
+
+    log_density: Floats
+    """Shape (samples,)."""
+    standard_error: Floats
+    """Monte-Carlo error of each, autocorrelation heeded; too small, maybe several times, where k̂ is above 0.5, and
+    infinite where it is above `largest_k`."""
+    pareto_k: Floats
+    """Shape of the weights' tail, k̂; −∞ where the largest weights are all the same, ∞ where no tail can be fitted."""
+
+
+class FromWider(NamedTuple):
+    """Predictive density of one sample given all the others, from draws that were given fewer."""
+
+    log_density: float
+    """NaN where no draw has any weight."""
+    standard_error: float
+    """Monte-Carlo error, autocorrelation heeded; infinite with fewer than 10 effective draws."""
+    effective: float
+    """Effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation makes it fewer still."""
+
+
+class Difference(NamedTuple):
+    """By how much one model foretells the samples of a record better than another."""
+
+    difference: float
+    """Sum over samples of log-densities of the one, less those of the other; positive where the one is better."""
+    standard_error: float
+    """From the scatter between samples: √n standard deviations."""
+
+
+def largest_k(draws: int) -> float:
+    """Pareto k̂ above which so many draws do not stand for the posterior without a sample.
+
+    The smaller of 1 − 1 / log₁₀ draws and 0.7 (Vehtari et al. 2024, JMLR 25(72)).
+
+    Examples
+    --------
+    >>> largest_k(1000), largest_k(100_000)
+    (0.6666666666666667, 0.7)
+    """
+    return min(1.0 - 1.0 / math.log10(draws), 0.7)
+
+
+def left_out(log_densities: Floats) -> LeftOut:
+    """Leave-one-out predictive densities, by Pareto-smoothed importance sampling.
+
+    Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. Weights are smoothed with tails as long as the
+    autocorrelation of the densities asks for. A small k̂ is no proof where the posterior without a sample reaches what
+    the whole posterior excludes, as beside a jump: see `left_out_from_wider`.
+
+    Parameters
+    ----------
+    log_densities : ndarray, shape (chains, draws, samples)
+        Of each sample under each posterior draw; 25 draws at least.
+
+    Returns
+    -------
+    LeftOut
+
+    Raises
+    ------
+    ParameterError
+        If the shape is another, there are too few draws, or some log-density is not finite.
+
+    Examples
+    --------
+    Of 50 normal numbers of standard deviation 1 and unknown mean, to foretell each with the mean of the others:
+
+    >>> rng = np.random.default_rng(1)
+    >>> y = rng.normal(size=50)
+    >>> mean = rng.normal(y.mean(), 50**-0.5, (4, 500, 1))
+    >>> found = left_out(-0.5 * (y - mean) ** 2 - 0.5 * np.log(2 * np.pi))
+    >>> foretold = (50 * y.mean() - y) / 49
+    >>> exact = -0.5 * np.log(2 * np.pi * 50 / 49) - 0.5 * (y - foretold) ** 2 * 49 / 50
+    >>> bool(np.all(abs(found.log_density - exact) < 4 * found.standard_error)), bool(found.pareto_k.max() < 0.5)
+    (True, True)
+    """
+    logs = _checked(log_densities)
+    chains, draws, samples = logs.shape
+    if chains * draws < _LEAST_DRAWS:
+        raise ParameterError(f"log_densities has {chains * draws} draws: give {_LEAST_DRAWS} at least")
+    if not np.isfinite(logs).all():
+        chain, draw, sample = np.argwhere(~np.isfinite(logs))[0].tolist()
+        raise ParameterError(
+            f"the log-density of sample {sample} is {float(logs[chain, draw, sample])!r} at draw {draw} of chain "
+            f"{chain}: give draws of the posterior, in which no sample is impossible"
+        )
+    found = LeftOut(*np.empty((3, samples)))
+    worst = largest_k(chains * draws)
+    for i in range(samples):
+        log_density = np.ascontiguousarray(logs[..., i])
+        log_weights, k = _smoothed(log_density)
+        found.log_density[i], error = _weighed(log_weights, log_density)
+        found.standard_error[i] = error if k <= worst else np.inf
+        found.pareto_k[i] = k
+    return found
+
+
+def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
+    """Predictive density of a sample given all the others, from draws of the posterior without it and some more.
+
+    Importance sampling from the whole posterior does not reach what a sample alone excludes, and its k̂ may not tell:
+    beside a jump of the predicted load, both sides of the jump are known from two samples, and without one of them the
+    jump may lie beyond it. The posterior without all of these samples, E, is wider than that without one:
+
+        p(y_i | all other y) = Σ_s w_s p(y_i | θ_s) / Σ_s w_s,   w_s = Π_{j in E, j ≠ i} p(y_j | θ_s).
+
+    Parameters
+    ----------
+    log_densities : ndarray, shape (chains, draws, events)
+        Of each sample in E under each draw of the posterior without all of E, these samples being independent of all
+        others given θ; −∞ where a draw excludes one. Samples that know of one another want `reweighted`.
+    chosen : int
+        Which of E is to be foretold from all else.
+
+    Returns
+    -------
+    FromWider
+
+    Raises
+    ------
+    ParameterError
+        If the shape is another, there is no such sample, or some log-density is NaN or +∞.
+
+    Examples
+    --------
+    A jump is between 0 and 3, and as likely anywhere; samples at 1 and 2 found it between them:
+
+    >>> jump = np.random.default_rng(1).uniform(0.0, 3.0, (4, 1000))
+    >>> passed = np.stack([jump > 1.0, jump < 2.0], axis=-1)
+    >>> found = left_out_from_wider(np.log(np.where(passed, 1.0, 1e-9)), 1)
+    >>> bool(abs(found.log_density - np.log(0.5)) < 4 * found.standard_error), round(found.effective / 4000, 1)
+    (True, 0.7)
+    """
+    logs = _checked(log_densities)
+    if not 0 <= chosen < logs.shape[-1]:
+        raise ParameterError(f"chosen is {chosen!r}: give the place of one of {logs.shape[-1]} samples, from 0 on")
+    return reweighted(np.delete(logs, chosen, axis=-1).sum(axis=-1), logs[..., chosen])
+
+
+def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
+    """A mean density over draws from a wider distribution, by their weights under a narrower one.
+
+    For samples that know of one another: draws of a posterior without several samples, weighed by the likelihood of
+    all samples but one over that of those it was given.
+
+    Parameters
+    ----------
+    log_weights : ndarray, shape (chains, draws)
+        But for a constant; −∞ where the narrower distribution excludes a draw.
+    log_density : ndarray, shape (chains, draws)
+
+    Returns
+    -------
+    FromWider
+
+    Raises
+    ------
+    ParameterError
+        If the shapes differ, or a value is NaN or +∞.
+
+    Examples
+    --------
+    >>> weights, densities = np.array([[2.0, 2.0, 1e-9, 1e-9]]), np.array([[0.1, 0.3, 0.9, 0.9]])
+    >>> found = reweighted(np.log(weights), np.log(densities))
+    >>> round(math.exp(found.log_density), 3), round(found.effective, 3), found.standard_error
+    (0.2, 2.0, inf)
+    """
+    weights, density = np.asarray(log_weights, dtype=np.float64), np.asarray(log_density, dtype=np.float64)
+    if weights.ndim != 2 or weights.shape != density.shape or not weights.size:
+        raise ParameterError(
+            f"log_weights has shape {weights.shape} and log_density {density.shape}: give (chains, draws) of both"
+        )
+    for name, values in (("log_weights", weights), ("log_density", density)):
+        if not (values < np.inf).all():
+            chain, draw = np.argwhere(~(values < np.inf))[0].tolist()
+            raise ParameterError(
+                f"{name} is {float(values[chain, draw])!r} at draw {draw} of chain {chain}: give finite numbers, or "
+                "-inf for what is impossible"
+            )
+    total = logsumexp(weights)
+    if total == -np.inf:
+        return FromWider(math.nan, math.inf, 0.0)
+    weights = weights - total
+    effective = float(np.exp(-logsumexp(2.0 * weights)))
+    found, error = _weighed(weights, density)
+    return FromWider(found, error if effective >= _LEAST_EFFECTIVE else math.inf, effective)
+
+
+def difference(one: Floats, other: Floats) -> Difference:
+    """Difference of two models' leave-one-out log-densities, and its standard error over samples.
+
+    √n times the standard deviation of n differences: equation 24 of Vehtari, Gelman & Gabry 2017, doi
+    10.1007/s11222-016-9696-4. Below 4 or so a difference says little, and its standard error is too small (Sivula et
+    al. 2020, arXiv 2008.10296).
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (samples,)
+        `LeftOut.log_density` of the same samples.
+
+    Returns
+    -------
+    Difference
+
+    Raises
+    ------
+    ParameterError
+        If the shapes differ, or there are fewer than 2 samples.
+
+    Examples
+    --------
+    >>> difference(np.array([-1.0, -2.0, -1.5]), np.array([-1.5, -2.0, -2.5]))
+    Difference(difference=1.5, standard_error=0.8660254037844386)
+    """
+    one, other = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
+    if one.ndim != 1 or one.shape != other.shape or one.size < 2:
+        raise ParameterError(
+            f"the log-densities have shapes {one.shape} and {other.shape}: give those of the same samples, 2 at least"
+        )
+    by_sample = one - other
+    return Difference(float(by_sample.sum()), float(math.sqrt(by_sample.size) * by_sample.std(ddof=1)))
+
+
+def stacking_weights(log_densities: Floats) -> Floats:
+    """Weights of a mixture of models that foretells samples best, leave-one-out.
+
+    They maximise Σ_i log Σ_k w_k p_k(y_i | all other y) over w ≥ 0 with sum one, which is convex: Yao et al. 2018, doi
+    10.1214/17-BA1091. The result is within 1e-5 per sample of the best.
+
+    Parameters
+    ----------
+    log_densities : ndarray, shape (models, samples)
+        `LeftOut.log_density` of each model; −∞ where a model excludes a sample that another allows.
+
+    Returns
+    -------
+    ndarray, shape (models,)
+
+    Raises
+    ------
+    ParameterError
+        If the shape is another, some value is NaN or +∞, or all models exclude a sample.
+    InferenceError
+        If the best weights cannot be found.
+
+    Examples
+    --------
+    Two coins, of which one shows heads in a quarter of throws and the other in three quarters, and 12 heads in 20:
+
+    >>> heads = np.repeat([True, False], [12, 8])
+    >>> stacking_weights(np.log([np.where(heads, 0.25, 0.75), np.where(heads, 0.75, 0.25)])).round(3)
+    array([0.3, 0.7])
+    """
+    logs = np.asarray(log_densities, dtype=np.float64)
+    if logs.ndim != 2 or not logs.size:
+        raise ParameterError(f"log_densities has shape {logs.shape}: give (models, samples)")
+    if not (logs < np.inf).all():
+        model, sample = np.argwhere(~(logs < np.inf))[0].tolist()
+        raise ParameterError(f"model {model} has a log-density of {float(logs[model, sample])!r} of sample {sample}")
+    best = logs.max(axis=0)
+    if (best == -np.inf).any():
+        raise ParameterError(f"no model allows sample {int(np.argmin(best))}: remove it, or add one that does")
+    densities = np.exp(logs - best)
+
+    def loss(weights: Floats) -> tuple[float, Floats]:
+        mixture = weights @ densities
+        return -float(np.log(mixture).mean()), -(densities / mixture).mean(axis=1)
+
+    models = len(logs)
+    least = 1e-10 / models  # keeps mixtures from nothing
+    found = minimize(
+        loss,
+        np.full(models, 1.0 / models),
+        jac=True,
+        method="SLSQP",
+        bounds=Bounds(least, 1.0),
+        constraints=LinearConstraint(np.ones((1, models)), 1.0, 1.0),
+        options={"ftol": 1e-14, "maxiter": 1000},
+    )
+    weights = np.clip(found.x, least, 1.0)
+    weights /= weights.sum()
+    off = -float(loss(weights)[1].min()) - 1.0  # how far below the best they can be at most, by convexity
+    if not off <= _OFF:
+        raise InferenceError(f"stacking did not converge ({found.message}): its weights may be {off:.1e} off the best")
+    return np.asarray(weights)
+
+
+# ---- importance sampling
+
+
+def _checked(log_densities: Floats) -> Floats:
+    logs = np.asarray(log_densities, dtype=np.float64)
+    if logs.ndim != 3 or not logs.size:
+        raise ParameterError(f"log_densities has shape {logs.shape}: give (chains, draws, samples)")
+    return logs
+
+
+def _smoothed(log_density: Floats) -> tuple[Floats, float]:
+    """Logarithms of weights in proportion to 1 / density, with sum one, their tail smoothed, and its k̂."""
+    efficiency = _efficiency(np.exp(log_density - log_density.max()))
+    tail = int(3.0 * math.sqrt(log_density.size / efficiency))
+    tail = min(tail, log_density.size // 5)
+    lowest = np.partition(log_density, tail, axis=None)[: tail + 1]
+    plain = -log_density - logsumexp(-log_density)
+    if np.ptp(lowest) < _SAME:
+        return plain, -math.inf
+    with np.errstate(all="ignore"):  # a fit that fails, of few different weights, gives NaN
+        smoothed, k = array_stats.psislw(log_density, r_eff=efficiency, axis=(0, 1))  # it takes what to divide by
+    return (smoothed, float(k)) if np.isfinite(k) and np.isfinite(smoothed).all() else (plain, math.inf)
+
+
+def _weighed(log_weights: Floats, log_density: Floats) -> tuple[float, float]:
+    """Logarithm of a weighted mean of densities, and its error to first order, from weights with sum one."""
+    found = float(logsumexp(log_weights + log_density))
+    if found == -np.inf:
+        return found, math.inf
+    off = np.exp(log_weights + log_density - found) - np.exp(log_weights)
+    return found, math.sqrt(float(np.sum(off**2)) / _efficiency(off))
+
+
+def _efficiency(values: Floats) -> float:
+    """Effective over actual draws for the mean of values, shape (chains, draws), at most 1."""
+    size = np.abs(values).max()
+    if size == 0.0:
+        return 1.0
+    effective = float(array_stats.ess(values / size, method="mean"))
+    return min(effective / values.size, 1.0) if effective > 0.0 else 1.0 / values.size

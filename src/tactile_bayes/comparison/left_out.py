@@ -1,0 +1,93 @@
+"""How well a family of contours foretells each sample of a record from all the others."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.comparison.leave_one_out import left_out, left_out_from_wider
+from tactile_bayes.inference.contour import Sampled
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_problem import ContourProblem
+from tactile_bayes.inference.contour_start import walk_of
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, sample, spawn
+
+__all__ = ["ForetoldSamples", "foretold_samples"]
+
+_DRAWS = 2000
+"""Of which densities are asked."""
+
+
+class ForetoldSamples(NamedTuple):
+    """Log-densities of each sample given all others, its channels together, in EI/L and EI/L²."""
+
+    log_density: Floats
+    """Shape (samples,); NaN where it is not to be had: next to events, of a load cell that drifts."""
+    standard_error: Floats
+    """Monte-Carlo error; infinite where it cannot be trusted."""
+    pareto_k: Floats
+    """NaN where the contour was inferred again without the sample."""
+
+
+def foretold_samples(
+    problem: ContourProblem, sampled: Sampled, *, seed: Seed, settings: SamplerSettings
+) -> ForetoldSamples:
+    """Leave-one-out predictive densities of a record.
+
+    By Pareto-smoothed importance sampling from the posterior; but not next to first contact and snap-off. There, the
+    record without a sample allows contours that would have been touched later, or let go earlier, of which the
+    posterior has none: these samples are foretold from a posterior that is inferred again without any of them, weighed
+    by all of them but one.
+    """
+    model = problem.model
+    logs = _densities(model, sampled.draws)
+    found = left_out(logs)
+    events = model.likelihood.event_samples(problem.loaded)
+    chosen = np.unique(events[events >= 0])
+    log_density, error, k = (np.array(part) for part in found)
+    k[chosen] = np.nan
+    if _knows_of_others(model):
+        log_density[chosen] = error[chosen] = np.nan
+        return ForetoldSamples(log_density, error, k)
+    seeds = spawn(seed, 2)
+    without = np.zeros(logs.shape[-1], dtype=bool)
+    without[chosen] = True
+    wider = problem.without(without)
+    walk = walk_of(wider, seeds[0], settings)
+    draws = sample(
+        wider.log_probability,
+        walk.start,
+        names=wider.names,
+        seed=seeds[1],
+        settings=settings,
+        coordinates=walk.coordinates,
+    )
+    draws.refuse_interrupted(f"{model.family.name} without some samples")
+    of_events = _densities(model, draws)[..., chosen]
+    for i, of_sample in enumerate(chosen):
+        one = left_out_from_wider(of_events, i)
+        log_density[of_sample], error[of_sample] = one.log_density, one.standard_error
+    return ForetoldSamples(log_density, error, k)
+
+
+def _knows_of_others(model: ContourModel) -> bool:
+    cell = model.likelihood.load_cell
+    return bool(cell.drift or any(cell.bias_uncertainty))
+
+
+def _densities(model: ContourModel, draws: Draws) -> Floats:
+    """Log-densities of samples, given the others where they know of them, shape (chains, draws, samples)."""
+    chains, _, parameters = draws.samples.shape
+    kept = draws.evenly(_DRAWS // chains)
+    points = draws.samples[:, kept].reshape(-1, parameters)
+    logs = []
+    for part in np.array_split(points, max(1, len(points) // 200)):
+        loads, reached = model.loads_with_errors(part)
+        if _knows_of_others(model):
+            cell, measured = model.likelihood.load_cell, model.likelihood.measured
+            logs.append(cell.log_density_left_out(measured, loads[:, 0], noise_scale=model.noise_scale(part)))
+        else:
+            logs.append(model.likelihood.score(loads, reached, model.noise_scale(part), pointwise=True))
+    return np.concatenate(logs).reshape(chains, kept.size, -1)

@@ -1,0 +1,126 @@
+"""Samples that look wrong by themselves, whatever the contour: knocks, readings that are stuck, cut off, or twice."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import stats
+
+from tactile_bayes.arrays import Flags, Floats, Index
+from tactile_bayes.diagnostics.inspection.stretches import centred
+
+__all__ = ["outliers", "repeat_chance", "repeated", "runs_of_equals", "stuck", "uneven_steps"]
+
+_FEWEST = 8
+"""Unloaded samples below which their scatter says nothing of single ones."""
+
+_EFFICIENCY = 0.37
+"""Of the median deviation beside the standard deviation, in normal noise."""
+
+_SHORTEST = 3
+"""Fewest equal readings in a row that are told."""
+
+_JUMP = 2.0
+"""How many times the range of its four neighbours a loaded reading must be out of it."""
+
+_WIDER = 0.5
+"""Share of the usual step by which another must differ."""
+
+_USUAL = 0.2
+"""Share of steps that may be uneven: with more of them, the drive is meant to move so."""
+
+
+def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step: float, *, false_alarm: float) -> Flags:
+    """Readings far from the others: of their unloaded stretch, or in contact of both neighbours on either side.
+
+    Parameters
+    ----------
+    reading : ndarray, shape (n_samples,)
+    sweeps, stretches : list of ndarray
+        Rows of each sweep, and of each of its unloaded stretches.
+    step : float
+        Step of the reading, 0 if it has none; the median deviation may miss half of it, which is added.
+    false_alarm : float
+        Probability that one of all samples is flagged in white normal noise.
+
+    Notes
+    -----
+    Unloaded readings are compared with their median by their median deviation, by Student's t of as many degrees of
+    freedom as that is worth. A loaded reading must be outside of its four neighbours by twice their range besides: no
+    slope, kink or snap-off makes that.
+    """
+    flags = np.zeros(reading.size, dtype=bool)
+    residual, spread = centred(reading, stretches)
+    if residual.size < _FEWEST:
+        return flags
+    spread += 1.4826 * 0.5 * step
+    level = 0.5 * false_alarm / reading.size
+    most = float(stats.t.isf(level, max(_EFFICIENCY * (residual.size - len(stretches)), 1.0))) * spread
+    unloaded = np.concatenate(stretches)
+    flags[unloaded] = np.abs(residual) > most
+    is_unloaded = np.zeros(reading.size, dtype=bool)
+    is_unloaded[unloaded] = True
+    for rows in sweeps:
+        if rows.size < 5:
+            continue
+        values = reading[rows]
+        windows = np.lib.stride_tricks.sliding_window_view(values, 5)
+        neighbours = windows[:, [0, 1, 3, 4]]
+        highest, lowest = neighbours.max(axis=1), neighbours.min(axis=1)
+        beyond = np.maximum(windows[:, 2] - highest, lowest - windows[:, 2])
+        inner = rows[2:-2]
+        flags[inner[(beyond > _JUMP * (highest - lowest) + most) & ~is_unloaded[inner]]] = True
+    return flags
+
+
+def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: float) -> float:
+    """How often two unloaded readings are the same, as far as the steps of the reading make them so."""
+    by_steps = min(1.0, step / (2.0 * math.sqrt(math.pi) * noise)) if noise > 0.0 else 1.0
+    values = np.concatenate([reading[rows][np.append(True, np.diff(reading[rows]) != 0.0)] for rows in stretches])
+    if values.size < 2:
+        return by_steps
+    counts = np.unique(values, return_counts=True)[1]
+    found = float(np.sum(counts * (counts - 1.0))) / (values.size * (values.size - 1.0))
+    return max(by_steps, found)
+
+
+def runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
+    """Readings of a sweep that are the same one after the other, two and more."""
+    parts = np.split(rows, np.flatnonzero(np.diff(reading[rows]) != 0.0) + 1)
+    return [part for part in parts if part.size > 1]
+
+
+def stuck(reading: Floats, sweeps: list[Index], chance: float, *, false_alarm: float) -> Flags:
+    """Readings that stay the same for longer than steps of the reading explain."""
+    flags = np.zeros(reading.size, dtype=bool)
+    for rows in sweeps:
+        for run in runs_of_equals(reading, rows):
+            if run.size >= _SHORTEST and reading.size * chance ** (run.size - 1) < false_alarm:
+                flags[run] = True
+    return flags
+
+
+def repeated(readings: Floats, sweeps: list[Index], chances: Floats, *, false_alarm: float) -> Flags:
+    """Samples of which all readings, shape (n_samples, n_channels), are those of the sample before."""
+    flags = np.zeros(len(readings), dtype=bool)
+    if len(readings) * float(np.prod(chances)) >= false_alarm:
+        return flags
+    for rows in sweeps:
+        same = np.all(np.diff(readings[rows], axis=0) == 0.0, axis=1)
+        flags[rows[1:][same]] = True
+    return flags
+
+
+def uneven_steps(angle: Floats, rows: Index, sense: int) -> Flags:
+    """Whether the step up to each sample of a sweep differs from the others; all even where many do."""
+    flags = np.zeros(rows.size, dtype=bool)
+    step = sense * np.diff(angle[rows])
+    if step.size < _FEWEST:
+        return flags
+    usual = float(np.median(step))
+    spread = 1.4826 * float(np.median(np.abs(step - usual)))
+    differs = np.abs(step - usual) > max(_WIDER * abs(usual), 6.0 * spread)
+    if np.mean(differs) <= _USUAL:
+        flags[1:] = differs
+    return flags

@@ -1,0 +1,70 @@
+"""The stretches of a record: its sweeps, and the unloaded part before and after contact of each."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats, Index
+
+__all__ = ["Autocorrelation", "autocorrelation", "centred", "rows_of_sweeps", "unloaded_stretches"]
+
+_CUT = 4.0
+"""Robust standard deviations at which residuals are cut off, lest one outlier rules."""
+
+
+class Autocorrelation(NamedTuple):
+    """How alike neighbouring residuals are."""
+
+    value: float
+    """Coefficient of neighbours, freed of what taking out means does to it; NaN of too few."""
+    score: float
+    """In standard errors if the noise is white: about standard normal."""
+
+
+def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
+    """The samples of each sweep, in the order of their numbers."""
+    order = np.argsort(sweep, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
+
+
+def unloaded_stretches(sweeps: list[Index], unloaded: NDArray[np.bool_]) -> list[Index]:
+    """Samples that follow each other in a sweep and are unloaded, each stretch by itself."""
+    stretches = []
+    for rows in sweeps:
+        flags = unloaded[rows]
+        parts = np.split(rows, np.flatnonzero(np.diff(flags.astype(np.int8))) + 1)
+        stretches += [part for part in parts if part.size and unloaded[part[0]]]
+    return stretches
+
+
+def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
+    """Readings less the median of their stretch, stretch by stretch, and their robust standard deviation."""
+    residuals = [reading[rows] - np.median(reading[rows]) for rows in stretches]
+    together = np.concatenate(residuals) if residuals else np.zeros(0)
+    spread = 1.4826 * float(np.median(np.abs(together))) if together.size else 0.0
+    return together, spread
+
+
+def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
+    """Of neighbouring samples, over all stretches; NaN where most readings are on one step."""
+    _, spread = centred(reading, stretches)
+    if spread == 0.0:
+        return Autocorrelation(np.nan, np.nan)
+    product, square, pairs, expected = 0.0, 0.0, 0, 0.0
+    for rows in stretches:
+        if rows.size < 3:
+            continue
+        residual = np.clip(reading[rows] - np.median(reading[rows]), -_CUT * spread, _CUT * spread)
+        residual = residual - residual.mean()
+        product += float(residual[1:] @ residual[:-1])
+        square += float(residual @ residual)
+        pairs += rows.size - 1
+        expected -= (rows.size - 1) / rows.size
+    if pairs < 10 or square <= 0.0:
+        return Autocorrelation(np.nan, np.nan)
+    variance = square / pairs  # a stretch of n has n − 1 degrees of freedom, as many as pairs
+    value = (product / variance - expected) / pairs
+    return Autocorrelation(float(np.clip(value, -1.0, 1.0)), float(value * np.sqrt(pairs)))

@@ -1,0 +1,123 @@
+"""Tables of a record: its samples and what looks wrong in them, its channels, its sweeps."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.arrays import Index
+from tactile_bayes.diagnostics.inspection.samples import outliers, repeat_chance, repeated, stuck, uneven_steps
+from tactile_bayes.diagnostics.inspection.stretches import autocorrelation
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, present_channels
+
+__all__ = ["channel_table", "sample_table", "sweep_table"]
+
+_FROM_ZERO_LOAD = ("bias", "bias_uncertainty", "noise", "noise_uncertainty", "resolution", "same_bias_p_value")
+
+
+def sample_table(
+    record: xr.Dataset,
+    found: xr.Dataset,
+    sweeps: list[Index],
+    stretches: list[Index],
+    cell: LoadCell | None,
+    *,
+    false_alarm: float,
+) -> xr.Dataset:
+    """See `Inspection`; `found` is what `zero_load` returns."""
+    count, present = record.sizes["sample"], present_channels(record)
+    level = false_alarm / len(present)
+    flags = {name: np.zeros((count, len(CHANNELS)), dtype=bool) for name in ("outlier", "stuck", "cut_off")}
+    unloaded = found["unloaded"].values
+    chances, readings = [], []
+    for index, name in enumerate(CHANNELS):
+        if name not in present:
+            continue
+        reading = record[name].values
+        step, noise = float(found["resolution"][index]), float(found["noise"][index])
+        rounding = 4.0 * np.finfo(float).eps * float(np.abs(reading).max())
+        if not noise > rounding:  # an ideal record, whose zeros are equal, or too few unloaded samples to tell
+            continue
+        chance = repeat_chance(reading, stretches, step, noise)
+        chances.append(chance)
+        readings.append(reading)
+        flags["outlier"][:, index] = outliers(reading, sweeps, stretches, step, false_alarm=level)
+        equal = stuck(reading, sweeps, chance, false_alarm=level)
+        at_end = equal & ~unloaded & ((reading == reading.max()) | (reading == reading.min()))
+        flags["cut_off"][:, index] = at_end
+        flags["stuck"][:, index] = equal & ~at_end
+    if cell is not None:
+        ends = cell.cuts_off(np.stack([record[name].values for name in CHANNELS], axis=-1))
+        flags["cut_off"] |= ends
+        flags["stuck"] &= ~ends
+    twice = np.zeros(count, dtype=bool)
+    if len(readings) == len(present):
+        twice = repeated(np.stack(readings, axis=-1), sweeps, np.array(chances), false_alarm=false_alarm)
+        twice &= ~(flags["stuck"] | flags["cut_off"]).all(axis=1)
+    uneven = np.zeros(count, dtype=bool)
+    for rows in sweeps:
+        sense = -1 if record["direction"].values[rows[0]] == "backward" else 1
+        uneven[rows] = uneven_steps(record["drive_angle"].values, rows, sense)
+    words = {
+        "outlier": "whether the reading stands out from its neighbours",
+        "stuck": "whether the reading stays the same for long",
+        "cut_off": "whether the reading is at the end of a range",
+    }
+    return xr.Dataset(
+        {
+            "unloaded": ("sample", unloaded, {"long_name": "whether the sample is unloaded"}),
+            **{name: (("sample", "channel"), flags[name], {"long_name": words[name]}) for name in words},
+            "repeated": ("sample", twice, {"long_name": "whether all readings are those of the sample before"}),
+            "uneven_step": ("sample", uneven, {"long_name": "whether the step of the drive up to it is another"}),
+        },
+        coords={"channel": list(CHANNELS)},
+    )
+
+
+def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index], stated: LoadCell | None) -> xr.Dataset:
+    """See `Inspection`; `found` is what `zero_load` returns."""
+    columns = {name: np.full(len(CHANNELS), np.nan) for name in ("smallest", "largest", "stated_noise", "stated_bias")}
+    likeness = np.full((2, len(CHANNELS)), np.nan)
+    for index, name in enumerate(CHANNELS):
+        if name not in present_channels(record):
+            continue
+        reading = record[name].values
+        columns["smallest"][index], columns["largest"][index] = reading.min(), reading.max()
+        likeness[:, index] = autocorrelation(reading, stretches)
+        if stated is not None:
+            step = stated.resolution[index] / np.sqrt(12.0)
+            noise = float(np.hypot(stated.standard_deviations[name], step))
+            columns["stated_noise"][index] = noise if 0.0 < noise < np.inf else np.nan
+            columns["stated_bias"][index] = stated.bias[index]
+    columns["neighbour_correlation"], columns["neighbour_score"] = likeness
+    table = xr.Dataset(
+        {name: ("channel", values) for name, values in columns.items()},
+        coords={"channel": list(CHANNELS), "unit": ("channel", found["unit"].values)},
+        attrs={"units": record.attrs["units"]},
+    )
+    return table.assign({name: found[name].variable for name in _FROM_ZERO_LOAD})
+
+
+def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> xr.Dataset:
+    """See `Inspection`; `found` is what `zero_load` returns."""
+    angle, unloaded = record["drive_angle"].values, found["unloaded"].values
+    first = np.array([rows[0] for rows in sweeps])
+    steps = [float(np.median(np.abs(np.diff(angle[rows])))) if rows.size > 1 else np.nan for rows in sweeps]
+    length = {"units": record["base_x"].attrs["units"]}
+    of_angle = {"units": "rad"}
+    table = xr.Dataset(
+        {
+            "direction": ("sweep", record["direction"].values[first]),
+            "samples": ("sweep", [rows.size for rows in sweeps]),
+            "base_x": ("sweep", record["base_x"].values[first], length),
+            "base_y": ("sweep", record["base_y"].values[first], length),
+            "drive_angle_from": ("sweep", angle[first], of_angle),
+            "drive_angle_to": ("sweep", angle[[rows[-1] for rows in sweeps]], of_angle),
+            "drive_step": ("sweep", steps, of_angle),
+            "unloaded": ("sweep", [int(np.count_nonzero(unloaded[rows])) for rows in sweeps]),
+        },
+        coords={"sweep": found["sweep"].values, "side": found["side"].values},
+    )
+    names = ("contact", "p_value", "onset_drive_angle", "snap_off_drive_angle")
+    return table.assign({name: found[name].variable for name in names})

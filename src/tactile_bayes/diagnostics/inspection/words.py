@@ -1,0 +1,348 @@
+"""Words for what looks wrong with a record, the most serious first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from tactile_bayes.diagnostics.inspection.fit import Fit
+from tactile_bayes.diagnostics.inspection.remedies import OTHER_ANGLE
+from tactile_bayes.diagnostics.suspicions import CHECK_UNITS
+from tactile_bayes.inference.misfit import CHECK_RIG
+from tactile_bayes.inference.nuisances import BIAS
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, present_channels, rod_of
+
+__all__ = ["UNFIT", "in_words", "prefix_of", "quantity"]
+
+UNFIT = 0.25
+"""Share of loaded samples that no contact explains above which it is told: of a rod 10 % stiffer than stated it is
+less at the usual noise."""
+
+_FACTOR = 2.0
+"""Between the noise that is stated and the one that is found, as for verdicts."""
+
+_OFF_ZERO = 5.0
+"""Standard errors by which a zero must differ from the stated one."""
+
+_FAR = 3.0
+"""Standard deviations of a bias's prior beyond which infer would object."""
+
+_CORRELATED = 0.2
+"""Coefficient of neighbours below which noise is as good as white."""
+
+_FEWEST_IN_CONTACT = 10
+
+_SHOWN = 5
+"""Samples that are listed, at most."""
+
+_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def in_words(
+    record: xr.Dataset,
+    sweeps: xr.Dataset,
+    channels: xr.Dataset,
+    samples: xr.Dataset,
+    suspected: Sequence[str],
+    fit: Fit,
+    cell: LoadCell | None,
+    source: str,
+    false_alarm: float,
+) -> tuple[str, ...]:
+    """See `inspect_record`; no sentence at all where nothing looks wrong."""
+    return (
+        *_never_loaded(sweeps),
+        *_dead(record, sweeps),
+        *_of_loads(suspected, fit),
+        *_cut_off(record, samples, cell),
+        *_without_contact(sweeps),
+        *_stuck(samples),
+        *_outlying(samples, cell),
+        *_zeros(record, channels, cell, source, false_alarm),
+        *_noise(channels, cell, source, false_alarm),
+        *_steps(samples),
+        *_unfinished(sweeps),
+    )
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """A value with its unit, in SI with a prefix.
+
+    Examples
+    --------
+    >>> quantity(0.0125, "N"), quantity(0.0125, "1"), quantity(0.0, "N m")
+    ('12.5 mN', '0.0125', '0 N m')
+    """
+    if unit == "1":
+        return f"{value:.{digits}g}"
+    size, prefix = prefix_of(value)
+    return f"{value / size:.{digits}g} {prefix}{unit}"
+
+
+def prefix_of(value: float) -> tuple[float, str]:
+    """The size of the prefix that suits a value in SI, and the prefix.
+
+    Examples
+    --------
+    >>> prefix_of(-0.0125)
+    (0.001, 'm')
+    """
+    if not abs(value) > 0.0:  # nothing, or not known
+        return _PREFIXES[0]
+    return next((pair for pair in _PREFIXES if abs(value) >= pair[0]), _PREFIXES[-1])
+
+
+def _of_loads(suspected: Sequence[str], fit: Fit) -> list[str]:
+    """Units and signs, and loads that contradict one another."""
+    told = list(suspected)
+    if not max(fit.share, fit.below) > UNFIT:
+        return told
+    if told and (not fit.remedy or told[0].endswith(CHECK_UNITS)):  # the first sentence says it all
+        return told
+    against = f"The loads of {fit.share:.0%} of the {fit.loaded} loaded samples fit no contact of such a rod"
+    would = "would"
+    if not fit.share > UNFIT:
+        against = f"Of the {fit.loaded} loaded samples {fit.below:.0%} touch something below the pivot, not above"
+        would = "would touch something above"
+    remedy = CHECK_RIG
+    if fit.remedy:
+        remedy = f"nearly all {would} if {fit.remedy}"
+    told.insert(0 if fit.remedy.startswith(OTHER_ANGLE) else len(told), f"{against}: {remedy}.")
+    return told
+
+
+def _dead(record: xr.Dataset, sweeps: xr.Dataset) -> list[str]:
+    if not sweeps.contact.values.any():
+        return []
+    names = [name for name in present_channels(record) if np.ptp(record[name].values) == 0.0]
+    return [
+        f"{name} never changes: is it connected? If it is not measured, empty its column, or remove it and give "
+        f"--missing {name}."
+        for name in names
+    ]
+
+
+def _cut_off(record: xr.Dataset, samples: xr.Dataset, cell: LoadCell | None) -> list[str]:
+    told = []
+    for index, name in enumerate(CHANNELS):
+        flags = samples.cut_off.values[:, index]
+        if not flags.any():
+            continue
+        largest = float(np.abs(record[name].values[flags]).max())
+        stated = cell is not None and np.isfinite(cell.limit[index])
+        remedy = "" if stated else ": state its end in the header, or take a cell with a larger one"
+        told.append(
+            f"{_count(flags, 'reading')} of {name} {_are(flags)} cut off at {quantity(largest, _unit(record, name))}, "
+            f"the end of a range ({_listed(flags)}){remedy}."
+        )
+    return told
+
+
+def _never_loaded(sweeps: xr.Dataset) -> list[str]:
+    if sweeps.contact.values.any():
+        return []
+    return [
+        "No sweep shows contact: the loads do not change from beginning to end by more than noise. Does the rod "
+        "touch, and are the load columns the right ones?"
+    ]
+
+
+def _without_contact(sweeps: xr.Dataset) -> list[str]:
+    none = [int(number) for number, found in zip(sweeps.sweep.values, sweeps.contact.values, strict=True) if not found]
+    if not none or len(none) == sweeps.sizes["sweep"]:
+        return []
+    return [f"{_of_sweeps(none, 'show')} no contact: leave it out, or is it another object's?"]
+
+
+def _stuck(samples: xr.Dataset) -> list[str]:
+    told = []
+    for index, name in enumerate(CHANNELS):
+        flags = samples.stuck.values[:, index]
+        if flags.any():
+            told.append(
+                f"{_count(flags, 'reading')} of {name} {_are(flags)} the same as before or after, for longer than its "
+                f"steps explain ({_listed(flags)}): did the acquisition hang?"
+            )
+    flags = samples.repeated.values
+    if flags.any():
+        told.append(
+            f"{_count(flags, 'sample')} {'has' if np.sum(flags) == 1 else 'have'} all the readings of the one before "
+            f"({_listed(flags)}): stored twice? Remove what is no measurement."
+        )
+    return told
+
+
+def _outlying(samples: xr.Dataset, cell: LoadCell | None) -> list[str]:
+    told = []
+    remedy = (
+        "If there are more, state noise with outliers, load_cell_degrees_of_freedom: 4, in the header; else remove the "
+        "row."
+    )
+    if cell is not None and np.isfinite(cell.degrees_of_freedom):
+        remedy = "The noise with outliers that is stated allows for some; else remove the row."
+    for index, name in enumerate(CHANNELS):
+        flags = samples.outlier.values[:, index]
+        if flags.any():
+            stands = "stands" if np.sum(flags) == 1 else "stand"
+            told.append(
+                f"{_count(flags, 'reading')} of {name} {stands} out from {'its' if stands[-1] == 's' else 'their'} "
+                f"neighbours ({_listed(flags)}): a knock? {remedy}"
+            )
+    return told
+
+
+def _zeros(
+    record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float
+) -> list[str]:
+    told = []
+    level = false_alarm / max(int(np.isfinite(channels.same_bias_p_value.values).sum()), 1)
+    moved = [str(row.channel.values) for row in _rows(channels) if float(row.same_bias_p_value) < level]
+    if moved and not _drifts(cell):
+        told.append(
+            f"The zero of {_and(moved)} moved between one unloaded stretch and another: tare before each sweep, or "
+            "have infer find a drift (--nuisance drift)."
+        )
+    is_stated = source in ("given", "data sheet")
+    far = _far_off(record, channels, cell if is_stated else None)
+    if far:
+        told.append(
+            f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Take it off as the "
+            "column is read: --column 'force_x=NAME+12.5' adds 12.5 in the column's unit."
+        )
+    if not is_stated or _drifts(cell):
+        return told
+    off = []
+    for row in _rows(channels):
+        if str(row.channel.values) in far:
+            continue
+        away, error = float(row.bias - row.stated_bias), float(row.bias_uncertainty)
+        stated = 0.0 if cell is None else cell.bias_uncertainty[CHANNELS.index(str(row.channel.values))]
+        error = float(np.hypot(error, stated))
+        if abs(away) > _OFF_ZERO * error > 0.0:
+            off.append(
+                f"{row.channel.values} is off by {quantity(away, str(row.unit.values))} "
+                f"({abs(away) / error:.0f} standard errors)"
+            )
+    if off:
+        told.append(
+            f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? "
+            "infer finds it as it is (--nuisance bias, one of the defaults), but not with --as-stated."
+        )
+    return told
+
+
+def _far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) -> dict[str, str]:
+    """Zeros by channel, in words, that the prior of a bias hardly allows, and that are not stated."""
+    rod, found = rod_of(record), {}
+    for row in _rows(channels):
+        name, bias = str(row.channel.values), float(row.bias)
+        index = CHANNELS.index(name)
+        stated, uncertain = (0.0, 0.0) if cell is None else (cell.bias[index], cell.bias_uncertainty[index])
+        expected = BIAS * (rod.moment_unit if name == CHANNELS[0] else rod.force_unit)
+        if abs(bias - stated) > _FAR * max(expected, uncertain):
+            found[name] = f"{quantity(bias, str(row.unit.values))} of {name}"
+    return found
+
+
+def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float) -> list[str]:
+    told = []
+    level = -float(ndtri(0.5 * false_alarm / len(CHANNELS)))
+    like = [
+        f"{row.channel.values} ({float(row.neighbour_correlation):+.2f})"
+        for row in _rows(channels)
+        if abs(float(row.neighbour_score)) > level and abs(float(row.neighbour_correlation)) > _CORRELATED
+    ]
+    if like and not _drifts(cell):
+        told.append(
+            f"The noise is not white: unloaded neighbours are correlated in {_and(like)}. Filter less or sample less "
+            "often, or have infer find a drift (--nuisance drift), else bands come out too narrow."
+        )
+    if source in ("given", "data sheet") and not _drifts(cell):
+        for row in _rows(channels):
+            stated, found, error = (float(row[name]) for name in ("stated_noise", "noise", "noise_uncertainty"))
+            ratio = found / stated if stated else np.nan
+            if not 1.0 / _FACTOR <= ratio <= _FACTOR and abs(found - stated) > _OFF_ZERO * error:
+                unit = str(row.unit.values)
+                told.append(
+                    f"The noise of {row.channel.values} is {quantity(found, unit)} in unloaded samples, and stated as "
+                    f"{quantity(stated, unit)}: state what it is, or are the units right?"
+                )
+    return told
+
+
+def _drifts(cell: LoadCell | None) -> bool:
+    """Whether a drift is stated, which explains a zero that moves and neighbours that are alike."""
+    return cell is not None and cell.drift is not None
+
+
+def _steps(samples: xr.Dataset) -> list[str]:
+    flags = samples.uneven_step.values
+    if not flags.any():
+        return []
+    return [
+        f"{_count(flags, 'step')} of the drive {'differs' if np.sum(flags) == 1 else 'differ'} from the others "
+        f"({_listed(flags)}): were samples lost, or did the drive slip?"
+    ]
+
+
+def _unfinished(sweeps: xr.Dataset) -> list[str]:
+    told = []
+    contact = sweeps.contact.values
+    for name, words, remedy in (
+        ("onset_drive_angle", "begin", "begin before first contact"),
+        ("snap_off_drive_angle", "end", "go on until the rod snaps off"),
+    ):
+        inside = (
+            contact & np.isnan(sweeps[name].sel(side="after").values) & np.isnan(sweeps[name].sel(side="before").values)
+        )
+        numbers = [int(number) for number in sweeps.sweep.values[inside]]
+        if numbers:
+            told.append(f"{_of_sweeps(numbers, words)} in contact: {remedy}, which tells much of the contour.")
+    few = contact & (sweeps.samples.values - sweeps.unloaded.values < _FEWEST_IN_CONTACT)
+    numbers = [int(number) for number in sweeps.sweep.values[few]]
+    if numbers:
+        which = _of_sweeps(numbers, "show")
+        told.append(f"{which} fewer than {_FEWEST_IN_CONTACT} samples in contact: take finer steps of the drive.")
+    return told
+
+
+def _rows(channels: xr.Dataset) -> list[xr.Dataset]:
+    """Of the channels that are there."""
+    return [channels.isel(channel=i) for i in np.flatnonzero(np.isfinite(channels.largest.values))]
+
+
+def _unit(record: xr.Dataset, name: str) -> str:
+    return str(record[name].attrs.get("units", "1"))
+
+
+def _count(flags: NDArray[np.bool_], noun: str) -> str:
+    count = int(np.sum(flags))
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def _are(flags: NDArray[np.bool_]) -> str:
+    return "is" if np.sum(flags) == 1 else "are"
+
+
+def _listed(flags: NDArray[np.bool_]) -> str:
+    """Like "samples 3, 5 to 9 and 12": neighbours together."""
+    where = np.flatnonzero(flags)
+    runs = np.split(where, np.flatnonzero(np.diff(where) != 1) + 1)
+    words = [f"{run[0]}" if run.size == 1 else f"{run[0]} to {run[-1]}" for run in runs]
+    more = len(words) - _SHOWN
+    shown = [*words[:_SHOWN], "..."] if more > 0 else words
+    return f"sample{'s' * (where.size != 1)} {_and(shown) if more <= 0 else ', '.join(shown)}"
+
+
+def _and(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else list(words))
+
+
+def _of_sweeps(numbers: Sequence[int], verb: str) -> str:
+    one = len(numbers) == 1
+    return f"Sweep{'' if one else 's'} {_and(list(map(str, numbers)))} {verb}{'s' if one else ''}"

@@ -1,0 +1,279 @@
+"""The check of a record: could it have come from the posterior that was inferred from it?"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.checks import check_probability
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.result import record_of, refuse_no_contour
+from tactile_bayes.load_cell import LoadCell, rough_noise
+
+__all__ = ["DISCREPANCIES", "Residuals", "check_record", "residuals_of"]
+
+DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
+"""Ways in which a record can differ from those that the posterior predicts."""
+
+_FEWEST_PREDICTIONS = 100
+
+_FEWEST_SAMPLES = 5
+"""Of one kind in a channel, below which nothing is said of them."""
+
+_OUTLYING = 4.0
+"""Where residuals are cut off for all but `largest`, in standard deviations: one outlier is no run."""
+
+_WINDOWS = 8
+"""Lengths of a running mean in the loaded part of a sweep: misfit of one shape by another changes sign 3 to 5 times."""
+
+_LOST = 20.0
+"""Log-probability below the median beyond which a draw is of a walker that is lost, and predicts nothing of use."""
+
+_TINY = 1e-300
+
+
+class Residuals(NamedTuple):
+    """Readings of one channel less what the posterior expects, over its spread; row 0 is the record itself."""
+
+    values: Floats
+    """Shape (1 + predictions, samples)."""
+    scale: Floats
+    """What one is in the record's units, shape (samples,)."""
+    loaded: NDArray[np.bool_]
+    """Which samples the posterior expects to carry a load, shape (samples,)."""
+    sweeps: tuple[Index, ...]
+    """Rows of each sweep, in the order of measurement."""
+
+
+def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dataset:
+    """Posterior predictive check: does the record look like those that the posterior predicts?
+
+    A contour that the family does not hold, a wrong rod, a forgotten tare: the noise that is inferred beside the
+    contour takes in all of them, so that the size of the residuals says nothing. Their pattern does: misfit is smooth
+    in the drive angle, there is none of it in unloaded samples, and noise is neither.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    false_alarm : float
+        Probability, at most, that the check fails for a record which the model does describe; all discrepancies and
+        channels together. With fewer than 1/false_alarm − 1 predictions in the tree it is 1/(1 + predictions).
+
+    Returns
+    -------
+    xr.Dataset
+        Over "discrepancy" and "channel" (those that were measured):
+
+        p_value
+            Share of records, predictions and the real one, that are at least as discrepant as the real one; NaN where
+            there are too few samples.
+        score
+            Discrepancy above its median over predictions, over the same of their 95 % quantile: 1 is unusual, some
+            tens are a misfit that can be seen.
+        worst_sweep, worst_from, worst_to (channel)
+            Sweep and drive angles [rad] of the stretch whose mean residual is largest, in standard errors.
+        worst_residual (channel)
+            That mean, in the record's units.
+        neighbour_noise (channel)
+            Standard deviation of white noise on the residuals from the differences of neighbours, in the record's
+            units: what the noise is if all that is smooth is misfit.
+        overall_p_value
+            Share of records of which the largest score is at least that of the real one.
+
+        Attributes: `passed` (0 or 1), false_alarm (as it is), predictions.
+
+    Raises
+    ------
+    InferenceError
+        If the tree holds fewer than 100 predictions.
+    ParameterError
+        If `false_alarm` is not in (0, 1).
+
+    Notes
+    -----
+    Residuals are readings less the median of the predicted ones, over half the width of their central 95 % interval
+    (over 1.96), of the real record and of all predicted ones alike; so drift, correlated noise, outliers and steps of
+    the reading need no treatment of their own. Draws of walkers that are lost are left out. In each channel:
+
+    - runs: mean square of the running mean over an eighth of the loaded part of a sweep, over that of the differences
+      of neighbours;
+    - neighbours: mean square of loaded residuals, over the same (von Neumann's ratio);
+    - largest: largest residual over the root mean square;
+    - loaded: mean square of loaded samples over that of unloaded ones;
+    - zero: mean of the unloaded samples over their root mean square.
+
+    All but `largest` cut residuals off at 4. None depends on the size of the noise. The p-values are those of Gelman,
+    Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre. The posterior has seen the record,
+    so they are conservative: of a true model they are seldom small, the less the more parameters there are for a
+    sample. A record that passes is not proven right: misfit below the noise over √(samples in a stretch) is not seen.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
+    >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=100)
+    >>> for profile in ("II", "IV"):
+    ...     ideal = scan(paper_profile(profile, q=0.5), drive_step=0.03).record
+    ...     measured = cell.measure(ideal, seed=1)
+    ...     result = infer_contour(measured, family="parabola", load_cell=cell, seed=1, settings=quick)
+    ...     print(profile, bool(check_record(result).passed))
+    II True
+    IV False
+    """
+    check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
+    residuals = residuals_of(posterior)
+    channels = list(residuals)
+    predictions = len(residuals[channels[0]].values) - 1
+    if predictions < _FEWEST_PREDICTIONS:
+        raise InferenceError(
+            f"the tree holds {predictions} predictions of the record, too few to compare it with: sample longer"
+        )
+    discrepancies = np.stack([_discrepancies(of_channel) for of_channel in residuals.values()], axis=1)
+    p_values, scores = _p_values(discrepancies), _scores(discrepancies)
+    finite = scores[np.isfinite(scores).all(axis=-1)]
+    overall = float(_p_values(finite.max(axis=0))) if finite.size else np.nan
+    columns = posterior["constant_data"].to_dataset()
+    angle, sweep = columns.drive_angle.values, columns.sweep.values
+    worst = [_worst_stretch(of_channel) for of_channel in residuals.values()]
+    means = [float(np.mean((r.values[0] * r.scale)[rows])) for r, rows in zip(residuals.values(), worst, strict=True)]
+    false_alarm = max(false_alarm, 1.0 / (1.0 + predictions))
+    predicted = posterior["posterior_predictive"].to_dataset()
+    units = {name: str(predicted[name].attrs.get("units", "1")) for name in channels}
+    return xr.Dataset(
+        {
+            "p_value": (("discrepancy", "channel"), p_values),
+            "score": (("discrepancy", "channel"), scores[..., 0]),
+            "worst_sweep": ("channel", [int(sweep[rows[0]]) for rows in worst]),
+            "worst_from": ("channel", [float(angle[rows[0]]) for rows in worst], {"units": "rad"}),
+            "worst_to": ("channel", [float(angle[rows[-1]]) for rows in worst], {"units": "rad"}),
+            "worst_residual": ("channel", means),
+            "neighbour_noise": ("channel", [_neighbour_noise(of_channel) for of_channel in residuals.values()]),
+            "overall_p_value": overall,
+        },
+        coords={
+            "discrepancy": list(DISCREPANCIES),
+            "channel": channels,
+            "unit": ("channel", [units[name] for name in channels]),
+        },
+        attrs={
+            "passed": int(not overall <= false_alarm),
+            "false_alarm": false_alarm,
+            "predictions": predictions,
+        },
+    )
+
+
+def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
+    """Residuals of the record and of every prediction, by channel."""
+    refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
+    predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()
+    sweep = posterior["constant_data"].to_dataset().sweep.values
+    order = np.argsort(sweep, kind="stable")
+    sweeps = tuple(np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1))
+    loaded = _loaded(posterior)
+    log_probability = posterior["sample_stats"].to_dataset().lp
+    found = (log_probability.sel(draw=predicted.draw) > float(log_probability.median()) - _LOST).values.ravel()
+    residuals = {}
+    for name, values in predicted.items():
+        of_draws = values.values.reshape(-1, sweep.size)[found]
+        low, centre, high = np.quantile(of_draws, [0.025, 0.5, 0.975], axis=0)
+        # At snap-off some draws are loaded and others not: such a sample must not outweigh all others.
+        scale = (high - low) / 3.92
+        scale = np.maximum(scale, float(np.median(scale)) or float(np.std(of_draws - centre)) or 1.0)
+        rows = np.concatenate([observed[name].values[None], of_draws])
+        residuals[str(name)] = Residuals((rows - centre) / scale, scale, loaded, sweeps)
+    return residuals
+
+
+def _loaded(posterior: xr.DataTree) -> NDArray[np.bool_]:
+    """Samples between first contact and snap-off, as the median of the draws has them."""
+    record = record_of(posterior)
+    events = posterior["events"].to_dataset().median(("chain", "draw"))
+    strokes = RecordLikelihood(record, LoadCell.from_record(record) or LoadCell()).strokes
+    angle = record.drive_angle.values
+    loaded = np.zeros(angle.size, dtype=bool)
+    ends = np.sort(np.stack([events.first_drive_angle.values, events.snap_off_drive_angle.values]), axis=0)
+    for stroke, low, high in zip(strokes, *ends, strict=True):
+        loaded[stroke.samples] = (angle[stroke.samples] >= low) & (angle[stroke.samples] <= high)
+    return loaded
+
+
+def _discrepancies(residuals: Residuals) -> Floats:
+    """In the order of `DISCREPANCIES`, of every row, shape (5, rows); NaN where there are too few samples."""
+    cut_off = np.clip(residuals.values, -_OUTLYING, _OUTLYING)
+    squares, loaded = cut_off**2, residuals.loaded
+    out = np.full((len(DISCREPANCIES), len(cut_off)), np.nan)
+    out[2] = _ratio(np.abs(residuals.values).max(axis=1) ** 2, squares.mean(axis=1))
+    enough, unloaded_enough = (np.count_nonzero(kind) >= _FEWEST_SAMPLES for kind in (loaded, ~loaded))
+    if enough:
+        energy = squares[:, loaded].mean(axis=1)
+        parts = [rows[loaded[rows]] for rows in residuals.sweeps]
+        parts = [rows for rows in parts if rows.size >= _FEWEST_SAMPLES]
+        if parts:
+            steps = np.concatenate([np.diff(cut_off[:, rows], axis=1) for rows in parts], axis=1)
+            means = np.concatenate([_running_mean(cut_off[:, rows]) for rows in parts], axis=1)
+            rough = (steps**2).mean(axis=1)
+            out[0], out[1] = _ratio((means**2).mean(axis=1), rough), _ratio(energy, rough)
+    if unloaded_enough:
+        quiet = squares[:, ~loaded].mean(axis=1)
+        out[4] = np.abs(cut_off[:, ~loaded].mean(axis=1)) / np.sqrt(np.maximum(quiet, _TINY))
+        if enough:
+            out[3] = _ratio(energy, quiet)
+    return out
+
+
+def _ratio(above: Floats, below: Floats) -> Floats:
+    """Logarithm of a ratio, whose distribution over records has no long tail."""
+    return np.asarray(np.log(np.maximum(above, _TINY)) - np.log(np.maximum(below, _TINY)))
+
+
+def _width(samples: int) -> int:
+    return max(2, samples // _WINDOWS)
+
+
+def _running_mean(values: Floats) -> Floats:
+    width = _width(values.shape[1])
+    sums = np.cumsum(values, axis=1)
+    sums[:, width:] = sums[:, width:] - sums[:, :-width]
+    return np.asarray(sums[:, width - 1 :] / width)
+
+
+def _p_values(discrepancies: Floats) -> Floats:
+    """Share of rows at least as large as the first, over the last axis; NaN where that is none."""
+    shares = np.mean(discrepancies >= discrepancies[..., :1], axis=-1)
+    return np.where(np.isnan(discrepancies[..., 0]), np.nan, shares)
+
+
+def _scores(discrepancies: Floats) -> Floats:
+    """Discrepancies on a scale that they share, on which the median over predictions is 0, and the 95 % quantile 1."""
+    middle, high = np.quantile(discrepancies[..., 1:], [0.5, 0.95], axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((discrepancies - middle[..., None]) / (high - middle)[..., None])
+
+
+def _worst_stretch(residuals: Residuals) -> Index:
+    """Samples of the real record, neighbours in the loaded part of a sweep, whose mean is furthest from zero."""
+    parts = [rows[residuals.loaded[rows]] for rows in residuals.sweeps]
+    parts = [rows for rows in parts if rows.size >= _FEWEST_SAMPLES] or list(residuals.sweeps)
+    real = np.clip(residuals.values[:1], -_OUTLYING, _OUTLYING)
+    best, found = -1.0, parts[0]
+    for rows in parts:
+        width = min(_width(rows.size), rows.size)
+        if width < rows.size:
+            means = np.abs(_running_mean(real[:, rows])[0]) * np.sqrt(width)
+            start = int(np.argmax(means))
+            if means[start] > best:
+                best, found = float(means[start]), rows[start : start + width]
+    return found
+
+
+def _neighbour_noise(residuals: Residuals) -> float:
+    """Of the real record, from the median size of second differences, so that jumps do not count."""
+    return rough_noise(residuals.values[0] * residuals.scale)

@@ -1,0 +1,114 @@
+"""Suspicions: what in a record no rod of the stated size can have done, whatever the contour."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import contact_sides
+from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
+
+__all__ = ["CHECK_UNITS", "suspicions"]
+
+_STRONGEST = 100.0
+"""Force in EI/L² above which units are doubted: a tangential contact with more is within 0.37 L of the pivot."""
+
+_WEAKEST = 0.02
+"""Largest force in EI/L² below which units are doubted: a rod that lets go has been bent by more."""
+
+_LONGEST_LEVER = 2.0
+"""Moment over force, in L, above which units are doubted: no contact is further away than L."""
+
+CHECK_UNITS = "check the units of the loads, and the rod's length and flexural rigidity."
+"""How sentences end that are of loads too large or too small for the rod."""
+
+
+def suspicions(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[str, ...]:
+    """In words, what speaks for a wrong unit or sign in a record; nothing of it depends on a contour.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    load_cell : LoadCell, optional
+        In the record's units; by default its data sheet, if any. Known errors are taken out.
+
+    Returns
+    -------
+    tuple of str
+
+    Notes
+    -----
+    The lever arm of the contact force is at most L, so that |m0| ≤ f L with or without friction. In tangential contact
+    √f s1 ≤ 2 K(1/2), so that f ≤ 13.8/s1² in EI/L². The object lies above the pivot, so that fAy > 0.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> record = scan(paper_profile("II", q=0.5)).record
+    >>> suspicions(record)
+    ()
+    >>> print(suspicions(record.assign(force_y=-record.force_y))[0])
+    force_y is negative in contact, but the object pushes the pivot's support up: its sign is wrong, or the frame.
+    """
+    cell = load_cell or LoadCell.from_record(measured) or LoadCell()
+    present = present_channels(measured)
+    if len(present) == len(CHANNELS):
+        measured = cell.corrected(measured)
+    record = to_dimensionless(measured)
+    found = []
+    forces = [record[name].values for name in CHANNELS[1:] if name in present]
+    if forces:
+        force = np.sqrt(np.sum(np.square(forces), axis=0))
+        largest = _largest(force)
+        firm = force > 0.1 * largest
+        found += _of_size(record, measured, force, firm, has_all=len(forces) == 2)
+        if len(forces) == 2 and largest > 0.0:
+            force_y = forces[1]
+            if frame_of(record) == "turning":
+                force_y = turned(forces[0], forces[1], -record.drive_angle.values)[1]
+            if force_y[firm].sum() < -0.5 * np.abs(force_y[firm]).sum():
+                found.append(
+                    "force_y is negative in contact, but the object pushes the pivot's support up: its sign is wrong, "
+                    "or the frame."
+                )
+    if "holding_moment" in present:
+        drive = np.where(record.direction.values == "backward", -1.0, 1.0)
+        if np.all(contact_sides(measured, cell) == -drive):
+            found.append(
+                "The holding moment has the sign of contacts on the other side in every sweep (it is positive where "
+                "the drive turns counter-clockwise against the object): its sign is wrong, or the directions are, "
+                "that is the sense of the drive angle."
+            )
+    return tuple(found)
+
+
+def _of_size(
+    record: xr.Dataset, measured: xr.Dataset, force: Floats, firm: NDArray[np.bool_], *, has_all: bool
+) -> list[str]:
+    """Loads that are too large or too small for the rod."""
+    unit = rod_of(measured).force_unit
+    largest = _largest(force)
+    stated = f" (with EI/L² = {unit:.3g} N)" if measured.attrs["units"] == "SI" else ""
+    remedy = CHECK_UNITS
+    if largest > _STRONGEST:
+        return [f"Forces reach {largest:.3g} EI/L²{stated}, more than such a rod can carry: {remedy}"]
+    moment = np.abs(record.holding_moment.values)
+    if has_all and firm.any() and np.median(moment[firm] / force[firm]) > _LONGEST_LEVER:
+        lever = float(np.median(moment[firm] / force[firm]))
+        return [
+            f"The holding moment is {lever:.3g} L times the force, but no contact is further from the pivot than L: "
+            f"{remedy}"
+        ]
+    if 0.0 < largest < _WEAKEST and has_all:
+        return [f"Forces reach {largest:.3g} EI/L²{stated} only, which hardly bends such a rod: {remedy}"]
+    return []
+
+
+def _largest(values: Floats) -> float:
+    """Nearly: a knock or two do not count."""
+    return float(np.quantile(values, 0.98))

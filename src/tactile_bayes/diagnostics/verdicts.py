@@ -1,0 +1,294 @@
+"""Verdicts: what is wrong with a result, in words, and what to do."""
+
+from __future__ import annotations
+
+import json
+import math
+import warnings
+from collections.abc import Container, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
+from tactile_bayes.diagnostics.suspicions import suspicions
+from tactile_bayes.errors import DriftWarning, InferenceError
+from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
+from tactile_bayes.inference.result import posterior_draws, record_of
+from tactile_bayes.load_cell import LoadCell, zero_load
+from tactile_bayes.reconstruction import AXIAL_ALARM
+from tactile_bayes.record import CHANNELS
+
+__all__ = ["doubtful_sides", "verdicts"]
+
+_NOISES = ("noise_scale", "moment_noise", "force_noise")
+
+_FACTOR = 2.0
+"""Between the noise that is stated and the one that is found: less is what data sheets are like."""
+
+_OFF_ZERO = 5.0
+"""Standard errors by which a zero must be off to be told."""
+
+_CONTRADICTION = 1e-4
+"""Probability of the misfit of single samples below which it is told."""
+
+_FEWEST_PRIOR_DRAWS = 500
+
+_BEYOND = 0.5
+"""Of the way from the 5 % quantile of a prior's draws to the last, how much further the posterior must be to be told:
+of a normal prior that is some four standard deviations, of one that is largest at its end nothing is beyond it."""
+
+_PRIOR_DOMINATED = 0.7
+"""Width of the posterior over that of the prior above which the record is said to tell little."""
+
+_CAUSES = {
+    "runs": "whose residuals do not scatter about zero but stay on one side",
+    "neighbours": "whose residuals do not scatter about zero but stay on one side",
+    "largest": "of which single samples are far off",
+    "loaded": "whose loaded samples are further from what is predicted than its unloaded ones",
+    "zero": "whose unloaded samples are off zero",
+}
+
+
+def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tuple[str, ...]:
+    """What is wrong with a result of `infer_contour`, in sentences, the most serious first, or that all is well.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+        From `infer_contour`.
+    contacts : xr.Dataset, optional
+        From `reconstruct` by method="constrained", whose misfits tell whether the loads of a sample agree.
+
+    Returns
+    -------
+    tuple of str
+        At least one. Told are: loads that such a rod cannot have (`suspicions`); a zero that is off, or that moved;
+        a record that does not look like what the posterior predicts (`check_record`); ensembles that have not
+        converged; noise twice as large as stated, or half; loads of a sample that contradict one another; nuisance
+        parameters that are beyond what the prior thought possible. Last, and not against the result, are parameters of
+        which the record tells little.
+
+    Examples
+    --------
+    >>> from tactile_bayes import LoadCell, SamplerSettings, infer_contour, scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> cell = LoadCell(force_noise=0.02, moment_noise=0.008)
+    >>> measured = cell.measure(scan(paper_profile("IV", q=0.5), drive_step=0.03).record, seed=1)
+    >>> quick = SamplerSettings(ensembles=2, walkers=32, max_steps=50)
+    >>> found = verdicts(infer_contour(measured, family="parabola", load_cell=cell, seed=1, settings=quick))
+    >>> print(found[0].split(":")[0])
+    The family parabola and the rig as assumed do not describe the record
+    """
+    record = record_of(posterior)
+    try:
+        check = check_record(posterior)
+    except InferenceError:  # too few draws, which the message tells
+        check = None
+    residuals = residuals_of(posterior)  # after the check has let its own go: of a long record they are large
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DriftWarning)  # which is told in words
+        unloaded = zero_load(record)
+    against = [
+        *suspicions(record),
+        *doubtful_sides(posterior.attrs),
+        *_off_zero(record, unloaded, residuals),
+        *_moved_zero(posterior, record, unloaded),
+    ]
+    if check is not None and not check.attrs["passed"]:
+        against.append(_not_described(posterior, check))
+    if not posterior.attrs["converged"]:
+        against.append(posterior.attrs["message"].replace("not converged", "NOT CONVERGED", 1) + ".")
+    noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
+    beyond = _beyond_prior(posterior)
+    against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
+    against += _told_beyond(beyond)
+    if not against:
+        p_value = math.nan if check is None else float(check.overall_p_value)
+        against.append(
+            f"All is well: the ensembles agree, and the record looks like what they predict (p = {p_value:.2g})."
+        )
+    return (*against, *_prior_dominated(posterior, known=beyond))
+
+
+def _inferred(posterior: xr.DataTree) -> list[str]:
+    """Nuisance parameters of a run."""
+    names: list[str] = json.loads(posterior.attrs.get("nuisances", "[]"))
+    return names
+
+
+def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
+    """What the attributes of a posterior, or of contacts, say of sweeps that may have touched from either side."""
+    if "doubtful_sides" not in attrs:
+        return []
+    sides = json.loads(attrs["doubtful_sides"])
+    taken = ", ".join(f"sweep {sweep} as a {side} one" for sweep, side in sides.items())
+    probability = attrs.get("sides_probability")
+    sure = "" if probability is None else f", with probability {probability:.2g}"
+    return [
+        f"The moment leaves doubt on which side of the object it was touched; taken is {taken}{sure}. Is the sign of "
+        "the moment right, and the direction, and was the load cell tared?"
+    ]
+
+
+def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
+    """Channels that read something without load which the posterior does not expect."""
+    off = []
+    for name, of_channel in residuals.items():
+        unloaded = found.unloaded.values & ~of_channel.loaded
+        uncertainty = float(found.bias_uncertainty.sel(channel=name))
+        if np.count_nonzero(unloaded) < 3 or not math.isfinite(uncertainty):
+            continue
+        means = (of_channel.values * of_channel.scale)[:, unloaded].mean(axis=1)
+        error = math.hypot(uncertainty, float(np.std(means[1:])))
+        if abs(means[0]) > _OFF_ZERO * error > 0.0:
+            unit = _unit(record, name)
+            off.append(f"{name} is off by {means[0]:.3g}{unit} ({abs(means[0]) / error:.0f} standard errors)")
+    if not off:
+        return []
+    return [
+        f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? Take it out of "
+        "the readings, or give LoadCell.from_zero_load(record)."
+    ]
+
+
+def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[str]:
+    """Channels whose zero wandered, where nothing was said of that, nor asked."""
+    cell = LoadCell.from_record(record)
+    inferred = _inferred(posterior)
+    level = found.attrs["false_alarm"] / max(int(np.isfinite(found.same_bias_p_value).sum()), 1)
+    moved = [
+        f"{name} (p = {p_value:.1g} if it had not)"
+        for name, p_value in zip(found.channel.values.tolist(), found.same_bias_p_value.values.tolist(), strict=True)
+        if p_value < level and f"{name.removeprefix('holding_')}_drift" not in inferred
+    ]
+    if not moved or (cell is not None and cell.drift is not None):
+        return []
+    return [
+        f"The zero moved from one unloaded stretch to another, of {', '.join(moved)}: infer it, too (--nuisance drift, "
+        "or nuisances=[..., 'drift']), state the drift of the load cell, or tare before each sweep."
+    ]
+
+
+def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
+    score = check.score.fillna(-np.inf)
+    place = score.argmax(("discrepancy", "channel"))
+    channel, cause = (str(score[dim].values[int(place[dim])]) for dim in ("channel", "discrepancy"))
+    worst = check.sel(channel=channel)
+    unit = "" if str(worst.unit.values) == "1" else f" {worst.unit.values}"
+    family, predictions = posterior.attrs["family"], check.attrs["predictions"]
+    # The share of predictions alone: the record itself is no prediction.
+    like = round(float(check.overall_p_value) * (predictions + 1)) - 1
+    return (
+        f"The family {family} and the rig as assumed do not describe the record: {like or 'none'} of {predictions} "
+        f"records that the posterior predicts {'are' if like > 1 else 'is'} so far off. Worst is {channel}, "
+        f"{_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {float(worst.worst_from):.3g} to "
+        f"{float(worst.worst_to):.3g} rad it reads {float(worst.worst_residual):+.2g}{unit} beside what is predicted. "
+        "Do not use this contour. "
+        + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
+    )
+
+
+def _neighbours_over_stated(record: xr.Dataset, check: xr.Dataset) -> float:
+    """How much neighbouring samples scatter over what the load cell states, the median of the channels; 1 if unknown.
+
+    Only so much of the misfit can be noise.
+    """
+    cell = LoadCell.from_record(record) or LoadCell()
+    stated = np.hypot(list(cell.standard_deviations.values()), cell.resolution / math.sqrt(12.0))
+    ratios = [
+        float(check.neighbour_noise.sel(channel=name)) / stated[CHANNELS.index(name)]
+        for name in check.channel.values
+        if 0.0 < stated[CHANNELS.index(name)] < math.inf
+    ]
+    return float(np.median(ratios)) if ratios else 1.0
+
+
+def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
+    draws = posterior_draws(posterior)
+    if "noise_scale" not in draws:
+        return []
+    factor = float(draws["noise_scale"].median())
+    if 1.0 / _FACTOR <= factor <= _FACTOR:
+        return []
+    said = f"The noise is {factor:.3g} times what the load cell states"
+    if noisier < 0.5 * factor and factor > _FACTOR:
+        alike = f"{noisier:.2g} times as much as stated" if abs(math.log(noisier)) > 0.2 else "as stated"
+        return [f"{said}, but neighbouring samples scatter {alike}: the rest is misfit, no noise."]
+    return [f"{said}, and neighbouring samples scatter alike: state the noise that it has, or are the units right?"]
+
+
+def _contradictions(
+    posterior: xr.DataTree, record: xr.Dataset, contacts: xr.Dataset | None, noisier: float
+) -> list[str]:
+    """Of normal noise: outliers make the misfits larger than the probability knows of."""
+    cell = LoadCell.from_record(record) or LoadCell()
+    if contacts is None or math.isfinite(cell.degrees_of_freedom):
+        return []
+    chance = float(contacts.attrs.get("misfit_probability", math.nan))
+    if not chance < _CONTRADICTION or noisier > 0.75 * _FACTOR:  # more noise than stated explains it
+        return []
+    words = f"{chance:.1g}" if chance > 1e-99 else "below 1e-99"
+    return [
+        "The loads of single samples contradict one another, whatever the contour (noise explains it with probability "
+        f"{words}): {CHECK_RIG}.{_dragging(posterior, float(contacts.attrs.get('axial_score', math.nan)))}"
+    ]
+
+
+def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
+    """What friction would do to the force along the rod."""
+    if not axial_score < -AXIAL_ALARM:
+        return ""
+    words = f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
+    if is_inferred("friction", _inferred(posterior)):
+        return f"{words}more friction than was found makes it."
+    return f"{words}friction makes it: infer it (--nuisance friction)."
+
+
+def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
+    """Parameters whose prior has next to nothing where the posterior is, with that in words."""
+    draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
+    said = {}
+    for name in draws.data_vars:
+        believed = prior[name].values.ravel()
+        if name in _NOISES or believed.size < _FEWEST_PRIOR_DRAWS:
+            continue
+        median = float(draws[name].median())
+        least, low, high, most = np.quantile(believed, [0.0, 0.05, 0.95, 1.0])
+        if not least - _BEYOND * (low - least) <= median <= most + _BEYOND * (most - high):
+            said[str(name)] = f"{name} = {median:.3g} (prior: {least:.3g} to {most:.3g})"
+    return said
+
+
+def _told_beyond(beyond: Mapping[str, str]) -> list[str]:
+    if not beyond:
+        return []
+    return [
+        f"The record wants what the prior hardly allows: {', '.join(beyond.values())}. Check what is stated of rod and "
+        "drive angle, take a zero off as its column is read (--column 'force_x=NAME+12.5'), or give a wider prior "
+        "(priors=)."
+    ]
+
+
+def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[str]:
+    draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
+    mute = {*_NOISES, *family_named(posterior.attrs["family"]).roughness}
+    names = [str(name) for name in draws.data_vars if name not in mute and name not in known]
+    names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
+    if not names:
+        return []
+    return [f"The record tells little more than the prior of {', '.join(names)}."]
+
+
+def _width(values: Floats) -> float:
+    """Two standard deviations, but of the middle."""
+    low, high = np.quantile(values, [0.16, 0.84])
+    return float(high - low)
+
+
+def _unit(record: xr.Dataset, name: str) -> str:
+    unit = str(record[name].attrs.get("units", "1"))
+    return "" if unit == "1" else f" {unit}"

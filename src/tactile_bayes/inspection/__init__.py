@@ -1,6 +1,0 @@
-"""The inspection of a record before anything is inferred from it: what is in it, and what looks wrong."""
-
-from tactile_bayes.inspection.inspection import Inspection, inspect_record
-from tactile_bayes.inspection.known_cell import CellSource, known_cell
-
-__all__ = ["CellSource", "Inspection", "inspect_record", "known_cell"]

@@ -1,0 +1,49 @@
+"""Slopes of what a record would show, by differences; samples at a snap-off jump."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats
+
+__all__ = ["central_slopes"]
+
+_JUMP = 0.01
+"""Bend of a value over a step, in its unit, from which on it may be a jump."""
+
+
+def central_slopes(values: Callable[[Floats], Floats], point: Floats, steps: Floats | float) -> Floats:
+    """Derivatives of values by central differences, zero where a value jumps.
+
+    A sample at a snap-off that lets go on one side of the point and not on the other jumps from there to here: that is
+    no slope, but the end of a contour's being possible.
+
+    Parameters
+    ----------
+    values : callable
+        From points (n, d) to values (n, k), in standard deviations of what they are compared with.
+    point : ndarray, shape (d,)
+    steps : ndarray, shape (d,), or float
+        Not too small where values are interpolated.
+
+    Returns
+    -------
+    ndarray, shape (k, d)
+
+    Examples
+    --------
+    >>> def values(p):
+    ...     return np.stack([p[:, 0] ** 2, 5.0 * (p[:, 0] > 1.0)], axis=1)
+    >>> central_slopes(values, np.array([1.0]), 1e-4).round(6)
+    array([[2.],
+           [0.]])
+    """
+    steps = np.broadcast_to(np.asarray(steps, dtype=float), point.shape)
+    moves = np.diag(steps)
+    found = values(np.concatenate([point + moves, point - moves, point[None]]))
+    more, less, here = found[: point.size], found[point.size : -1], found[-1]
+    jump = np.abs(more + less - 2.0 * here)
+    slopes = np.where(jump > np.maximum(_JUMP, 0.5 * np.abs(more - less)), 0.0, (more - less) / (2.0 * steps[:, None]))
+    return np.asarray(slopes.T)

@@ -1,0 +1,67 @@
+"""Roots of many monotone functions at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats, Index
+
+__all__ = ["ROUNDING", "falling_root"]
+
+ROUNDING = 1e-14
+"""Step, as a share of the bracket, that is rounding."""
+
+
+def falling_root(
+    function: Callable[[Index, Floats], tuple[Floats, Floats]],
+    lo: Floats,
+    hi: Floats,
+    start: Floats | None = None,
+    *,
+    last_step: float = ROUNDING,
+) -> Floats:
+    """Where functions that are positive at `lo` and not positive at `hi` change sign: Newton kept in its bracket.
+
+    Parameters
+    ----------
+    function : callable
+        From indices (which of the functions) and arguments to values and derivatives.
+    lo, hi : ndarray, shape (n,)
+        `lo` may be greater than `hi`.
+    start : ndarray, shape (n,), optional
+        First guess, between them; by default the middle.
+    last_step : float
+        Step, as a share of the bracket, after which no further one is made. What is still missing then is of the order
+        of its square.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    roots = 0.5 * (lo + hi) if start is None else start.astype(float)
+    x, before = roots, np.abs(hi - lo)
+    settled = last_step * before
+    active = np.arange(lo.size)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(100):
+            if not active.size:
+                break
+            value, slope = function(active, x)
+            positive = value > 0.0
+            lo, hi = np.where(positive, x, lo), np.where(positive, hi, x)
+            new = x - value / slope
+            # Steps that do not shrink by half go round in circles, for instance about a kink.
+            trusted = ((new - lo) * (new - hi) <= 0.0) & (np.abs(new - x) <= 0.5 * before)
+            new = np.where(trusted, new, np.where(value == 0.0, x, 0.5 * (lo + hi)))
+            step = np.abs(new - x)
+            going = (step > settled) & (value != 0.0)
+            before = np.where(trusted, step, np.abs(hi - lo))
+            if going.all():
+                x = new
+                continue
+            roots[active] = new
+            active, x, before, lo, hi, settled = (a[going] for a in (active, new, before, lo, hi, settled))
+    roots[active] = x
+    return roots

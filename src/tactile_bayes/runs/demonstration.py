@@ -1,0 +1,47 @@
+"""The demonstration: a rod, a load cell and an object that could stand on a table."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from tactile_bayes.contours import Parabola
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import write_record
+from tactile_bayes.sweep import scan
+
+__all__ = ["CONTOUR", "LOAD_CELL", "ROD", "TRUTH", "measure_demo"]
+
+ROD = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
+"""Music wire, 200 mm long, 0.7 mm thick: EI = 2.43e-3 N m²."""
+
+CONTOUR = Parabola(a=2.5, q=0.1)
+"""Profile II of the paper at q = 0.5, for a rod of 200 mm [m]."""
+
+LOAD_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+"""A small six-axis cell: 3 mN and 0.25 mN m, or 0.049 EI/L² and 0.021 EI/L."""
+
+TRUTH = {"a": 2.5, "q": 0.1, "x_c": 0.0, "noise_scale": 1.0}
+
+
+def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
+    """Sweep forward and backward in steps of 1°, measure, and write record.csv without any column of truth.
+
+    Parameters
+    ----------
+    out : path-like
+        Folder, made if it is not there.
+    seed : int
+        Of the load cell's noise.
+
+    Returns
+    -------
+    Path
+        The record.
+    """
+    measured = LOAD_CELL.measure(scan(CONTOUR, rod=ROD).record, seed=seed)
+    path = Path(out) / "record.csv"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_record(measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")]), path)
+    return path

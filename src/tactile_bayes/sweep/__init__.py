@@ -1,0 +1,25 @@
+"""Step 1: what the base feels in a sweep, by contour or by slope angle, with events, labels and units."""
+
+from tactile_bayes.sweep.columns import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
+from tactile_bayes.sweep.events import Event, SweepEvents
+from tactile_bayes.sweep.lab_frame import to_lab_frame
+from tactile_bayes.sweep.scanning import Scan, equilibria, scan
+from tactile_bayes.sweep.scanning_many import scan_many
+from tactile_bayes.sweep.template import record_template
+
+__all__ = [
+    "EVENT_COLUMNS",
+    "SAMPLE_COLUMNS",
+    "Event",
+    "ManyUnits",
+    "Scan",
+    "SweepEvents",
+    "equilibria",
+    "phases_of",
+    "record_template",
+    "scan",
+    "scan_many",
+    "sweep_events",
+    "sweep_samples",
+    "to_lab_frame",
+]

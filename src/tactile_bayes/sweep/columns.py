@@ -1,0 +1,89 @@
+"""Columns of many sweeps at once: arrays in the laboratory's signs and units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.paths import Paths
+from tactile_bayes.mechanics.phases import NONE
+from tactile_bayes.sweep.lab_frame import to_lab_frame
+
+__all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_events", "sweep_samples"]
+
+LOADS = ("holding_moment", "force_x", "force_y")
+
+SAMPLE_COLUMNS = (
+    *LOADS,
+    "contact_x",
+    "contact_y",
+    "slope_angle",
+    "contact_arclength",
+    "tip_angle",
+)
+"""What is known of every sample; loads are 0 out of contact, the rest NaN. The phase comes beside them."""
+
+EVENT_COLUMNS = ("drive_angle", "slope_angle", "contact_x", "contact_y")
+
+
+class ManyUnits(NamedTuple):
+    """Units of the rods of many sweeps, each a number for all or an array over lanes."""
+
+    length_unit: Any
+    moment_unit: Any
+    force_unit: Any
+
+    def of(self, lane: NDArray[np.intp]) -> ManyUnits:
+        return ManyUnits(*(value[lane] if isinstance(value, np.ndarray) else value for value in self))
+
+
+def sweep_samples(paths: Paths, units: ManyUnits, lane: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
+    """What the base feels at the drive angles that paths were traced with, and the contacts.
+
+    Parameters
+    ----------
+    paths : Paths
+        A lane for each sweep.
+    units : ManyUnits
+        Of the lanes' rods.
+    lane : ndarray of int
+        Which lanes, of any shape.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (*lane.shape, k)
+        `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
+    """
+    states, each = paths.sampled_states(lane), lane[..., None]
+    found = to_lab_frame(paths.seen, each, states, units.of(each))
+    for name in LOADS:
+        np.copyto(found[name], 0.0, where=states.wrench.phase == NONE)
+    return {name: found[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
+
+
+def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:
+    """`EVENT_COLUMNS` of every "first_contact" and "snap_off", in the laboratory frame; NaN where there is none."""
+    lanes = np.arange(paths.seen.lanes)
+    events = {}
+    for name, angle, parameter in (
+        ("first_contact", paths.first_angle, paths.first_parameter),
+        ("snap_off", paths.snap_angle, paths.snap_parameter),
+    ):
+        states = paths.states_at(lanes, parameter)
+        found = to_lab_frame(paths.seen, lanes, states, units.of(lanes))
+        turned = np.where(paths.seen.mirrored, np.pi - angle, angle)
+        events[name] = {**{column: found[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
+    return events
+
+
+def phases_of(paths: Paths) -> list[str]:
+    """Phases of every lane in their order, as "A-B-A" (A is tip contact, B tangential); "" where nothing touches."""
+    count = np.isfinite(paths.change_parameter).sum(axis=1)
+    return [
+        "-".join("A" if tip else "B" for tip in to_tip[:phases])
+        for to_tip, phases in zip(paths.change_to_tip.tolist(), count.tolist(), strict=True)
+    ]

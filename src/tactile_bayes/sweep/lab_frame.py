@@ -1,0 +1,68 @@
+"""States in the laboratory frame: its signs for both directions, and the rod's units."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.mechanics.paths import States
+
+__all__ = ["RodUnits", "to_lab_frame"]
+
+
+class RodUnits(Protocol):
+    """What dimensionless numbers are multiplied with: a `Rod`, or arrays for many."""
+
+    @property
+    def length_unit(self) -> Any: ...
+    @property
+    def moment_unit(self) -> Any: ...
+    @property
+    def force_unit(self) -> Any: ...
+
+
+def to_lab_frame(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
+    """States on lanes in the laboratory's signs and units; the contact point is the object's, not the centreline's.
+
+    Parameters
+    ----------
+    seen : SeenContour
+    lane : ndarray, broadcastable to shape (...)
+    states : States
+        Of shape (...).
+    rod : RodUnits
+        The units of the rod, or of each state's rod.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (...)
+        By the names of a record's columns; phases as numbers.
+    """
+    mirrored = seen.mirrored[lane]
+    sign = np.where(mirrored, -1.0, 1.0)
+    wrench = states.wrench
+    length, standoff = (v[lane] if isinstance(v, np.ndarray) else v for v in (seen.length, seen.standoff))
+    x, y = states.x, states.y
+    if np.any(standoff):
+        x = x - standoff / length * np.sin(states.slope_angle)
+        y = y + standoff / length * np.cos(states.slope_angle)
+
+    def turned(angle: Floats) -> Floats:
+        return np.where(mirrored, np.pi - angle, angle)
+
+    return {
+        "drive_angle": turned(wrench.drive_angle),
+        "holding_moment": sign * wrench.holding_moment * rod.moment_unit + 0.0,  # never −0
+        "force_x": sign * wrench.force_x * rod.force_unit + 0.0,
+        "force_y": wrench.force_y * rod.force_unit,
+        "contact_arclength": wrench.contact_arclength * rod.length_unit,
+        "contact_phase": wrench.phase,
+        "contact_x": seen.base_x[lane] + sign * x * rod.length_unit,
+        "contact_y": seen.base_y[lane] + y * rod.length_unit,
+        "tip_angle": turned(wrench.tip_angle),
+        "slope_angle": sign * states.slope_angle,
+    }

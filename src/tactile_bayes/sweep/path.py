@@ -1,0 +1,112 @@
+"""One sweep along one contour: its exact path, or a refusal that says why there is none."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from tactile_bayes.checks import check_choice, check_kind, check_number
+from tactile_bayes.contours.base import Contour
+from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.errors import ContourError, ParameterError, ReachError
+from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
+from tactile_bayes.mechanics.fates import CLEARANCE, Reach
+from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.rod import Rod
+
+__all__ = ["Direction", "friction_angle_of", "seen_from", "sweep_paths"]
+
+Direction = Literal["forward", "backward"]
+
+
+def sweep_paths(
+    contour: Contour,
+    *,
+    base: tuple[float, float] = (0.0, 0.0),
+    direction: Direction = "forward",
+    rod: Rod | None = None,
+    friction: float = 0.0,
+) -> Paths:
+    """The exact path of one sweep along one contour, or a refusal that says why there is none.
+
+    Parameters and errors are those of `scan`.
+    """
+    rod = Rod() if rod is None else rod
+    seen = seen_from(contour, base, direction, rod)
+    friction_angle = friction_angle_of(friction)
+    height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
+    if np.any(height <= base[1]):
+        raise ContourError(
+            f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
+            f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
+        )
+    paths = trace(seen, friction_angle=friction_angle)
+    sweep = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
+    match Reach(int(paths.reach[0])):
+        case Reach.TOO_FAR:
+            raise ReachError(
+                f"the contour is out of reach: its nearest point is {paths.distance[0] * rod.length:.6g} from the "
+                f"pivot at ({base[0]:g}, {base[1]:g}), and the rod is {rod.length:g} long"
+            )
+        case Reach.CUTS_PIVOT:
+            raise ContourError(
+                f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
+                "contour or lower the pivot"
+            )
+        case Reach.TOO_CLOSE:
+            raise ContourError(
+                f"the contour comes within {paths.distance[0] * rod.length:.6g} of the pivot at ({base[0]:g}, "
+                f"{base[1]:g}); a path can be followed from {CLEARANCE * rod.length:g} on ({CLEARANCE:.0%} of the "
+                "rod's length): move one of them away"
+            )
+        case Reach.ENDS:
+            raise ContourError(
+                f"{sweep} the rod would first touch beyond {_end(contour, direction == 'forward')}, "
+                "and nothing is known of the object there: extend the contour, or move the pivot"
+            )
+        case Reach.RUNS_OUT:
+            raise ContourError(
+                f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
+                "nothing is known of the object beyond: extend the contour, or move the pivot"
+            )
+        case Reach.GRAZES:
+            raise ReachError(
+                f"{sweep} the rod touches the contour so slightly that rounding hides where contact ends: bring "
+                "contour and pivot closer together (are contour, pivot and rod in one unit?)"
+            )
+    return paths
+
+
+def _end(contour: Contour, at_right: bool) -> str:
+    side: Literal["left", "right"] = "right" if at_right else "left"
+    locus = contour.locate(contour.domain[1 if at_right else 0])
+    return f"the contour's {side} end at ({float(locus.x):.6g}, {float(locus.y):.6g}), {contour.end_name(side)}"
+
+
+def seen_from(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SeenContour:
+    """One contour as one rod sees it from one pivot.
+
+    Raises
+    ------
+    ParameterError
+        If one of them is none, or there are several contours.
+    """
+    check_kind("the contour", contour, Contour, "give one, such as tb.contours.Parabola(a=0.5, q=0.5)")
+    check_kind("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
+    check_choice("direction", direction, ("forward", "backward"))
+    if contour.shape != ():
+        raise ParameterError(
+            f"one contour is wanted here, not an array of shape {contour.shape}: scan_many takes those of shape (n,)"
+        )
+    x, y = (np.full(1, float(b)) for b in base)
+    return SeenContour(
+        contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, np.array([direction == "backward"])
+    )
+
+
+def friction_angle_of(friction: float) -> float:
+    """The angle arctan μ [rad] by which friction turns the contact force, refused where the rod's map would fold."""
+    most = float(np.tan(MAX_FRICTION_ANGLE))
+    remedy = f"give Coulomb's coefficient, a number from 0 to {most:.2f}"
+    return float(np.arctan(check_number("friction", friction, remedy, least=0.0, most=most)))

@@ -1,0 +1,309 @@
+"""Step 1 as a user asks for it: a rod sweeps along a contour, and the base feels it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import as_numbers, check_choice, check_number, check_pivots
+from tactile_bayes.contours.base import Contour
+from tactile_bayes.errors import ClearanceWarning, ParameterError, StrainWarning
+from tactile_bayes.mechanics.elastica import wrench_from_contact
+from tactile_bayes.mechanics.paths import Paths, States
+from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
+from tactile_bayes.mechanics.rod import LARGEST_STRAIN, Rod
+from tactile_bayes.record import COLUMNS, make_record
+from tactile_bayes.sweep.events import SweepEvents, events_of
+from tactile_bayes.sweep.lab_frame import to_lab_frame
+from tactile_bayes.sweep.path import Direction, friction_angle_of, seen_from, sweep_paths
+
+__all__ = ["Scan", "equilibria", "scan"]
+
+_MARGIN = 15
+"""Steps of the drive before first contact and after snap-off."""
+
+_FINEST = 1e-6
+"""Steps of the drive [rad] below this would make millions of samples."""
+
+_COARSEST = 0.5
+"""Steps of the drive [rad] above this are taken for degrees: a sweep would have a handful of samples."""
+
+
+class _ByDirection(dict[str, SweepEvents]):
+    def __missing__(self, direction: str) -> SweepEvents:
+        have = ", ".join(map(repr, self))
+        hint = f"choose from {have}" if have else "there are several bases, so take scan.sweeps[number] instead"
+        raise ParameterError(f"the scan has no events of direction {direction!r}: {hint}")
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """What `scan` returns.
+
+    Attributes
+    ----------
+    record : xr.Dataset
+        The record, dimension "sample", with `truth_` columns for what the base cannot feel.
+    sweeps : tuple of SweepEvents
+        The events of each sweep, by its number in the record.
+    events : mapping of str to SweepEvents
+        The same by direction, where there is one base only.
+    contour : Contour
+        What was scanned.
+    """
+
+    record: xr.Dataset
+    sweeps: tuple[SweepEvents, ...]
+    contour: Contour
+
+    @property
+    def events(self) -> Mapping[str, SweepEvents]:
+        one_base = len({sweep.base for sweep in self.sweeps}) == 1
+        return _ByDirection({sweep.direction: sweep for sweep in self.sweeps} if one_base else {})
+
+
+def equilibria(
+    contour: Contour,
+    slope_angles: ArrayLike,
+    *,
+    base: tuple[float, float] = (0.0, 0.0),
+    direction: Direction = "forward",
+    rod: Rod | None = None,
+    friction: float = 0.0,
+) -> xr.Dataset:
+    """States in which the rod touches a contour at given slope angles.
+
+    Where a sweep would already have let go they are equilibria all the same, if unstable ones: equations 19 and 20 of
+    Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form.
+
+    Parameters
+    ----------
+    contour : Contour
+        In metres if `rod` is given in SI, else in rod lengths.
+    slope_angles : array_like, shape (n,)
+        Slope angles α of the contour at the contact [rad]; those of a backward sweep are mostly negative.
+    base : (float, float)
+        The pivot, in the contour's unit of length.
+    direction : {"forward", "backward"}
+        Sense of the drive: forward is counter-clockwise.
+    rod : Rod, optional
+        By default the dimensionless rod.
+    friction : float
+        Coulomb's coefficient μ of the sliding rod.
+
+    Returns
+    -------
+    xr.Dataset
+        Over "slope_angle": drive_angle, holding_moment, force_x, force_y, contact_arclength, contact_phase ("tip",
+        "tangential" or "none"), contact_x, contact_y, tip_angle; NaN where the rod
+        cannot reach, and where the contour has no such slope.
+
+    Raises
+    ------
+    ParameterError
+        If a slope angle is outside (−π/2, π/2), or an argument is none that is offered.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import paper_profile
+    >>> states = equilibria(paper_profile("II", q=0.5), [0.0608483016, 0.4])
+    >>> states.drive_angle.values.round(6), states.contact_phase.values.tolist()
+    (array([3.154275, 1.994616]), ['tip', 'tangential'])
+    """
+    alpha = np.atleast_1d(_floats(slope_angles))
+    if alpha.ndim != 1 or not np.all(np.abs(alpha) < 0.5 * np.pi):
+        raise ParameterError("slope_angles must be a list of angles in (−π/2, π/2) radians")
+    pivots = check_pivots("base", base)
+    if len(pivots) > 1:
+        raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
+    units = Rod() if rod is None else rod
+    seen = seen_from(contour, pivots[0], direction, units)
+    lane = np.zeros(alpha.size, dtype=np.intp)
+    parameter = (-1.0 if seen.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
+    locus = seen.locate(lane, parameter)
+    wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle_of(friction))
+    states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
+    columns = to_lab_frame(seen, lane, states, units)
+    reached = wrench.phase != NONE
+    columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
+    data = {}
+    for name, values in columns.items():
+        if name == "slope_angle":
+            continue
+        if name != "contact_phase":
+            values = np.where(reached, values, np.nan)
+        data[name] = ("slope_angle", values, _attributes(name, rod))
+    return xr.Dataset(data, coords={"slope_angle": ("slope_angle", alpha, _attributes("slope_angle", rod))})
+
+
+def scan(
+    contour: Contour,
+    *,
+    direction: Literal["both", "forward", "backward"] = "both",
+    base: tuple[float, float] | Sequence[tuple[float, float]] = (0.0, 0.0),
+    drive_step: float = float(np.radians(1.0)),
+    drive_angles: ArrayLike | None = None,
+    rod: Rod | None = None,
+    friction: float = 0.0,
+) -> Scan:
+    """Sweep the rod along a contour and record what its base feels, from before first contact to after snap-off.
+
+    Parameters
+    ----------
+    contour : Contour
+        In metres if `rod` is given in SI, else in rod lengths.
+    direction : {"both", "forward", "backward"}
+        Which sweeps; "both" is a forward sweep (number 0), then a backward one (number 1).
+    base : (float, float) or sequence of them
+        The pivot, in the contour's unit of length. The contour must lie above it. With several pivots (a support that
+        is moved, or an array of whiskers) each is visited in turn, and the sweeps are numbered through.
+    drive_step : float
+        Step of the drive [rad], at most 0.5; the grid consists of its multiples, and reaches 15 steps beyond contact on
+        both sides, as far as a turn goes.
+    drive_angles : array_like, shape (n,), optional
+        A grid of one's own [rad], used in increasing order forward and in decreasing order backward; of equal angles
+        one is kept.
+    rod : Rod, optional
+        By default the dimensionless rod. One with a diameter touches with its surface.
+    friction : float
+        Coulomb's coefficient μ of the sliding rod.
+
+    Returns
+    -------
+    Scan
+        Outside contact the load is zero and the `truth_` columns are NaN, their phase "none".
+
+    Warns
+    -----
+    ClearanceWarning
+        If the straight rod would cut the object after snap-off: what it does then is not known, and the samples are
+        left out.
+    StrainWarning
+        If the rod is bent beyond its elastic strain, or beyond a strain of 0.1, where the model of a slender, linearly
+        elastic rod ends.
+
+    Raises
+    ------
+    ReachError
+        If the rod is too short to touch the contour.
+    ContourError
+        If the pivot is not below the contour or too close to it, or the rod would touch beyond an end of it.
+    ParameterError
+        If an argument is none that is offered.
+
+    Examples
+    --------
+    >>> from tactile_bayes.contours import paper_profile
+    >>> result = scan(paper_profile("II", q=0.5))
+    >>> round(result.events["forward"].snap_off.drive_angle, 6)
+    3.154275
+    """
+    check_choice("direction", direction, ("both", "forward", "backward"), "choose 'forward' or 'backward', or 'both'")
+    directions: tuple[Direction, ...] = ("forward", "backward") if direction == "both" else (direction,)
+    rod = Rod() if rod is None else rod
+    check_number(
+        "drive_step",
+        drive_step,
+        f"give a positive angle in radians, at most {_COARSEST}; one in degrees is converted by np.radians, and below "
+        f"{_FINEST:g} there would be millions of samples",
+        least=_FINEST,
+        most=_COARSEST,
+    )
+    given = None if drive_angles is None else _floats(drive_angles)
+    grid = None if given is None else np.unique(given)
+    if given is not None and not (given.ndim < 2 and given.size and np.all(np.abs(given) <= 2.0 * np.pi)):
+        raise ParameterError("drive_angles must be finite angles in radians, at most a turn")
+
+    columns: list[dict[str, NDArray[np.generic]]] = []
+    sweeps: list[SweepEvents] = []
+    for pivot, sense in product(check_pivots("base", base), directions):
+        paths = sweep_paths(contour, base=pivot, direction=sense, rod=rod, friction=friction)
+        sweep = events_of(paths, sense, pivot, rod)
+        _warn_of(sweep, rod)
+        if grid is None:
+            first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
+            steps = np.arange(np.floor(first / drive_step) - _MARGIN, np.ceil(snap / drive_step) + _MARGIN + 1)
+            angles = steps * drive_step
+            angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a record knows none beyond
+        else:
+            angles = grid
+        if not sweep.clear:
+            onward = 1.0 if sense == "forward" else -1.0
+            angles = angles[onward * (sweep.snap_off.drive_angle - angles) >= 0.0]
+        columns.append(_sweep(paths, angles[:: 1 if sense == "forward" else -1], len(sweeps), sense, pivot, rod))
+        sweeps.append(sweep)
+    if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
+        snaps = ", ".join(f"{sweep.snap_off.drive_angle:.6g} rad ({sweep.direction})" for sweep in sweeps)
+        raise ParameterError(
+            f"drive_angles: all of them are after the snap-off, at {snaps}, from where on nothing is known, since the "
+            "rod does not come free of the object: give angles before it too"
+        )
+    record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
+    return Scan(make_record(record, rod=rod), tuple(sweeps), contour)
+
+
+def _floats(values: ArrayLike) -> Floats:
+    """Numbers as an array, NaN if they are none."""
+    numbers = as_numbers(values)
+    return np.asarray(np.nan) if numbers is None else numbers
+
+
+def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
+    where = f"in the {sweep.direction} sweep from ({sweep.base[0]:g}, {sweep.base[1]:g})"
+    if not sweep.clear:
+        warnings.warn(
+            f"{where} the rod snaps at {sweep.snap_off.drive_angle:.6g} rad, but straight it would still cut the "
+            "object: it comes to rest in another contact, which no sweep leads to; the samples after that are left out",
+            ClearanceWarning,
+            stacklevel=3,
+        )
+    if sweep.largest_strain > LARGEST_STRAIN:
+        warnings.warn(
+            f"{where} the rod is strained by {sweep.largest_strain:.3g}: beyond {LARGEST_STRAIN:g} it is neither "
+            "slender nor linearly elastic, and the loads are not to be trusted; take a thinner or longer rod",
+            StrainWarning,
+            stacklevel=3,
+        )
+    if rod.elastic_strain is not None and sweep.largest_strain > rod.elastic_strain:
+        warnings.warn(
+            f"{where} the rod is strained by {sweep.largest_strain:.3g}, more than the {rod.elastic_strain:g} that it "
+            "takes elastically: it would stay bent; take a thinner or longer rod, or stop the drive earlier",
+            StrainWarning,
+            stacklevel=3,
+        )
+
+
+def _sweep(
+    paths: Paths, angles: Floats, number: int, direction: Direction, base: tuple[float, float], rod: Rod
+) -> dict[str, NDArray[np.generic]]:
+    lane = np.zeros(angles.size, dtype=np.intp)
+    states = paths.states(lane, np.pi - angles if paths.seen.mirrored[0] else angles)
+    columns = to_lab_frame(paths.seen, lane, states, rod)
+    loaded = states.wrench.phase != NONE
+    columns["contact_phase"] = np.array(PHASE_NAMES)[states.wrench.phase]
+    sweep: dict[str, NDArray[np.generic]] = {
+        "sweep": np.full(angles.size, number),
+        "direction": np.full(angles.size, direction),
+        "base_x": np.full(angles.size, float(base[0])),
+        "base_y": np.full(angles.size, float(base[1])),
+        "drive_angle": angles,
+    }
+    for name in ("holding_moment", "force_x", "force_y"):
+        sweep[name] = np.where(loaded, columns[name], 0.0)
+    for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle", "contact_phase"):
+        sweep[f"truth_{name}"] = columns[name]
+    return sweep
+
+
+def _attributes(name: str, rod: Rod | None) -> dict[str, str]:
+    column = COLUMNS[name]
+    units = "dimensionless" if rod is None or rod.is_dimensionless else "SI"
+    return {"units": column.unit_in(units), "long_name": column.long_name}

@@ -1,0 +1,561 @@
+"""Calibration from end to end: what it refuses, what it keeps, and that it finds what is wrong."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from helpers.replicates import STAGES, failing
+from helpers.tasks import wait_until
+from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate, experiment_of
+from tactile_bayes.calibration.ledger import REPLICATES
+from tactile_bayes.calibration.replicate import Outcome
+from tactile_bayes.calibration.world import World
+from tactile_bayes.errors import CalibrationError, ParameterError
+from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.ensembles import SamplerSettings, moves
+from tactile_bayes.load_cell import LoadCell
+
+module = importlib.import_module("tactile_bayes.calibration.calibrate")
+making = importlib.import_module("tactile_bayes.calibration.replicate")
+
+PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
+ANGLES = np.radians(np.arange(-30.0, 211.0, 4.0))
+
+FEW_STEPS = SamplerSettings(ensembles=2, walkers=20, block_steps=10, max_steps=20)
+"""Enough for numbers that are the same again, not for right ones."""
+
+BY_DEFAULT = SamplerSettings(ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
+
+
+def quickly(**options):
+    asked = {"replicates": 2, "nuisances": [], "priors": PRIORS, "drive_angles": ANGLES, "seed": 1, "workers": 1}
+    return calibrate(**(asked | options))
+
+
+def made_up(task):
+    """In place of a replicate: numbers that follow from seed and number alone."""
+    experiment, number = task
+    rng = np.random.default_rng([experiment.seed, number])
+    numbers = {"seconds": 0.0, "snap_off": 0.5 * int(rng.integers(3)), "width_in_gap": np.nan}
+    return Outcome({"a": int(rng.integers(100)), "q": int(rng.integers(100))}, numbers, "converged")
+
+
+@pytest.fixture
+def noted(monkeypatch):
+    """Numbers of the replicates that are made, which take no time."""
+    numbers = []
+
+    def note(task):
+        numbers.append(task[1])
+        return made_up(task)
+
+    monkeypatch.setattr(module, "replicate", note)
+    return numbers
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """Two replicates of few steps, in this process, and where they are kept."""
+    folder = tmp_path_factory.mktemp("small") / "on the way"
+    return quickly(settings=FEW_STEPS, out=folder), folder
+
+
+# ---- what comes of it
+
+
+def test_what_is_found(small):
+    found, _ = small
+    assert found.sizes == {"replicate": 2, "quantity": 7, "claim": 6}
+    assert sorted(found.quantity.values) == sorted([*PRIORS, "noise_scale", "log_likelihood", *SNAP_OFFS])
+    assert np.all((found["ranks"] >= 0) & (found["ranks"] <= 99))
+    assert np.all((found.coverage >= 0.0) & (found.coverage <= 1.0))
+    assert np.all(found.width_in_gap > 0.0)
+    assert np.all(found.evaluations > 0)
+    assert found.attrs["verdict"].startswith("Too few replicates to judge: 2 posteriors, and 20 are the least.")
+
+
+SNAP_OFFS = ("snap_off_forward", "snap_off_backward")
+
+
+def test_what_is_kept_is_all_there_is(small, monkeypatch):
+    """A second call makes nothing, and finds the same, to the last digit."""
+    found, folder = small
+    monkeypatch.setattr(module, "replicate", pytest.fail)
+    assert quickly(settings=FEW_STEPS, out=folder).identical(found)
+    assert [path.name for path in folder.iterdir()] == [REPLICATES.file]
+
+
+@pytest.mark.slow
+def test_workers_change_nothing_but_the_seconds(small):
+    found, _ = small
+    other = quickly(settings=FEW_STEPS, workers=2)
+    assert other.drop_vars("seconds").identical(found.drop_vars("seconds"))
+
+
+def test_replicates_do_not_depend_on_how_many_there_are(noted):
+    three, five = quickly(replicates=3), quickly(replicates=5)
+    np.testing.assert_array_equal(three["ranks"], five["ranks"][:3])
+    assert not np.array_equal(three["ranks"], quickly(replicates=3, seed=2)["ranks"])
+
+
+# ---- what is lost
+
+
+@pytest.fixture(scope="module")
+def with_lost(tmp_path_factory):
+    """Three replicates that fail, each at another stage, one that does not, and where they are kept."""
+    folder = tmp_path_factory.mktemp("lost")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "replicate", failing)
+        return quickly(replicates=4, settings=FEW_STEPS, out=folder), folder
+
+
+def test_a_failure_is_an_outcome_whatever_it_comes_from(with_lost):
+    found, folder = with_lost
+    assert (found.sizes["replicate"], found.attrs["lost"]) == (4, 3)
+    np.testing.assert_array_equal((found["ranks"] >= 0).any("quantity"), [False, False, False, True])
+    rows = json.loads((folder / REPLICATES.file).read_text(encoding="utf-8"))["replicates"]
+    for number, (stage, words) in enumerate(STAGES.items()):
+        row = rows[number]
+        assert (row["number"], row["ranks"], row["message"]) == (number, {}, f"_StrangeError: an error {words}")
+        assert f"{stage}(" in row["traceback"]
+        assert row["traceback"].endswith(f"_StrangeError: an error {words}\n")
+        assert (str(found.message[number].values), str(found.traceback[number].values)) == (
+            row["message"],
+            row["traceback"],
+        )
+    assert "traceback" not in rows[3]
+    assert str(found.traceback[3].values) == ""
+
+
+def test_what_is_lost_holds_nowhere(with_lost):
+    found, _ = with_lost
+    assert found.sizes["claim"] == 6
+    for name in found.claim.values:
+        np.testing.assert_array_equal(found[str(name)][:3], 0.0)
+    np.testing.assert_array_equal(found.coverage_replicates, 4)
+    np.testing.assert_allclose(found.coverage, [float(found[str(name)][3]) / 4.0 for name in found.claim.values])
+
+
+def test_what_is_lost_is_named_with_the_way_to_it(with_lost):
+    found, _ = with_lost
+    said = found.attrs["verdict"]
+    assert said.startswith("Too few replicates to judge: 1 posteriors, and 20 are the least. ")
+    assert "3 lost, and counted as not holding: 0, 1, 2 (_StrangeError). To see why, add --replicate 0 --debug" in said
+
+
+def test_what_is_lost_is_kept(with_lost, monkeypatch):
+    """A further run makes none of them again."""
+    found, folder = with_lost
+    monkeypatch.setattr(module, "replicate", pytest.fail)
+    assert quickly(replicates=4, settings=FEW_STEPS, out=folder).identical(found)
+
+
+@pytest.mark.parametrize("count", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_a_failure_in_another_process_is_the_same_outcome(with_lost, monkeypatch, count):
+    """The third takes a posterior, before it fails."""
+    monkeypatch.setattr(module, "replicate", failing)
+    found = quickly(replicates=count, settings=FEW_STEPS, workers=2)
+    expected = with_lost[0].isel(replicate=slice(count))
+    for name in ("message", "traceback"):
+        assert found[name].identical(expected[name])
+    assert found.attrs["lost"] == count
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])
+def test_an_interrupt_is_no_failure(tmp_path, monkeypatch, error):
+    def interrupt(*arguments):
+        raise error
+
+    monkeypatch.setattr(making, "simulate", interrupt)
+    with pytest.raises(error):
+        quickly(out=tmp_path)
+    assert json.loads((tmp_path / REPLICATES.file).read_text())["replicates"] == []
+
+
+def test_an_interrupt_in_the_sampler_loses_the_replicate_and_not_half_of_it(tmp_path, monkeypatch):
+    """A sampler that is interrupted gives what it has, which is no posterior to be judged."""
+
+    def interrupt(state):
+        raise KeyboardInterrupt
+
+    sampled = making.sampled
+    monkeypatch.setattr(making, "sampled", lambda problem, **options: sampled(problem, **options, progress=interrupt))
+    with pytest.raises(KeyboardInterrupt, match="interrupted while sampling replicate 0"):
+        quickly(settings=FEW_STEPS, out=tmp_path)
+    assert json.loads((tmp_path / REPLICATES.file).read_text())["replicates"] == []
+
+
+# ---- one replicate again
+
+
+def again(number, **options):
+    asked = {"nuisances": [], "priors": PRIORS, "drive_angles": ANGLES, "settings": FEW_STEPS, "seed": 1}
+    return calibration_replicate(number, **(asked | options))
+
+
+def test_a_replicate_is_the_same_again(small):
+    found, folder = small
+    before = (folder / REPLICATES.file).read_bytes()
+    made = again(1, out=folder)
+    ranks, numbers = made.outcome.ranks, made.outcome.numbers
+    assert (made.number, made.outcome.message) == (1, str(found.message[1].values))
+    assert ranks == {name: int(found["ranks"].sel(replicate=1, quantity=name)) for name in found.quantity.values}
+    for name in set(numbers) - {"seconds"}:
+        np.testing.assert_array_equal(numbers[name], found[name][1])
+    assert list(made.truth) == [*PRIORS, "noise_scale"]
+    assert made.measured.sizes["sample"] == 2 * ANGLES.size
+    assert list(made.posterior["posterior"].data_vars) == list(made.truth)
+    assert (folder / REPLICATES.file).read_bytes() == before
+
+
+def test_the_error_is_raised_where_a_replicate_is_lost(monkeypatch):
+    def fail(*arguments, **options):
+        raise ZeroDivisionError("nothing left")
+
+    monkeypatch.setattr(making, "sampled", fail)
+    with pytest.raises(ZeroDivisionError, match="nothing left"):
+        again(0)
+    made = again(0, throw=False)
+    assert made.outcome.is_lost
+    assert made.outcome.message == "ZeroDivisionError: nothing left"
+    assert list(made.truth) == [*PRIORS, "noise_scale"]
+    assert made.measured.sizes["sample"] == 2 * ANGLES.size
+    assert made.posterior is None
+    monkeypatch.setattr(making, "simulate", fail)
+    made = again(0, throw=False)
+    assert (made.truth, made.measured, made.posterior) == ({}, None, None)
+
+
+def test_what_has_not_converged_is_run_again_with_more_walkers(monkeypatch):
+    """By default alone: settings that are given are those of the only run."""
+    runs = []
+
+    def spied(problem, *, settings, **options):
+        runs.append(settings)
+        return sampled(problem, settings=FEW_STEPS, **options)
+
+    monkeypatch.setattr("tactile_bayes.calibration.replicate.sampled", spied)
+    asked = {"nuisances": [], "priors": PRIORS, "drive_angles": ANGLES, "seed": 1}
+    assert not calibration_replicate(0, **asked).outcome.numbers["converged"]
+    first, second = runs
+    assert first == BY_DEFAULT
+    assert second == replace(BY_DEFAULT, walkers=None, max_steps=6000)
+    runs.clear()
+    calibration_replicate(0, settings=FEW_STEPS, **asked)
+    assert runs == [FEW_STEPS]
+
+
+def test_a_replicate_of_another_calibration_is_refused(small, tmp_path):
+    with pytest.raises(CalibrationError, match="replicates of another experiment: seed is 1 there and 2 here"):
+        again(0, out=small[1], seed=2)
+    for number in (-1, True, 0.0, "1"):
+        with pytest.raises(ParameterError, match=f"number of the replicate is {number!r}: give a whole number from 0"):
+            again(number)
+
+
+def test_defaults_of_one_replicate_are_those_of_all():
+    own, all_of_them = (inspect.signature(function).parameters for function in (experiment_of, calibrate))
+    assert {name: option.default for name, option in own.items()} == {name: all_of_them[name].default for name in own}
+    others = set(all_of_them) - set(own)
+    assert others == {"replicates", "out", "workers", "scheduler", "progress"}
+
+
+# ---- going on
+
+
+def test_more_replicates_begin_with_those_that_are_there(noted, tmp_path):
+    whole = quickly(replicates=5)
+    noted.clear()
+    quickly(replicates=2, out=tmp_path)
+    assert quickly(replicates=5, out=tmp_path).identical(whole)
+    assert noted == [0, 1, 2, 3, 4]
+    fewer = quickly(replicates=3, out=tmp_path)
+    assert fewer.sizes["replicate"] == 3
+    assert len(noted) == 5
+    assert len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"]) == 5  # none is lost
+
+
+def test_a_gap_is_filled(noted, tmp_path):
+    whole = quickly(replicates=4, out=tmp_path)
+    table = json.loads((tmp_path / REPLICATES.file).read_text())
+    del table["replicates"][1]
+    (tmp_path / REPLICATES.file).write_text(json.dumps(table))
+    noted.clear()
+    assert quickly(replicates=4, out=tmp_path).identical(whole)
+    assert noted == [1]
+
+
+def test_progress_is_told(noted, tmp_path):
+    told = []
+    quickly(replicates=2, out=tmp_path, progress=told.append)
+    quickly(replicates=4, out=tmp_path, progress=told.append)
+    assert [(state.done, state.wanted, state.made) for state in told] == [(1, 2, 1), (2, 2, 2), (3, 4, 1), (4, 4, 2)]
+    assert all(state.seconds >= 0.0 for state in told)
+
+
+def test_an_interrupt_keeps_what_is_done(noted, tmp_path):
+    def interrupt(state):
+        if state.done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        quickly(replicates=9, out=tmp_path, progress=interrupt)
+    rows = json.loads((tmp_path / REPLICATES.file).read_text())["replicates"]
+    assert [row["number"] for row in rows] == [0, 1, 2]
+    assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
+    quickly(replicates=9, out=tmp_path)
+    assert noted == list(range(9))
+
+
+def test_what_is_done_is_noted_on_the_way(noted, tmp_path, monkeypatch):
+    """A run that is killed without a word has lost little."""
+    monkeypatch.setattr("tactile_bayes.tasks.ledger._NOTING", 1e9)
+    there = []
+    quickly(
+        replicates=3,
+        out=tmp_path,
+        progress=lambda state: there.append(len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"])),
+    )
+    assert there == [1, 2, 3]
+
+
+ENDLESS = """
+import sys, time
+from calibration.test_calibrate import made_up, module, quickly
+
+def slowly(task):
+    time.sleep(0.002)
+    return made_up(task)
+
+module.replicate, module._NOTING = slowly, 1e9
+quickly(replicates=10**5, out=sys.argv[1])
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wait", [0.0, 0.1, 0.2])
+def test_a_killed_run_goes_on(tmp_path, wait):
+    """Whenever it is killed, what is noted is whole."""
+    run = subprocess.Popen([sys.executable, "-c", ENDLESS, str(tmp_path)], cwd=Path(__file__).parents[1])
+    wait_until(lambda: (tmp_path / REPLICATES.file).exists() or run.poll() is not None, seconds=60.0)
+    time.sleep(wait)
+    run.kill()
+    run.wait()
+    done = len(json.loads((tmp_path / REPLICATES.file).read_text())["replicates"])
+    told = []
+    found = quickly(replicates=done, out=tmp_path, progress=told.append)
+    assert found.sizes["replicate"] == done > 0
+    assert told == []
+    assert [path.name for path in tmp_path.iterdir()] == [REPLICATES.file]
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        ({"seed": 2}, "seed is 1 there and 2 here"),
+        ({"friction": 0.1}, "friction is None there and 0.1 here"),
+        ({"world": World(friction=0.1)}, "world_friction is 0.0 there and 0.1 here"),
+        ({"world": World(priors={"a": stats.norm(1.0)})}, r"world_priors is \{\} there and .*norm"),
+        ({"load_cell": LoadCell(force_noise=0.1, moment_noise=0.02)}, "load_cell is .*0.05.* there and .*0.1.* here"),
+        ({"settings": FEW_STEPS}, "settings is .* there and .* here"),
+        ({"drive_angles": ANGLES[:-1]}, "drive_angles is .* there and .* here"),
+        ({"direction": "forward"}, "directions is .* there and .* here"),
+        ({"priors": {}}, "priors is .* there and .* here"),
+        ({"nuisances": ["bias"]}, "nuisances is .* there and .* here"),
+        ({"base": (0.1, 0.0)}, "bases is .* there and .* here"),
+        ({"probability": 0.8}, "probability is 0.9 there and 0.8 here"),
+        ({"events": False}, "events is True there and False here"),
+    ],
+)
+def test_another_calibration_is_left_alone(noted, tmp_path, other, told):
+    quickly(out=tmp_path)
+    before = (tmp_path / REPLICATES.file).read_bytes()
+    with pytest.raises(CalibrationError, match=f"replicates of another experiment: .*{told}.*; give another folder"):
+        quickly(out=tmp_path, **other)
+    assert (tmp_path / REPLICATES.file).read_bytes() == before
+    assert noted == [0, 1]
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        {"seed": np.int64(1)},
+        {"probability": np.float64(0.9)},
+        {"world": World(base_shift=[0.0, 0.0])},
+        {"settings": replace(BY_DEFAULT, ensembles=np.int64(2))},
+    ],
+    ids=lambda same: next(iter(same)),
+)
+def test_the_same_in_other_words_is_the_same(noted, tmp_path, same):
+    quickly(out=tmp_path)
+    quickly(out=tmp_path, **same)
+
+
+def test_what_an_experiment_is_follows_from_its_words():
+    """Those of defaults, written out."""
+    asked = {
+        "seed": 1,
+        "family": "parabola",
+        "load_cell": None,
+        "rod": None,
+        "base": (0.0, 0.0),
+        "direction": "both",
+        "drive_angles": None,
+        "priors": None,
+        "nuisances": [],
+        "friction": None,
+        "events": True,
+        "settings": None,
+        "probability": 0.9,
+        "world": None,
+    }
+    words = experiment_of(**asked).words
+    written_out = {
+        "load_cell": LoadCell(force_noise=0.05, moment_noise=0.02),
+        "drive_angles": np.radians(np.arange(-30.0, 211.0, 2.0))[::-1],
+        "base": [(0.0, 0.0)],
+        "priors": {},
+        "nuisances": (),
+        "settings": SamplerSettings(
+            ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500
+        ),
+        "world": World(),
+    }
+    assert experiment_of(**(asked | written_out)).words == words
+    assert all(isinstance(said, str) for said in words.values())
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        *(({"replicates": count}, "replicates is .*: give a whole number from 1 up") for count in (0, True, 1.5, "3")),
+        *(({"seed": seed}, "seed is .*: give a whole number from 0 up") for seed in (-1, True, 1.5, None)),
+        *(({"probability": p}, "probability is .*: give a number between 0 and 1, like 0.95") for p in (0, 1, np.nan)),
+        ({"workers": 0}, "workers is 0: give a positive number"),
+        ({"direction": "up"}, "direction is 'up': choose 'both', 'forward' or 'backward'"),
+        ({"drive_angles": [0.0, 1.0]}, "drive_angles is .*: give a list of at least 3 different finite numbers"),
+        (
+            {"drive_angles": [0.0, 1.0, np.nan]},
+            "drive_angles is .*: give a list of at least 3 different finite numbers",
+        ),
+        ({"base": [1.0, 2.0, 3.0]}, r"base is \[1.0, 2.0, 3.0\]: give a pivot \(x, y\), or several"),
+        ({"base": (np.nan, 0.0)}, r"base is \(nan, 0.0\): give a pivot \(x, y\)"),
+        ({"nuisances": "bias"}, r"nuisances is 'bias': give a list of names, like \['bias'\]"),
+        ({"nuisances": ["bia"]}, "there is no nuisance parameter 'bia': choose from bias, drift"),
+        ({"nuisances": ["base"]}, "base cannot be inferred: if pivot and object are shifted together"),
+        ({"family": "cube", "priors": {}}, "there is no family 'cube': choose parabola, circle"),
+        ({"friction": -0.1}, "friction is -0.1: give a coefficient from 0 to"),
+        ({"load_cell": LoadCell()}, "the load cell has no noise, so that there is nothing to be calibrated: give"),
+        (
+            {"priors": {"b": stats.norm()}},
+            "there is a prior of b, which is no parameter: there are a, noise_scale, q, x_c",
+        ),
+        (
+            {"world": World(priors={"friction": stats.norm()})},
+            "there is a prior of the world of friction, which is no parameter",
+        ),
+    ],
+)
+def test_bad_arguments_are_told(noted, tmp_path, wrong, message):
+    """Before there is a folder."""
+    out = tmp_path / "out"
+    with pytest.raises(ParameterError, match=message):
+        quickly(**({"out": None if "workers" in wrong else out} | wrong))
+    assert not out.exists()
+    assert noted == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"drive_angles": "all"}, "drive_angles"),
+        ({"drive_angles": [[0.0, 1.0], [2.0, 3.0]]}, "drive_angles"),
+        ({"base": "here"}, "base"),
+        ({"base": [(0.0, 0.0), (1.0,)]}, "base"),
+        ({"direction": ["both"]}, "direction"),
+        ({"probability": "high"}, "probability"),
+        ({"load_cell": "good"}, "load_cell"),
+        ({"settings": "quick"}, "settings"),
+        ({"world": "real"}, "world"),
+        ({"rod": "thin"}, "rod"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_of_another_kind_is_told(noted, wrong, name):
+    with pytest.raises(ParameterError, match=name):
+        quickly(**wrong)
+
+
+# ---- right and wrong, from end to end
+
+
+@pytest.mark.slow
+def test_the_right_posterior_passes():
+    """False alarm 1 %, but for numbers that are the same again."""
+    found = quickly(replicates=60, workers=None)
+    assert found.attrs["calibrated"] == 1, found.attrs["verdict"]
+
+
+@pytest.mark.slow
+def test_noise_larger_than_told_is_found():
+    """Of 10 %: power is above 99.9 %.
+
+    The 366 readings of a record tell the scale of noise to 1/√732 = 3.7 %, and posteriors lie 2.6 times that too high.
+    """
+    world = World(load_cell=LoadCell(force_noise=0.055, moment_noise=0.022))
+    found = quickly(replicates=25, world=world, workers=None)
+    assert found.attrs["calibrated"] == 0
+    assert "noise_scale: posteriors" in found.attrs["verdict"]
+    assert float(found["ranks"].sel(quantity="noise_scale").mean()) < 15.0  # far too high
+
+
+@pytest.mark.slow
+def test_a_shifted_prior_is_found():
+    """Rods are stiffer by 2 % than the prior says, which is sure to 1 %, where noise leaves much to the prior.
+
+    Posteriors lie 1.7 of their standard deviations too low; power is above 99.9 %.
+    """
+    prior = {"rigidity_scale": stats.lognorm(s=0.01)}
+    found = quickly(
+        replicates=40,
+        load_cell=LoadCell(force_noise=0.5, moment_noise=0.2),
+        priors=PRIORS | prior,
+        world=World(priors={"rigidity_scale": stats.lognorm(s=0.01, scale=1.02)}),
+        workers=None,
+    )
+    assert found.attrs["calibrated"] == 0
+    assert "rigidity_scale: posteriors lie too low" in found.attrs["verdict"]
+
+
+@pytest.mark.slow
+def test_a_wrong_sampler_is_found(monkeypatch):
+    """Its moves divide by what they should multiply with: the ratio of the proposal's densities has the wrong sign.
+
+    Posteriors are some 0.6 times as wide as they should be, and their draws too likely. Power is above 99 %,
+    of 200 times 40 replicates that are drawn from 60.
+    """
+    for kind in (moves.FixedMove, moves.FittedMove):
+
+        def turned(self, *arguments, right=kind.get_proposal):
+            there, ratio = right(self, *arguments)
+            return there, np.where(np.isfinite(ratio), -ratio, ratio)
+
+        monkeypatch.setattr(kind, "get_proposal", turned)
+    found = quickly(replicates=40)
+    assert found.attrs["calibrated"] == 0
+    assert "log_likelihood: the truth explains the records worse than the draws do" in found.attrs["verdict"]

@@ -1,0 +1,206 @@
+"""The ledger of a calibration: what is written is read, and nothing else is."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from tactile_bayes.calibration.ledger import REPLICATES
+from tactile_bayes.calibration.replicate import Outcome
+from tactile_bayes.errors import CalibrationError
+from tactile_bayes.tasks import Ledger, files, open_ledger
+
+LEDGER = REPLICATES.file
+
+WORDS = {"family": "parabola", "seed": "1", "friction": "0.0", "load_cell": '{"force_noise": 0.05}'}
+
+ROWS = {
+    3: Outcome({"a": 0, "q": 99}, {"seconds": 0.1 + 0.2, "width_in_gap": math.nan, "share": 1.0}, "converged: R̂ 1.01"),
+    0: Outcome({}, {"seconds": 1e-300}, 'InferenceError: "nothing"\nfits', 'File "a.py", line 1\n  in f\n'),
+    11: Outcome({"a": 50}, {}, ""),
+}
+
+
+def equal(one, other):
+    """Whether two outcomes are the same, NaN and all."""
+    return (
+        dict(one.ranks) == dict(other.ranks)
+        and list(one.numbers) == list(other.numbers)
+        and all(v == w or (math.isnan(v) and math.isnan(w)) for v, w in zip(*map(_values, (one, other)), strict=True))
+        and (one.message, one.traceback) == (other.message, other.traceback)
+    )
+
+
+def _values(outcome):
+    return outcome.numbers.values()
+
+
+def filled(folder, words=WORDS):
+    with open_ledger(words, folder, REPLICATES) as ledger:
+        ledger.outcomes.update(ROWS)
+    return folder / LEDGER
+
+
+def refused(folder, match, words=WORDS):
+    """Also nothing in the folder has changed."""
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(CalibrationError, match=match), open_ledger(words, folder, REPLICATES):
+        raise AssertionError("the block began")
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+# ---- what is written is read
+
+
+def test_what_is_written_is_read(tmp_path):
+    file = filled(tmp_path / "made" / "on the way")
+    assert [path.name for path in file.parent.iterdir()] == [LEDGER]
+    with open_ledger(WORDS, file.parent, REPLICATES) as ledger:
+        assert list(ledger.outcomes) == sorted(ROWS)
+        assert all(equal(ledger.outcomes[number], row) for number, row in ROWS.items())
+        assert all(type(rank) is int for row in ledger.outcomes.values() for rank in row.ranks.values())
+    written = file.read_bytes()
+    filled(file.parent)
+    assert file.read_bytes() == written
+
+
+def test_the_file_is_plain_json(tmp_path):
+    """Without the NaN that the standard does not know."""
+    table = json.loads(filled(tmp_path).read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    assert table["experiment"] == WORDS
+    assert [row["number"] for row in table["replicates"]] == [0, 3, 11]
+    assert table["replicates"][1]["numbers"]["width_in_gap"] is None
+
+
+def test_a_ledger_without_tracebacks_is_read(tmp_path):
+    """As older ones are; what was lost there is lost here."""
+    file = filled(tmp_path)
+    table = json.loads(file.read_text(encoding="utf-8"))
+    assert [row.pop("traceback", None) is not None for row in table["replicates"]] == [True, False, False]
+    file.write_text(json.dumps(table), encoding="utf-8")
+    outcomes = Ledger(WORDS, tmp_path, REPLICATES).outcomes
+    assert all(equal(outcomes[number], row._replace(traceback="")) for number, row in ROWS.items())
+    assert [outcomes[number].is_lost for number in (0, 3, 11)] == [True, False, False]
+
+
+def test_new_ones_are_added_to_those_that_are_there(tmp_path):
+    filled(tmp_path)
+    with open_ledger(WORDS, tmp_path, REPLICATES) as ledger:
+        ledger.outcomes[4] = Outcome({"a": 7}, {}, "new")
+    assert list(Ledger(WORDS, tmp_path, REPLICATES).outcomes) == [0, 3, 4, 11]
+
+
+def test_without_a_folder_it_is_kept_in_memory(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with open_ledger(WORDS, None, REPLICATES) as ledger:
+        ledger.outcomes.update(ROWS)
+        ledger.write()
+    assert ledger.outcomes == ROWS
+    assert not list(tmp_path.iterdir())
+
+
+# ---- whatever happens
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_what_is_done_is_written_however_the_block_ends(tmp_path, error):
+    block = open_ledger(WORDS, tmp_path, REPLICATES)
+    block.__enter__().outcomes.update(ROWS)
+    assert not block.__exit__(error, error(), None)  # which is not swallowed
+    assert len(Ledger(WORDS, tmp_path, REPLICATES).outcomes) == len(ROWS)
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path):
+    file = filled(tmp_path)
+    before = file.read_bytes()
+    ledger = Ledger(WORDS, tmp_path, REPLICATES)
+    ledger.outcomes[5] = Outcome({}, {}, object())  # which JSON cannot hold
+    with pytest.raises(TypeError):
+        ledger.write()
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {LEDGER: before}
+
+
+def test_what_a_killed_run_left_behind_is_removed(tmp_path):
+    """Only that: files that others put there stay."""
+    filled(tmp_path)
+    half = tmp_path / f".tactile-bayes-{files._HOST}-0123456789abcdef.tmp"
+    half.mkdir()
+    (half / LEDGER).write_text('{"format": 1, "exper')
+    (tmp_path / "notes.json").write_text("{}")
+    with open_ledger(WORDS, tmp_path, REPLICATES) as ledger:
+        assert len(ledger.outcomes) == len(ROWS)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.json", LEDGER]
+
+
+def test_one_run_at_a_time(tmp_path):
+    pytest.importorskip("fcntl")
+    with (
+        open_ledger(WORDS, tmp_path, REPLICATES),
+        pytest.raises(CalibrationError, match=r"another run is at work on .*: wait"),
+    ):
+        open_ledger(WORDS, tmp_path, REPLICATES).__enter__()
+    filled(tmp_path)
+
+
+# ---- what is refused
+
+
+def test_another_experiment_is_refused(tmp_path):
+    filled(tmp_path)
+    remedy = "; give another folder, or remove replicates.json from it to begin anew$"
+    for words, told in (
+        ({"seed": "2"}, "another experiment: seed is 1 there and 2 here"),
+        ({"seed": "2", "friction": "0.3"}, "seed is 1 there and 2 here, friction is 0.0 there and 0.3 here"),
+        ({"events": "True"}, "events is left out there and True here"),
+        (dict.fromkeys(WORDS, "x"), "friction is 0.0 there and x here and 1 more"),
+        ({"load_cell": 99 * "7"}, f"load_cell is .* there and {57 * '7'}… here"),
+    ):
+        refused(tmp_path, told + remedy, WORDS | words)
+    refused(tmp_path, "seed is 1 there and left out here" + remedy, {n: w for n, w in WORDS.items() if n != "seed"})
+
+
+def test_of_another_experiment_without_replicates_nothing_is_lost(tmp_path):
+    with open_ledger(WORDS | {"seed": "2"}, tmp_path, REPLICATES):
+        pass
+    filled(tmp_path)
+    assert Ledger(WORDS, tmp_path, REPLICATES).outcomes
+
+
+GARBAGE = {
+    "empty": b"",
+    "cut off": b'{"format": 1, "experiment": {"family": "par',
+    "no text": b"\x89HDF\r\n\xff\xfe",
+    "null": b"null",
+    "a list": b"[]",
+    "nothing in it": b"{}",
+    "no rows": b'{"format": 1, "experiment": {}}',
+    "rows that are none": b'{"format": 1, "experiment": {}, "replicates": 5}',
+    "words that are none": b'{"format": 1, "experiment": 5, "replicates": []}',
+    "an empty row": b'{"format": 1, "experiment": {}, "replicates": [{}]}',
+    "a rank that is none": b'{"format": 1, "experiment": {}, "replicates": '
+    b'[{"number": 0, "ranks": {"a": null}, "numbers": {}, "message": ""}]}',
+    "ranks that are none": b'{"format": 1, "experiment": {}, "replicates": '
+    b'[{"number": 0, "ranks": [1], "numbers": {}, "message": ""}]}',
+    "a number that is none": b'{"format": 1, "experiment": {}, "replicates": '
+    b'[{"number": 0, "ranks": {}, "numbers": {"seconds": "long"}, "message": ""}]}',
+}
+
+
+@pytest.mark.parametrize("content", GARBAGE.values(), ids=GARBAGE)
+def test_garbage_is_refused_with_path_and_remedy(tmp_path, content):
+    (tmp_path / LEDGER).write_bytes(content)
+    refused(tmp_path, f"{tmp_path / LEDGER} holds no replicates that can be read .*: give another folder, or remove")
+
+
+def test_another_format_is_refused(tmp_path):
+    file = filled(tmp_path)
+    file.write_text(file.read_text(encoding="utf-8").replace('"format": 1', '"format": 2'), encoding="utf-8")
+    refused(tmp_path, f"^{file} has format 2, this version reads 1: give another folder, or remove replicates.json")
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "taken").touch()
+    with pytest.raises(CalibrationError, match="taken is a file: give a folder"):
+        open_ledger(WORDS, tmp_path / "taken", REPLICATES).__enter__()

@@ -1,0 +1,486 @@
+"""The command line, inside this process and as a stranger would start it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from helpers.commands import assert_misused, assert_refused, call, plain
+from helpers.report_pages import FEW
+from tactile_bayes import __version__, read_record
+from tactile_bayes.cli.sampling_bar import remaining_seconds
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import Progress
+from tactile_bayes.record import write_record
+from tactile_bayes.runs import contour as contour_run
+from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
+
+HEAVY = {"scipy", "xarray", "matplotlib", "emcee", "numpy", "arviz_stats"}
+COMMANDS = ["scan", "measure", "inspect", "reconstruct", "infer", "compare", "calibrate", "sensitivity", "design"]
+"""In the order in which a record goes through them."""
+
+ROD_OPTIONS = ["--length", str(ROD.length), "--flexural-rigidity", repr(ROD.flexural_rigidity)]
+CELL_OPTIONS = ["--force-noise", str(LOAD_CELL.force_noise), "--moment-noise", str(LOAD_CELL.moment_noise)]
+
+
+def start(*arguments, code=0, cwd=None):
+    """The command in a process of its own; what it wrote to stdout and stderr."""
+    command = [str(Path(sys.executable).with_name("tactile-bayes")), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", cwd=cwd, timeout=300)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout, done.stderr
+
+
+@pytest.fixture(scope="session")
+def record(measured, tmp_path_factory):
+    path = tmp_path_factory.mktemp("record") / "record.csv"
+    write_record(measured, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def bare(record):
+    """The same without header."""
+    path = record.with_name("bare.csv")
+    lines = record.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.startswith("#")) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="session")
+def posterior(record):
+    """What that record is taken for, after few steps."""
+    return infer_contour(read_record(record), seed=1, nuisances=[], settings=FEW)
+
+
+@pytest.fixture
+def at_once(monkeypatch, posterior):
+    """Runs without figures to which the posterior is given; the records that it should have come from."""
+    given = []
+
+    def found(measured, *, progress=None, **options):
+        given.append(measured)
+        if progress is not None:
+            progress(Progress(steps=50, max_steps=100, r_hat=1.02, ess=300.0, seconds=1.0))
+        return posterior.copy(deep=True)
+
+    monkeypatch.setattr(contour_run, "infer_contour", found)
+    monkeypatch.setattr(contour_run, "_draw", lambda *arguments, **options: {})
+    return given
+
+
+# --- Help and imports -----------------------------------------------------------------------------------------------
+
+
+def test_help_lists_the_commands():
+    result = call("--help")
+    assert result.exit_code == 0
+    commands = result.stdout.split("Commands:")[1].split("\n\n")[0]
+    found = [line.split()[0] for line in commands.splitlines() if line.startswith("  ") and line[2] != " "]
+    assert found[: len(COMMANDS)] == COMMANDS
+    assert {"demo", "dataset"} <= set(found)
+
+
+def test_help_states_the_exit_codes():
+    words = " ".join(call("--help").stdout.split())
+    assert "0 for done, 1 for an unexpected error, 2 for input or options that are refused, 130 for Ctrl-C" in words
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "demo"])
+def test_help_of_a_command_ends_with_an_example(command):
+    result = call(command, "--help")
+    assert result.exit_code == 0
+    assert f"Example: tactile-bayes {command} " in result.stdout
+
+
+def test_version():
+    assert start("--version") == (f"{__version__}\n", "")
+
+
+@pytest.mark.parametrize("code", ["import tactile_bayes", "from tactile_bayes.cli import app; app(['--help'])"])
+def test_what_is_heavy_is_loaded_when_used(code):
+    """Importing the package and asking for help are quick because of what they do not import."""
+    script = f"import atexit, sys\natexit.register(lambda: print(sorted({HEAVY} & set(sys.modules))))\n{code}"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+# --- Results --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_path):
+    """As a stranger starts it, figures and all."""
+    out, errors = start("infer", record, "--out", "run", "--max-steps", 8, "--quiet", cwd=tmp_path)
+    assert errors == ""
+    assert out.startswith("NOT CONVERGED, the steps allowed ran out after 8 steps: largest R̂ ")
+    assert out.lower().count("not converged") == 1
+    assert "\nSamples: " in out
+    for name in ("a", "q", "x_c", "noise_scale", "gap width"):
+        assert f"\n{name} " in out
+    for line in out.split("\n\n")[-1].splitlines():
+        assert (tmp_path / line.split()[-1]).stat().st_size > 0
+
+
+@pytest.mark.slow
+def test_a_run_may_be_given_a_time(record, tmp_path):
+    of_many = ("--family", "parabola/power-law")  # parameters, which take more than one look
+    result = call("infer", record, "--out", tmp_path / "run", *of_many, "--max-seconds", 0.1, "--quiet")
+    assert result.stdout.startswith("NOT CONVERGED, the time allowed ran out")
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "demo", "dataset generate", "dataset verify", "dataset record"])
+def test_every_command_can_be_quiet_and_answer_in_json(command):
+    shown = call(*command.split(), "--help").stdout
+    assert "--quiet" in shown
+    assert "--json" in shown
+
+
+@pytest.mark.usefixtures("quick")
+def test_an_answer_in_json_is_one_object_and_says_whether_it_is_to_be_trusted(record, tmp_path):
+    result = call("infer", record, "--out", tmp_path / "run", "--json")
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    answer = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert answer["converged"] is False
+    assert answer["message"].startswith("not converged")
+    assert any(sentence.startswith("NOT CONVERGED") for sentence in answer["words"])
+    table = {row["quantity"]: row for row in answer["quantities"]}
+    assert table["a"]["lower"] < 2.5 < table["a"]["upper"]
+    assert table["gap width"]["r_hat"] is None  # of which there is none
+    assert sum(answer["samples"].values()) == len((tmp_path / "run" / "contacts.csv").read_text().splitlines()) - 1
+    assert Path(answer["files"]["posterior"]).stat().st_size > 0
+
+
+@pytest.mark.usefixtures("at_once")
+def test_a_demonstration_in_json_has_the_truth_beside_it(tmp_path):
+    answer = json.loads(call("demo", "--out", tmp_path / "demo", "--json").stdout)
+    assert {row["quantity"]: row["truth"] for row in answer["quantities"]}["a"] == 2.5
+    assert answer["files"]["record"] == str(tmp_path / "demo" / "record.csv")
+
+
+@pytest.mark.usefixtures("at_once")
+def test_what_is_wrong_with_the_record_is_the_first_line(posterior, record, tmp_path, monkeypatch):
+    large = posterior.copy(deep=True)
+    large["observed_data"]["force_x"] *= 1e3
+    large["observed_data"]["force_y"] *= 1e3
+    monkeypatch.setattr(contour_run, "infer_contour", lambda measured, **options: large)
+    result = call("infer", record, "--out", tmp_path / "run", "--quiet")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("Forces reach ")
+    assert result.stdout.split("\n\n")[0] == "\n".join(
+        (tmp_path / "run" / "summary.txt").read_text(encoding="utf-8").split("\n\n")[0].splitlines()
+    )
+
+
+@pytest.mark.usefixtures("at_once")
+def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_path, monkeypatch):
+    def broken(*arguments):
+        raise RuntimeError("it broke")
+
+    monkeypatch.setattr(contour_run, "contour_band", broken)
+    said = "Left out: band. Unexpected error, RuntimeError: it broke"
+    result = call("infer", record, "--out", tmp_path / "run", "--quiet")
+    assert result.exit_code == 0, result.output
+    assert said in result.stdout.split("\n\n")[0].splitlines()
+    assert result.stderr == "tactile-bayes: left out: band; tactile-bayes --debug ... shows where that comes from\n"
+    assert (tmp_path / "run" / "posterior.nc").exists()
+    assert not (tmp_path / "run" / "band.csv").exists()
+    traced = call("--debug", "infer", record, "--out", tmp_path / "run", "--json")
+    assert traced.exit_code == 0
+    answer = json.loads(traced.stdout)
+    assert answer["left_out"] == {"band": "it broke"}
+    assert said in answer["words"]
+    assert "band" not in answer["files"]
+    assert traced.stderr.startswith("Traceback (most recent call last):")
+    assert "in broken" in traced.stderr
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
+    result = call("demo", "--out", tmp_path / "demo")
+    assert result.exit_code == 0, result.output
+    assert "the same job on your own: tactile-bayes infer RECORD --as-stated" in result.stdout
+    assert "truth" in result.stdout
+    assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+def test_a_file_without_header_is_told_its_rod_and_cell(record, bare, tmp_path):
+    stated = call("infer", record, "--out", tmp_path / "1", "-q")
+    told = call("infer", bare, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, "--diameter", ROD.diameter, *CELL_OPTIONS)
+    assert told.exit_code == 0, told.output
+    assert told.stderr == ""
+    assert stated.stdout.split("\n\n")[:2] == told.stdout.split("\n\n")[:2]
+
+
+def test_a_rig_tells_its_names_units_signs_and_sweeps_by_options(at_once, bare, tmp_path):
+    names, *rows = (line.split(",") for line in bare.read_text(encoding="utf-8").splitlines())
+    place = names.index
+    table = [["Winkel", "Mz [mN m]", "Fx", "Fy"]]
+    for row in rows:
+        angle, moment, x, y = (float(row[place(name)]) for name in names[-4:])
+        table.append([repr(90 - math.degrees(angle)), repr(1e3 * moment), repr(-1e3 * x), repr(y)])
+    path = tmp_path / "rig.csv"
+    path.write_text("\n".join(map(";".join, table)).replace(".", ","), encoding="utf-8")
+    options = ["drive_angle=90-Winkel[deg]", "holding_moment=Mz", "force_x = -Fx[mN]", "force_y=Fy[N]"]
+    options = ["--split-sweeps", *(word for option in options for word in ("--column", option))]
+    told = call("infer", path, "--out", tmp_path / "2", "-q", *ROD_OPTIONS, *CELL_OPTIONS, *options)
+    assert told.exit_code == 0, told.output
+    plain = call("infer", bare, "--out", tmp_path / "1", "-q", *ROD_OPTIONS, *CELL_OPTIONS)
+    assert told.stdout.split("\n\n")[:2] == plain.stdout.split("\n\n")[:2]
+    rig, usual = at_once
+    assert set(rig.data_vars) == set(usual.data_vars)
+    for name in usual.data_vars:
+        if usual[name].dtype.kind == "f":
+            np.testing.assert_allclose(rig[name], usual[name], rtol=1e-9, atol=1e-12, err_msg=name)
+        else:
+            np.testing.assert_array_equal(rig[name], usual[name], err_msg=name)
+    assert rig.attrs == usual.attrs
+
+
+@pytest.mark.usefixtures("at_once")
+def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(record, tmp_path, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
+    result = call("infer", record, "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert "effective draws 300" in result.stderr
+    assert "effective draws" not in result.stdout
+    assert " left" in result.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_path):
+    path = tmp_path / "plain.csv"
+    rows = [f"0,forward,{0.5 + 0.05 * i},{0.1 * (3 < i < 30)},,,0,0" for i in range(40)]
+    names = "sweep,direction,drive_angle,holding_moment,force_x,force_y,base_x,base_y"
+    path.write_text("\n".join([names, *rows]) + "\n", encoding="utf-8")
+    result = call("infer", path, "--out", tmp_path / "run", "-q")
+    assert result.exit_code == 0, result.output
+    assert result.stderr.startswith("The record states no units: its numbers are taken as dimensionless")
+    assert "give --length and --flexural-rigidity" in result.stderr
+    assert "No contact points: Step 2 needs all three load channels." in result.stdout
+
+
+# --- Refusals -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--length", "0.1"], "--length and --flexural-rigidity go together: give both, or neither"),
+        (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity go together: give both, or neither"),
+        (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity beside it: give all three"),
+        (["--length", "-1", "--flexural-rigidity", "1"], "the rod's length is -1.0: give a positive number [m]"),
+        (["--length", "0.3", "--flexural-rigidity", "1"], "but Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0) w"),
+        (["--family", "blob"], "there is no family 'blob': choose parabola, circle, ellipse, power-law, one"),
+        (["--probability", "1"], "probability is 1.0: give a number between 0 and 1, like 0.95"),
+        (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise as well, above zero, or leave"),
+        (["--moment-noise", "0.1"], "force_x is measured too: give --force-noise as well, above zero, or leave both"),
+        (["--force-noise", "-1"], "the load cell's force_noise is -1.0: give a standard deviation, zero or positive"),
+        (["--missing", "force_z"], "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
+        (["--missing", "force_x"], "column 'force_x' has values, but is declared missing"),
+        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
+        (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice: keep one of them"),
+        (["--column", "force=Fx"], "columns: 'force' is no column of a record: did you mean 'force_"),
+        (["--column", "force_x=Fx[mN]"], "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
+        (
+            ["--column", "force_x=force_x[mm]"],
+            "column 'force_x' is in [N], but [mm] is given for it: leave out the one",
+        ),
+        (["--split-sweeps"], "column 'sweep' is there already: do without split_sweeps, or remove the column"),
+    ],
+)
+def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
+    assert_refused(call("infer", record, "--out", tmp_path, *options), message)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["infer", "record.csv", "--out", "run", "--famly", "circle"], "No such option: --famly"),
+        (["infer", "record.csv", "--out", "run", "--max-steps", "many"], "--max-steps"),
+        (["infer", "record.csv", "--out", "run", "--friction", "1"], "--friction"),
+        (["infer", "record.csv", "--out", "run", "--seed", "-1"], "--seed"),
+        (["infer", "record.csv"], "Missing option '--out'"),
+        (["infer", "--out", "run"], "Missing argument 'record'"),
+        (["infer", "record.csv", "--out", __file__], "is a file"),
+        (["sing"], "No such command 'sing'"),
+        (["--quiet"], "No such option: --quiet"),
+    ],
+)
+def test_a_call_that_is_none_is_refused_with_the_usage(arguments, message):
+    assert_misused(call(*arguments), message)
+
+
+@pytest.mark.parametrize("name", ["nowhere.csv", "nowhere.nc", "nowhere"])
+def test_a_file_that_is_not_there(tmp_path, name):
+    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), f"{tmp_path / name}: No such file or directory")
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.nc", "a"])
+def test_a_directory_for_a_record(tmp_path, name):
+    (tmp_path / name).mkdir()
+    assert_refused(call("infer", tmp_path / name, "--out", tmp_path), "is a folder: give the record itself")
+
+
+def test_a_folder_that_cannot_be_made(record):
+    assert_refused(call("infer", record, "--out", Path(__file__) / "run"), "Not a directory")
+    assert_refused(call("demo", "--quiet", "--out", Path(__file__) / "run"), "Not a directory")
+
+
+@pytest.mark.slow
+def test_refusals_of_the_command_itself(tmp_path):
+    out, errors = start("infer", "nowhere.csv", "--out", "run", code=2, cwd=tmp_path)
+    assert (out, errors) == ("", "tactile-bayes: nowhere.csv: No such file or directory\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_misuse_of_the_command_itself():
+    _, errors = start("infer", "nowhere.csv", "--famly", "circle", code=2)
+    assert plain("No such option: --famly") in plain(errors)
+
+
+def test_a_refusal_shows_where_it_comes_from_if_asked(tmp_path):
+    result = call("--debug", "infer", tmp_path / "nowhere.csv", "--out", tmp_path)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Traceback (most recent call last):")
+    assert result.stderr.splitlines()[-1] == f"tactile-bayes: {tmp_path / 'nowhere.csv'}: No such file or directory"
+
+
+@pytest.mark.parametrize("debug", [False, True])
+def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_path, monkeypatch, debug):
+    from tactile_bayes.runs import reconstruction as reconstruction_run
+
+    def broken(*arguments, **options):
+        raise ZeroDivisionError("float division by zero\nand more")
+
+    monkeypatch.setattr(reconstruction_run, "reconstruct", broken)
+    result = call(*(["--debug"] if debug else []), "reconstruct", record, "--out", tmp_path)
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    *before, last = result.stderr.splitlines()
+    first = "tactile-bayes: unexpected error, ZeroDivisionError: float division by zero"
+    if debug:
+        assert before[0] == "Traceback (most recent call last):"
+        assert last == first
+    else:
+        assert before == [first]
+        assert last == "Run it again as tactile-bayes --debug ... to see where it comes from."
+
+
+@pytest.mark.filterwarnings("always::tactile_bayes.errors.StrainWarning")
+def test_a_warning_is_a_line(tmp_path):
+    rod = ["--length", 0.2, "--flexural-rigidity", 1e-2, "--diameter", 0.02]
+    result = call("scan", *rod, "--drive-step", 10, "--direction", "forward", "--out", tmp_path / "record.csv")
+    assert result.exit_code == 0, result.output
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("tactile-bayes: warning: in the forward sweep from (0, 0) the rod is strained by ")
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        pytest.param("tactile-bayes rec", "reconstruct", marks=pytest.mark.slow),
+        ("tactile-bayes scan --fam", "--family"),
+    ],
+)
+def test_shells_can_complete_commands_and_options(words, wanted):
+    """As the script that --show-completion prints asks for it."""
+    asking = {**os.environ, "_TACTILE_BAYES_COMPLETE": "complete_bash"}
+    command = str(Path(sys.executable).with_name("tactile-bayes"))
+    typed = {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    done = subprocess.run([command], env={**asking, **typed}, capture_output=True, text=True, timeout=100)
+    assert done.stdout.split() == [wanted], done.stderr
+
+
+# --- Progress -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("made", "left"),
+    [
+        ({"ess": 250.0}, 30.0),  # a quarter in 10 s
+        ({"ess": 20.0}, 90.0),  # but steps run out
+        ({"ess": 1500.0, "r_hat": 1.2}, 2.0),
+        ({"ess": math.nan}, None),
+        ({"steps": 0, "ess": 0.0}, None),
+    ],
+)
+def test_time_that_is_left_is_that_of_draws_as_they_came(made, left):
+    progress = Progress(**{"steps": 100, "max_steps": 1000, "r_hat": 1.05, "seconds": 10.0, **made})
+    assert remaining_seconds(progress) == pytest.approx(left)
+    if left is not None:
+        assert remaining_seconds(progress, max_seconds=10.5) == pytest.approx(0.5)
+
+
+# --- Interrupts -----------------------------------------------------------------------------------------------------
+
+SAMPLING = """
+import functools
+from tactile_bayes.runs import contour as run
+from tactile_bayes.cli import main
+from tactile_bayes.inference import contour, ensembles
+
+made = contour.sample
+def sample(*arguments, progress, **options):
+    return made(*arguments, progress=lambda state: print("sampling", flush=True), **options)
+
+contour.sample = sample
+run._draw = lambda *arguments, **options: {}
+ensembles.SamplerSettings = functools.partial(ensembles.SamplerSettings, block_steps=5, min_ess=1e9)
+main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
+def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
+    command = [sys.executable, "-c", SAMPLING, "infer", record, "--as-stated", "--out", "run", "-q"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", cwd=tmp_path
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "sampling\n"
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=300)
+    assert process.returncode == 130
+    answer, end = errors.split("\n", 2)[1:]
+    assert answer.startswith("tactile-bayes: stopping; what has been drawn is judged, drawn and written now")
+    assert end == (
+        "tactile-bayes: interrupted, results are of what was drawn by then: give --checkpoint FOLDER, and the same "
+        "command can go on after an interrupt\n"
+    )
+    assert "NOT CONVERGED, interrupted after " in out.split("\n\n")[0]
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {
+        "posterior.nc",
+        "contacts.csv",
+        "band.csv",
+        "summary.txt",
+        "summary.csv",
+    }
+
+
+def test_control_c_before_there_is_a_draw_says_so(record, tmp_path, monkeypatch):
+    from tactile_bayes.inference import contour
+
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(contour, "sample", interrupted)
+    result = call("infer", record, "--out", tmp_path, "-q")
+    assert result.exit_code == 130
+    assert result.stderr == "tactile-bayes: interrupted, results are incomplete\n"
+    assert list(tmp_path.iterdir()) == []

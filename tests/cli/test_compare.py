@@ -1,0 +1,220 @@
+"""The command `compare`: what it prints, writes and refuses."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+
+import pandas as pd
+import pytest
+import xarray as xr
+
+from helpers.commands import assert_misused, assert_refused, call
+from helpers.comparisons import NAMES, made_up
+from tactile_bayes.inference.ensembles import Progress
+from tactile_bayes.record import write_record
+from tactile_bayes.runs import comparison as comparison_run
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
+FILES = {"comparison.nc", "comparison.csv", "families.png"}
+
+
+@pytest.fixture(scope="module")
+def record(measured, tmp_path_factory):
+    path = tmp_path_factory.mktemp("record") / "record.csv"
+    write_record(measured, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def compared(record, tmp_path_factory, coarse_pictures):
+    folder = tmp_path_factory.mktemp("compared") / "made" / "on the way"
+    two = ["--family", "parabola", "--family", "circle", "--as-stated"]
+    options = [*two, "--no-leave-one-out", "--max-seconds", 0.5, "--quiet"]
+    return call("compare", record, "--out", folder, *options), folder
+
+
+@pytest.fixture
+def instead(monkeypatch):
+    """Have a comparison made up in place of one that is computed; what it was asked for is noted."""
+
+    def put(comparison, *, before=lambda progress: None):
+        asked = {}
+
+        def compare_families(measured, *, progress, **options):
+            asked.update(options)
+            before(progress)
+            return comparison
+
+        monkeypatch.setattr(comparison_run, "compare_families", compare_families)
+        return asked
+
+    return put
+
+
+def rows(output):
+    """Cells of the table by family."""
+    table = output.split("\n\n")[1].splitlines()
+    return {line.split()[0]: line.split()[1:] for line in table if line.split()[0] in NAMES}
+
+
+# --- Results --------------------------------------------------------------------------------------------------------
+
+
+def test_the_verdict_comes_first_then_the_table_then_the_files(compared):
+    result, folder = compared
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    assert result.stdout.splitlines()[0].startswith("parabola with probability above 0.999")
+    assert set(rows(result.stdout)) == {"parabola", "circle"}
+    assert rows(result.stdout)["circle"][-1] == "no"
+    assert "Far off, and not sampled: circle" in result.stdout
+    assert "elpd" not in result.stdout
+    listed = result.stdout.split("\n\n")[-1].splitlines()
+    assert {line.split(maxsplit=1)[1] for line in listed} == {str(folder / name) for name in FILES}
+    assert {path.name for path in folder.iterdir()} == FILES
+
+
+def test_the_files_hold_the_comparison(compared):
+    result, folder = compared
+    stored = xr.load_dataset(folder / "comparison.nc", engine="h5netcdf")
+    assert stored.attrs["verdict"] == result.stdout.splitlines()[0]
+    assert stored.fits.dtype == bool
+    table = pd.read_csv(folder / "comparison.csv", index_col="family")
+    assert table.index.tolist() == ["parabola", "circle"]
+    assert table["fits"].tolist() == [1, 0]
+    assert all(kind.kind in "if" for kind in table.dtypes)
+    for width, column in ((0.5, "probability_half_width"), (1.0, "probability"), (2.0, "probability_twice_width")):
+        assert table[column].tolist() == stored.probability_by_width.sel(prior_width=width).values.tolist()
+    assert (folder / "families.png").read_bytes().startswith(b"\x89PNG\r\n")
+
+
+@pytest.mark.parametrize(
+    "comparison",
+    [made_up([0.2, 0.8], elpd=[-1.0, 0.0]), made_up([0.0, 1.0], sampled=[False, True]), made_up([float("nan")] * 3)],
+    ids=["all", "one given up", "no probabilities"],
+)
+def test_what_is_written_is_read_back(comparison, tmp_path):
+    files = comparison_run.write_comparison(comparison, tmp_path)
+    assert xr.load_dataset(files["comparison"], engine="h5netcdf").identical(comparison)
+    assert {path.name for path in tmp_path.iterdir()} == FILES
+
+
+def test_all_shapes_are_compared_unless_some_are_named(instead, record, tmp_path):
+    asked = instead(made_up([0.3, 0.7]))
+    call("compare", record, "--out", tmp_path)
+    assert tuple(asked["families"]) == NAMES
+    assert asked["leave_one_out"] is True
+    call("compare", record, "--out", tmp_path, "--family", "circle", "--family", "ellipse", "--no-leave-one-out")
+    assert asked["families"] == ["circle", "ellipse"]
+    assert asked["leave_one_out"] is False
+
+
+def test_the_table_says_how_samples_are_foretold(instead, record, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    flags = {"sampled": [False, True, True], "fits": [False, True, False]}
+    instead(made_up([0.0, 0.9997, 0.0003], **flags, elpd=[0.0, 0.0, -9.0], k=0.9))
+    result = call("compare", record, "--out", tmp_path)
+    assert "elpd diff.  weight  check p  fits" in result.stdout
+    found = {name: " ".join(cells) for name, cells in rows(result.stdout).items()}
+    assert found == {
+        "parabola": "0 – – 0 – no",
+        "circle": ">0.999 -100.0 0 1 0.400 yes",
+        "ellipse": "<0.001 -108.1 -9.0 ± 3.0 0 0.001 no",
+    }
+    assert "Leave-one-out densities cannot all be trusted (Pareto k̂ above 0.7): circle, ellipse\n" in result.stdout
+
+
+def test_that_none_fits_is_the_first_line(instead, record, tmp_path):
+    instead(made_up([0.4, 0.6], fits=False))
+    assert call("compare", record, "--out", tmp_path).stdout.startswith("None fits: ")
+
+
+def test_progress_names_the_family(instead, record, tmp_path, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # which rich takes for a terminal
+    state = Progress(steps=50, max_steps=100, r_hat=1.02, ess=300.0, seconds=1.0)
+    instead(made_up([0.4, 0.6]), before=lambda progress: progress("circle", state))
+    result = call("compare", record, "--out", tmp_path)
+    assert "circle, step 50: R̂ 1.020, effective draws 300" in result.stderr
+    assert "effective draws" not in result.stdout
+
+
+# --- Refusals -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--family", "circle"], "families are circle: give two or more different ones"),
+        (["--family", "circle", "--family", "blob"], "there is no family 'blob': choose parabola, circle"),
+        (["--as-stated", "--nuisance", "bias"], "--as-stated and --nuisance contradict each other: leave one of them"),
+        (["--length", "0.1"], "--length and --flexural-rigidity go together: give both, or neither"),
+        (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise as well, above zero, or leave"),
+        (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
+        (["--max-seconds", "0"], "max_seconds is 0.0: give a positive time [s], or None for no limit"),
+        (["--out", __file__ + "/run"], "Not a directory"),
+    ],
+)
+def test_what_does_not_fit_the_record_is_refused_in_a_line(record, tmp_path, options, message):
+    assert_refused(call("compare", record, "--out", tmp_path / "shapes", *options), message)
+    assert not (tmp_path / "shapes").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--out", "run", "--max-steps", "50"], "No such option: --max-steps"),
+        (["--out", "run", "--friction", "1"], "--friction"),
+        ([], "Missing option '--out'"),
+        (["--out", __file__], "is a file"),
+    ],
+)
+def test_a_call_that_is_none_is_refused_with_the_usage(options, message):
+    assert_misused(call("compare", "record.csv", *options), message)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    path = tmp_path / "nowhere.csv"
+    assert_refused(call("compare", path, "--out", tmp_path), f"{path}: No such file or directory")
+
+
+# --- Interrupts -----------------------------------------------------------------------------------------------------
+
+
+SAMPLING = """
+import functools
+from tactile_bayes.cli import main
+from tactile_bayes.inference import contour, ensembles
+
+made = contour.sample
+def sample(*arguments, progress, **options):
+    def show(state):
+        print("sampling", flush=True)
+        progress(state)
+    return made(*arguments, progress=show, **options)
+
+contour.sample = sample
+ensembles.SamplerSettings = functools.partial(ensembles.SamplerSettings, block_steps=5, min_ess=1e9)
+main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
+def test_control_c_while_sampling_ends_all_of_it(record, tmp_path):
+    command = [sys.executable, "-c", SAMPLING, "compare", record, "--as-stated", "--out", "run", "-q"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", cwd=tmp_path
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "sampling\n"
+        time.sleep(0.5)  # while walkers walk, which is most of the time
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=300)
+    assert process.returncode == 130
+    assert errors == "tactile-bayes: interrupted while sampling shape-free: nothing comes of it\n"
+    assert set(out.splitlines()) <= {"sampling"}
+    assert list((tmp_path / "run").iterdir()) == []

@@ -1,0 +1,313 @@
+"""The commands `inspect` and `reconstruct`, and a laboratory's path from its own file to a contour."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import tactile_bayes as tb
+from helpers.commands import assert_misused, assert_refused, call
+from tactile_bayes.record import CHANNELS, write_record
+from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
+COLUMNS = ("drive_angle=90-Winkel[deg]", "holding_moment=Mz", "force_x=-Fx[mN]", "force_y=Fy")
+READING = [
+    *("--length", ROD.length, "--flexural-rigidity", repr(ROD.flexural_rigidity), "--diameter", ROD.diameter),
+    *(word for column in COLUMNS for word in ("--column", column)),
+    "--split-sweeps",
+]
+
+
+def record_of_rig():
+    cell = tb.LoadCell(force_noise=LOAD_CELL.force_noise, moment_noise=LOAD_CELL.moment_noise, bias=(1e-4, 4e-3, -2e-3))
+    return cell.measure(tb.scan(CONTOUR, rod=ROD, drive_step=math.radians(2.0)).record, seed=1)
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """A file as a rig writes it: names, units and signs of its own, semicolons, no sweeps, a zero that is off."""
+    record = record_of_rig()
+    lines = ["Winkel;Mz [mN m];Fx;Fy [mN];Temp / °C"]
+    for angle, moment, x, y in zip(*(record[name].values for name in ("drive_angle", *CHANNELS)), strict=True):
+        cells = (90.0 - math.degrees(angle), 1e3 * moment, -1e3 * x, 1e3 * y, 21.5)
+        lines.append(";".join(f"{cell:.4f}".replace(".", ",") for cell in cells))
+    path = tmp_path_factory.mktemp("rig") / "rig file.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_the_rigs_file_that_comes_with_the_package_is_like_it(rig):
+    ours = Path(__file__).parents[2] / "data" / "synthetic" / "rig.csv"
+    stored, made = (pd.read_csv(path, sep=";", decimal=",") for path in (ours, rig))
+    assert list(stored.columns) == ["Angle", *made.columns[1:]]
+    np.testing.assert_allclose(stored, made, rtol=0.0, atol=1.5e-4)
+
+
+@pytest.fixture(scope="module")
+def inspected(rig, tmp_path_factory, coarse_pictures):
+    folder = tmp_path_factory.mktemp("inspected") / "inspection"
+    return call("inspect", rig, *READING, "--out", folder), folder
+
+
+# --- inspect --------------------------------------------------------------------------------------------------------
+
+
+def test_what_looks_wrong_comes_first_then_what_is_in_the_file(inspected):
+    result, _ = inspected
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    lines = result.stdout.splitlines()
+    assert lines[:2] == ["Nothing looks wrong.", ""]
+    told = {line[:12].strip(): line[12:] for line in lines[2:8]}
+    assert told["samples"] == "198 in 2 sweeps"
+    assert "drive_angle = 90-Winkel[deg], holding_moment = Mz, force_x = -Fx[mN], force_y = Fy" in told["columns"]
+    assert told["others"] == "Temp [°C]"
+    assert told["units"].startswith("SI, rod: L = 200 mm, EI = 0.002428 N m², diameter 700 µm, EI/L = 12.1 mN m")
+    assert told["load cell"] == "fixed, along x and y; noise not stated, found in the unloaded samples"
+    sweeps, channels = (block.splitlines() for block in result.stdout.split("\n\n")[2:4])
+    assert [line.split()[:2] for line in sweeps[1:]] == [["0", "forward"], ["1", "backward"]]
+    assert sweeps[1].split()[-2] == "181.0"
+    assert [line.split("]")[0] for line in channels[1:]] == ["holding_moment [mN m", "force_x [mN", "force_y [mN"]
+    assert max(map(len, sweeps + channels)) <= 80
+    assert "\nRaw Step 2: " in result.stdout
+
+
+def test_the_last_line_is_the_command_to_go_on_with(inspected, rig):
+    last = inspected[0].stdout.splitlines()[-1]
+    assert last.startswith("Next: tactile-bayes infer ")
+    words = shlex.split(last.removeprefix("Next: tactile-bayes "))
+    assert words[:2] == ["infer", str(rig)]
+    assert words[-2:] == ["--out", "run/"]
+    given = [str(word) for word in READING]
+    assert sorted(words[2:-2]) == sorted(word for word in given)
+
+
+def test_the_folder_holds_words_tables_and_a_picture(inspected):
+    result, folder = inspected
+    assert (folder / "inspection.txt").read_text(encoding="utf-8").startswith("Nothing looks wrong.\n\nsamples ")
+    assert (folder / "inspection.png").read_bytes().startswith(b"\x89PNG\r\n")
+    samples = pd.read_csv(folder / "samples.csv", index_col="sample")
+    assert len(samples) == 198
+    assert samples[[name for name in samples if name.startswith(("outlier", "stuck", "cut_off"))]].to_numpy().sum() == 0
+    sweeps = pd.read_csv(folder / "sweeps.csv", index_col="sweep")
+    assert sweeps["snap_off_before"].notna().all()
+    assert pd.read_csv(folder / "channels.csv", index_col="channel").loc["force_x", "unit"] == "N"
+    listed = [line.split(maxsplit=1)[1] for line in result.stdout.split("\n\n")[-2].splitlines()]
+    assert sorted(listed) == sorted(str(path) for path in folder.iterdir())
+
+
+def test_json_has_the_same_in_numbers(rig):
+    result = call("inspect", rig, *READING, "--json")
+    assert result.exit_code == 0, result.output
+    answer = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert answer["words"] == ["Nothing looks wrong."]
+    assert answer["is_suspect"] is False
+    assert answer["channels"][1]["bias"] == pytest.approx(4e-3, abs=5 * answer["channels"][1]["bias_uncertainty"])
+    assert answer["channels"][0]["stated_noise"] is None
+    assert answer["sweeps"][0]["snap_off_drive_angle"] == pytest.approx(np.radians([180.0, 182.0]), abs=1e-5)
+    assert answer["suspicious_samples"]["repeated"] == []
+    assert sum(answer["raw_step_2"].values()) == 198
+    assert answer["files"] == {}
+
+
+def test_what_is_wrong_is_the_first_line_and_is_to_be_mended(rig):
+    signs = [word.replace("=-Fx", "=Fx") if isinstance(word, str) else word for word in READING]
+    result = call("inspect", rig, *signs)
+    assert result.exit_code == 0
+    first, *_, last = result.stdout.splitlines()
+    assert first.endswith("fit no contact of such a rod: nearly all would if force_x had the other sign.")
+    assert last.startswith("Once that is mended: tactile-bayes infer ")
+
+
+def test_a_rig_that_measures_the_moment_only(measured, tmp_path):
+    gone = ("sample", np.full(measured.sizes["sample"], np.nan))
+    write_record(measured.assign(force_x=gone, force_y=gone), tmp_path / "moment.csv")
+    result = call("inspect", tmp_path / "moment.csv")
+    assert result.exit_code == 0, result.output
+    assert "not there   force_x, force_y" in result.stdout
+    assert "No Step 2, which needs all three load channels; infer works without." in result.stdout
+
+
+def test_a_channel_that_is_not_connected_is_left_out_as_is_said(measured, tmp_path):
+    write_record(measured.assign(force_x=("sample", np.full(measured.sizes["sample"], 0.1))), tmp_path / "dead.csv")
+    said = call("inspect", tmp_path / "dead.csv").stdout.splitlines()[0]
+    assert said.endswith("empty its column, or remove it and give --missing force_x.")
+    table = pd.read_csv(tmp_path / "dead.csv", comment="#")
+    header = [line for line in (tmp_path / "dead.csv").read_text().splitlines() if line.startswith("#")]
+    for name, kept in {"empty.csv": table.assign(force_x=""), "removed.csv": table.drop(columns="force_x")}.items():
+        (tmp_path / name).write_text("\n".join([*header, kept.to_csv(index=False)]))
+        options = ["--missing", "force_x"] if name == "removed.csv" else []
+        result = call("inspect", tmp_path / name, *options)
+        assert "not there   force_x" in result.stdout, result.output
+
+
+def test_pivots_have_the_unit_of_the_record(tmp_path):
+    for bases, rod, head in (
+        ([(0.0, 0.0), (0.02, 0.01)], ROD, "base [m]"),
+        ([(0.0, 0.0), (0.1, 0.0)], None, "base  samples"),
+    ):
+        contour = CONTOUR if rod else tb.contours.paper_profile("II", q=0.5)
+        write_record(tb.scan(contour, base=bases, rod=rod, drive_step=0.1).record, tmp_path / "r.csv")
+        sweeps = call("inspect", tmp_path / "r.csv").stdout.split("\n\n")[2].splitlines()
+        assert head in sweeps[0]
+        assert f"{bases[1][0]:g},{bases[1][1]:g}" in sweeps[-1]
+        assert max(map(len, sweeps)) <= 80
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "there is no line of column names"),
+        (b"a,b\n1,2\n", "there is no column 'sweep' (columns: a, b)"),
+        (b"\x00\xff\xab", "a.csv"),
+        (b"sweep,direction,drive_angle,holding_moment,force_x,force_y\n", "a.csv"),
+        (b"sweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,x,2,3\n", "line 2"),
+        (
+            b"sweep,direction,drive_angle,holding_moment,force_x,force_y\n0,forward,1,nan,2,3\n0,forward,2,1,2,3\n",
+            "line 2",
+        ),
+    ],
+)
+def test_a_file_that_is_no_record_is_refused_in_a_line(tmp_path, content, message):
+    (tmp_path / "a.csv").write_bytes(content)
+    assert_refused(call("inspect", tmp_path / "a.csv"), message)
+
+
+# --- reconstruct ----------------------------------------------------------------------------------------------------
+
+
+def test_contact_points_of_a_rigs_file(rig, tmp_path):
+    result = call("reconstruct", rig, *READING, "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert "contact points by the constrained method; samples: " in result.stdout.splitlines()[0]
+    assert "they share an unknown bias, so that no probability is told" in result.stdout
+    assert "No noise is stated: bias and noise are taken from the unloaded samples." in result.stdout
+    assert (tmp_path / "contacts.png").read_bytes().startswith(b"\x89PNG\r\n")
+    contacts = pd.read_csv(tmp_path / "contacts.csv")
+    good = contacts[contacts["status"] == "ok"]
+    away = (good["contact_y"] - CONTOUR.height(good["contact_x"].to_numpy())) / good["normal_sd"]
+    assert len(good) > 80
+    assert np.sqrt(np.mean(away**2)) < 1.5
+
+
+def test_a_data_sheet_tells_whether_noise_explains_the_misfit(measured, tmp_path):
+    write_record(measured, tmp_path / "r.csv")
+    answer = json.loads(call("reconstruct", tmp_path / "r.csv", "--out", tmp_path, "--json").stdout)
+    contacts = tb.reconstruct(measured, method="constrained")
+    for name in ("misfit_sum", "misfit_samples", "misfit_probability", "axial_score"):
+        assert answer[name] == pytest.approx(contacts.attrs[name])
+    assert answer["samples"]["ok"] == int((contacts.status == "ok").sum())
+    assert answer["load_cell_source"] == "data sheet"
+    assert call("reconstruct", tmp_path / "r.csv", "--method", "raw", "--out", tmp_path).stdout.startswith(
+        f"{int(np.isfinite(tb.reconstruct(measured).contact_x).sum())} contact points by the raw method"
+    )
+
+
+def test_friction_that_is_not_stated_comes_first(tmp_path):
+    measured = LOAD_CELL.measure(tb.scan(CONTOUR, rod=ROD, friction=0.3).record, seed=1)
+    write_record(measured, tmp_path / "r.csv")
+    lines = call("reconstruct", tmp_path / "r.csv", "--out", tmp_path).stdout.splitlines()
+    assert lines[0].startswith("The loads of single samples contradict one another, misfit ")
+    assert "as friction makes it: give --friction, or have infer find it" in lines[1]
+    mended = call("reconstruct", tmp_path / "r.csv", "--friction", 0.3, "--out", tmp_path)
+    assert "which noise explains with probability" in mended.stdout
+    assert "contradict" not in mended.stdout
+
+
+def test_an_ideal_record_is_taken_at_its_word(tmp_path):
+    write_record(tb.scan(CONTOUR, rod=ROD, drive_step=0.05).record, tmp_path / "r.csv")
+    result = call("reconstruct", tmp_path / "r.csv", "--out", tmp_path / "run")
+    assert "by the raw method" in result.stdout
+    assert "There is no noise, neither stated nor in unloaded samples: no standard deviations." in result.stdout
+    refused = call("reconstruct", tmp_path / "r.csv", "--method", "constrained", "--out", tmp_path / "no")
+    assert_refused(refused, "the load cell has none on at least one")
+    assert not (tmp_path / "no").exists()
+
+
+def test_noise_that_cannot_be_known_is_not_said_to_be_none(rig, tmp_path):
+    lines = rig.read_text(encoding="utf-8").splitlines()
+    loaded = [line for line in lines[1:] if abs(float(line.split(";")[1].replace(",", "."))) > 1.0]
+    (tmp_path / "loaded.csv").write_text("\n".join([lines[0], *loaded]) + "\n", encoding="utf-8")
+    result = call("reconstruct", tmp_path / "loaded.csv", *READING, "--out", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    assert (
+        "No noise is known: neither stated, nor to be found without unloaded samples; every sample counts as loaded. "
+        "Give --force-noise and --moment-noise.\n"
+    ) in result.stdout
+    inspected = call("inspect", tmp_path / "loaded.csv", *READING)
+    assert "noise not stated, and not to be found without unloaded samples\n" in inspected.stdout
+
+
+def test_no_map_of_other_contacts_is_left(tmp_path):
+    """Where there is none to draw, that of an earlier run goes."""
+    record = tb.scan(CONTOUR, rod=ROD, drive_step=0.1).record
+    write_record(record, tmp_path / "touching.csv")
+    write_record(record.isel(sample=slice(0, 5)), tmp_path / "before.csv")
+    call("reconstruct", tmp_path / "touching.csv", "--out", tmp_path / "run")
+    assert (tmp_path / "run" / "contacts.png").exists()
+    result = call("reconstruct", tmp_path / "before.csv", "--out", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["contacts.csv"]
+
+
+def test_a_method_that_is_none(rig, tmp_path):
+    assert_misused(call("reconstruct", rig, "--method", "best", "--out", tmp_path), "--method")
+
+
+# --- From a rig's file to a contour -----------------------------------------------------------------------------------
+
+
+def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured(inspected, tmp_path, monkeypatch):
+    """In SI, with signs and sweeps; what comes of it is below."""
+    asked = []
+
+    def analyse(measured, out, **options):
+        asked.append((measured, out, options))
+        raise tb.errors.InferenceError("that is enough")
+
+    monkeypatch.setattr("tactile_bayes.runs.contour.analyse", analyse)
+    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
+    words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
+    assert_refused(call(*words), "that is enough")
+    ((measured, out, options),) = asked
+    expected = record_of_rig()
+    for name in ("drive_angle", *CHANNELS):
+        np.testing.assert_allclose(measured[name].values, expected[name].values, rtol=0.0, atol=2e-6)
+    np.testing.assert_array_equal(measured.sweep.values, expected.sweep.values)
+    assert tb.record.rod_of(measured) == ROD
+    assert out == tmp_path / "run"
+    assert options["family"] == "parabola"
+    assert "bias" in options["nuisances"]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+def test_the_command_that_inspect_names_infers_the_contour(inspected, tmp_path):
+    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
+    words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
+    answer = json.loads(call(*words, "--json").stdout)
+    rows = {row["quantity"]: row for row in answer["quantities"]}
+    assert rows["q"]["median"] == pytest.approx(0.1, abs=2e-3)
+    assert rows["force_x_bias"]["median"] == pytest.approx(4e-3, abs=2e-3)
+    assert (tmp_path / "run" / "posterior.nc").stat().st_size > 0
+
+
+@pytest.mark.slow
+def test_a_laboratorys_path_ends_at_the_truth(inspected, tmp_path):
+    """At full length: each interval of 95 % holds the truth, up to half its width."""
+    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
+    words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
+    answer = json.loads(call(*words, "--json").stdout)
+    assert answer["converged"] is True
+    rows = {row["quantity"]: row for row in answer["quantities"]}
+    for name, truth in {"a": 2.5, "q": 0.1, "x_c": 0.0, "force_x_bias": 4e-3}.items():
+        lower, upper = rows[name]["lower"], rows[name]["upper"]
+        assert abs(truth - 0.5 * (lower + upper)) < upper - lower

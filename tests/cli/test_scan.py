@@ -1,0 +1,227 @@
+"""The commands `scan` and `measure`: ideal records, and what a load cell makes of them."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import tactile_bayes as tb
+from helpers.commands import assert_misused, assert_refused, call
+
+COARSE = ["--drive-step", 10]
+FLANKS = [f"--parameter={number}" for number in ("left_a=0.5", "right_w=1", "right_n=4", "q=0.5")]
+
+
+def told(*arguments):
+    """The JSON object that a command answers with."""
+    result = call(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    return json.loads(result.stdout)
+
+
+@pytest.fixture(scope="module")
+def ideal(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ideal") / "ideal.csv"
+    return path, call("scan", "--profile", "II", "--distance", 0.5, "--drive-step", 2, "--out", path)
+
+
+# --- scan -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_scan_prints_its_events_and_writes_the_record(ideal):
+    path, result = ideal
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert lines[0].startswith("Parabola(a=0.5, q=0.5, x_c=0.0): 2 sweeps, ")
+    assert max(map(len, lines[2:])) <= 80
+    rows = [line.split() for line in lines[3:9]]
+    assert [row[:2] for row in rows] == [
+        *(["0", "forward"], ["tip", "→"], ["snap-off", "(corner)"]),
+        *(["1", "backward"], ["tip", "→"], ["snap-off", "(corner)"]),
+    ]
+    assert rows[2][2:] == ["180.727", "0.0609", "0.5019", "1.0544", "11.5448"]
+    assert lines[-1].split() == ["record", str(path)]
+    expected = tb.scan(tb.contours.Parabola(0.5, 0.5), drive_step=math.radians(2.0)).record
+    xr.testing.assert_identical(tb.read_record(path), expected)
+
+
+@pytest.mark.parametrize(
+    ("options", "contour"),
+    [
+        ([], "Parabola(a=0.5, q=0.5, x_c=0.0)"),
+        (["--family", "circle", "--parameter", "r=0.8", "--parameter", "q=0.4", "--parameter", "x_c=0.1"], "Circle("),
+        (["--family", "parabola/power-law", *FLANKS], "Joined("),
+    ],
+)
+def test_contours_are_chosen_by_options(tmp_path, options, contour):
+    answer = told("scan", *options, *COARSE, "--direction", "forward", "--out", tmp_path / "r.nc")
+    assert answer["contour"].startswith(contour)
+    assert [sweep["direction"] for sweep in answer["sweeps"]] == ["forward"]
+
+
+def test_a_scan_in_si_is_of_a_contour_in_metres(tmp_path):
+    rod = ["--length", 0.2, "--flexural-rigidity", 1e-3]
+    of_profile = told("scan", "--profile", "II", *rod, *COARSE, "--out", tmp_path / "1.csv")
+    family = ["--family", "parabola", "--parameter", "a=2.5", "--parameter", "q=0.1"]
+    of_family = told("scan", *family, *rod, *COARSE, "--out", tmp_path / "2.csv")
+    assert of_profile["sweeps"] == of_family["sweeps"]
+    assert of_profile["units"] == "SI"
+    assert of_profile["rod"]["length"] == 0.2
+
+
+def test_measured_points_are_scanned(tmp_path):
+    x = np.linspace(-0.9, 0.9, 40)
+    lines = [f"{a:.6f};{b:.6f}".replace(".", ",") for a, b in zip(0.5 * x**2 + 0.5, x, strict=True)]
+    points = tmp_path / "points.csv"
+    points.write_text("\n".join(["# from a probe", "y [L];x [L]", *lines]), encoding="utf-8")
+    forward = ["--direction", "forward", *COARSE]
+    found = told("scan", "--points", points, *forward, "--out", tmp_path / "r.csv")
+    exact = told("scan", "--profile", "II", *forward, "--out", tmp_path / "e.csv")
+    one, other = (answer["sweeps"][0]["snap_off"]["drive_angle"] for answer in (found, exact))
+    assert one == pytest.approx(other, abs=1e-4)
+
+
+@pytest.mark.usefixtures("coarse_pictures")
+def test_a_scan_from_two_pivots_is_drawn(tmp_path):
+    pivots = ["--base", "0,0", "--base", "0.2,0"]
+    answer = told("scan", *pivots, *COARSE, "--out", tmp_path / "r.csv", "--figure", tmp_path / "scan.png")
+    assert [sweep["base"] for sweep in answer["sweeps"]] == [[0.0, 0.0], [0.0, 0.0], [0.2, 0.0], [0.2, 0.0]]
+    assert (tmp_path / "scan.png").read_bytes().startswith(b"\x89PNG\r\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--profile", "II", "--family", "circle"], "--profile with --distance, --family and --points exclude each"),
+        (["--parameter", "a=1"], "--parameter is for a --family: give one"),
+        (["--family", "parabola", "--parameter", "q=0.5"], "--family parabola takes a, q, x_c: give --parameter a=..."),
+        (["--family", "parabola", "--parameter", "r=1"], "--parameter r=1: write NAME=VALUE, with one of a, q, x_c"),
+        (["--family", "parabola", *["--parameter", "a=1"] * 2], "--parameter a= is given twice"),
+        (["--family", "parabola", "--parameter", "a=x"], "--parameter a is 'x': give a number"),
+        (["--family", "shape-free"], "--family shape-free: such a contour is no few numbers, so give --points"),
+        (["--family", "blob"], "there is no family 'blob'"),
+        (["--distance", "1.5"], "the contour is out of reach"),
+        (["--points", "{}/none.csv"], "none.csv: No such file or directory"),
+        (["--points", "{}/empty.csv"], "empty.csv: there are no points in it"),
+        (["--points", "{}/words.csv"], "words.csv: '1,b' is no point: give x and y, like 0.1,0.52"),
+        (["--figure", "{}/scan.gif"], "scan.gif: a figure is a .png, .pdf or .svg file"),
+        (["--out", "{}/r.txt"], "r.txt: a record is a .csv or .nc file"),
+        (
+            ["--out", "{}/words.csv/no/r.csv"],
+            "words.csv is a file, and no folder for r.csv: give a record another name",
+        ),
+    ],
+)
+def test_what_cannot_be_scanned_is_refused_in_a_line(tmp_path, options, message):
+    (tmp_path / "empty.csv").write_text("\n")
+    (tmp_path / "words.csv").write_text("x,y\n0,1\n1,b\n")
+    options = [option.format(tmp_path) for option in options]
+    assert_refused(call("scan", "--out", tmp_path / "r.csv", *options), message)
+    assert not (tmp_path / "r.csv").exists()
+
+
+def test_folders_of_files_are_made(tmp_path):
+    out, figure, measured = tmp_path / "a" / "b" / "ideal.csv", tmp_path / "c" / "scan.png", tmp_path / "d" / "m.csv"
+    assert call("scan", "--profile", "II", *COARSE, "--out", out, "--figure", figure).exit_code == 0
+    assert call("measure", out, "--force-noise", 0.1, "--moment-noise", 0.1, "--out", measured).exit_code == 0
+    assert all(path.is_file() for path in (out, figure, measured))
+
+
+def test_a_profile_that_is_none(tmp_path):
+    assert_misused(call("scan", "--profile", "V", "--out", tmp_path / "r.csv"), "--profile")
+
+
+# --- measure --------------------------------------------------------------------------------------------------------
+
+
+def test_a_load_cell_measures_an_ideal_record(ideal, tmp_path):
+    noise = ["--force-noise", 0.05, "--moment-noise", 0.02, "--bias", "0,0.1,-0.1", "--drive-angle-noise", 0.1]
+    result = call("measure", ideal[0], *noise, "--seed", 3, "--out", tmp_path / "m.csv")
+    assert result.exit_code == 0, result.output
+    assert "as a laboratory has it, without truth" in result.stdout
+    cell = tb.LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.0, 0.1, -0.1), drive_angle_noise=math.radians(0.1))
+    expected = cell.measure(tb.read_record(ideal[0]), seed=3)
+    found = tb.read_record(tmp_path / "m.csv")
+    assert tb.LoadCell.from_record(found) == cell
+    assert not [name for name in found.data_vars if name.startswith("truth_")]
+    xr.testing.assert_equal(found, expected[list(found.data_vars)])
+
+
+def test_a_record_that_states_no_load_cell_is_taken_to_be_ideal(ideal, tmp_path):
+    """As the help says: what is not in the header cannot be known."""
+    noisy = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(tb.read_record(ideal[0]), seed=1)
+    noisy.attrs = {name: value for name, value in noisy.attrs.items() if not name.startswith("load_cell_")}
+    tb.write_record(noisy, tmp_path / "noisy.csv")
+    told("measure", tmp_path / "noisy.csv", "--force-noise", 0.1, "--moment-noise", 0.1, "--out", tmp_path / "m.csv")
+    assert "whose header states a load cell is refused" in " ".join(call("measure", "--help").stdout.split())
+
+
+def test_the_truth_is_kept_if_asked(ideal, tmp_path):
+    call("measure", ideal[0], "--force-noise", 0.1, "--moment-noise", 0.1, "--keep-truth", "--out", tmp_path / "m.nc")
+    found = tb.read_record(tmp_path / "m.nc")
+    xr.testing.assert_equal(found.truth_force_x.drop_attrs(), tb.read_record(ideal[0]).force_x.drop_attrs())
+
+
+def test_every_flaw_arrives(ideal, tmp_path):
+    options = {
+        "--relative-noise": 0.01,
+        "--degrees-of-freedom": 5,
+        "--bias-uncertainty": "0.1,0.2,0.3",
+        "--ornstein-uhlenbeck": "0.01,0.02,30",
+        "--force-range": 9,
+        "--moment-range": 2,
+        "--force-resolution": 0.01,
+        "--moment-resolution": 0.005,
+        "--lever": "0.01,-0.02",
+        "--drive-angle-offset": 1,
+        "--drive-angle-backlash": 0.2,
+        "--drive-angle-resolution": 0.5,
+        "--load-cell-frame": "turning",
+    }
+    words = [word for pair in options.items() for word in pair]
+    gains = ["--gain", "force_x=1.01", "--gain", "force_x/force_y=0.02"]
+    told("measure", ideal[0], *words, *gains, "--out", tmp_path / "m.csv")
+    assert tb.LoadCell.from_record(tb.read_record(tmp_path / "m.csv")) == tb.LoadCell(
+        relative_noise=0.01,
+        degrees_of_freedom=5.0,
+        bias_uncertainty=(0.1, 0.2, 0.3),
+        drift=tb.OrnsteinUhlenbeck(moment=0.01, force=0.02, time=30.0),
+        force_range=9.0,
+        moment_range=2.0,
+        force_resolution=0.01,
+        moment_resolution=0.005,
+        lever=(0.01, -0.02),
+        drive_angle_offset=math.radians(1.0),
+        drive_angle_backlash=math.radians(0.2),
+        drive_angle_resolution=math.radians(0.5),
+        gain=((1.0, 0.0, 0.0), (0.0, 1.01, 0.02), (0.0, 0.0, 1.0)),
+    )
+    assert tb.read_record(tmp_path / "m.csv").attrs["load_cell_frame"] == "turning"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "this load cell is ideal, and changes nothing: give at least one flaw"),
+        (["--bias", "1,2"], "--bias is '1,2': give 3 numbers with commas between them"),
+        (["--gain", "fx=1"], "--gain fx=1: write READING=VALUE or READING/LOAD=VALUE"),
+        (["--gain", "force_x=1.1", "--gain", "force_x=1.2"], "--gain force_x= is given twice"),
+        (["--random-walk", "1,1", "--ornstein-uhlenbeck", "1,1,9"], "random walk or an Ornstein-Uhlenbeck process"),
+        (["--force-range", "-1"], "the load cell's force_range is -1.0"),
+    ],
+)
+def test_what_is_no_load_cell_is_refused_in_a_line(ideal, tmp_path, options, message):
+    assert_refused(call("measure", ideal[0], *options, "--out", tmp_path / "m.csv"), message)
+
+
+def test_a_record_is_not_measured_twice(ideal, tmp_path):
+    noise = ["--force-noise", 0.05, "--moment-noise", 0.02]
+    call("measure", ideal[0], *noise, "--out", tmp_path / "m.csv")
+    result = call("measure", tmp_path / "m.csv", *noise, "--out", tmp_path / "mm.csv")
+    assert_refused(result, "m.csv has been measured already (its header states a load cell)")
+    assert not (tmp_path / "mm.csv").exists()

@@ -1,0 +1,134 @@
+"""Families compared: which shape it was, and that none of them is said where none is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from helpers.contour_posteriors import CELL, swept
+from tactile_bayes.comparison.families import compare_families
+from tactile_bayes.contours import Circle, Ellipse, paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.ensembles import SamplerSettings
+
+BRIEF = SamplerSettings(ensembles=2, walkers=20, min_ess=100, max_r_hat=1.1, max_steps=40)
+
+
+@pytest.fixture(scope="module")
+def circle():
+    return CELL.measure(swept(Circle(0.8, 0.5, 0.0), step=0.1, direction="forward"), seed=1)
+
+
+@pytest.fixture(scope="module")
+def compared(circle):
+    return compare_families(
+        circle, families=["circle", "ellipse"], load_cell=CELL, seed=1, nuisances=(), settings=BRIEF
+    )
+
+
+def test_the_simpler_of_two_shapes_that_fit_is_more_probable(compared):
+    """An ellipse can be a circle, and is then one of many that it could have been."""
+    probability = compared.probability.sel(family=["circle", "ellipse"]).values
+    assert probability.sum() == pytest.approx(1.0)
+    assert probability[0] > 0.7
+    assert compared.fits.all()
+    assert compared.attrs["most_probable"] == "circle"
+    assert len(compared.attrs["data_sha256"]) == 64
+    assert compared.attrs["verdict"].startswith("circle with probability 0.")
+    assert abs(float(compared.elpd_difference.min())) < 5.0
+    assert compared.weight.sum() == pytest.approx(1.0)
+    assert (compared.log_evidence_error < 0.2).all()
+
+
+def test_wider_priors_are_worse_for_more_parameters(compared):
+    wide = compared.probability_by_width
+    np.testing.assert_allclose(wide.sum("family"), 1.0)
+    assert float(wide.sel(family="circle", prior_width=2.0)) > float(wide.sel(family="circle", prior_width=0.5))
+
+
+@pytest.mark.slow
+def test_a_shape_that_is_far_off_is_given_up():
+    """And the only one that is left fits as badly: none does."""
+    measured = CELL.measure(swept(paper_profile("IV", q=0.5), step=0.1), seed=1)
+    found = compare_families(
+        measured,
+        families=["circle", "ellipse"],
+        load_cell=CELL,
+        seed=1,
+        nuisances=(),
+        leave_one_out=False,
+        settings=SamplerSettings(ensembles=2, max_steps=150),
+    )
+    assert found.attrs["none_fits"]
+    assert found.attrs["verdict"].startswith("None fits")
+    assert "elpd" not in found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("truth", "right"), [(Ellipse(0.9, 0.5, 0.5, 0.02), "ellipse"), (paper_profile("II", q=0.5), "parabola")]
+)
+def test_the_right_one_of_all(truth, right):
+    measured = CELL.measure(swept(truth, step=np.radians(1.0)), seed=1)
+    found = compare_families(measured, load_cell=CELL, seed=1)
+    assert found.attrs["most_probable"] == right
+    assert float(found.probability.sel(family=right)) > 0.5
+    assert bool(found.fits.sel(family=right))
+    best = found.family.values[found.elpd.values.argmax()]
+    behind = found.elpd_difference.sel(family=right)
+    assert best == right or -float(behind) < 4.0
+
+
+@pytest.mark.slow
+def test_what_is_none_of_the_shapes_comes_out_as_such():
+    measured = CELL.measure(swept(paper_profile("IV", q=0.5), step=np.radians(1.0)), seed=1)
+    found = compare_families(
+        measured, families=["parabola", "circle", "ellipse", "power-law"], load_cell=CELL, seed=1, leave_one_out=False
+    )
+    assert found.attrs["none_fits"]
+
+
+@pytest.mark.slow
+def test_a_run_is_made_again_from_its_seed(circle, compared):
+    again = compare_families(
+        circle,
+        families=["ellipse", "circle"],
+        load_cell=CELL,
+        seed=1,
+        nuisances=(),
+        leave_one_out=False,
+        settings=BRIEF,
+    )
+    assert again.family.values.tolist() == ["ellipse", "circle"]
+    assert np.isfinite(again.log_evidence).all()
+
+
+def test_an_interrupt_ends_the_comparison(circle):
+    def interrupt(name, state):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="interrupted while sampling circle: nothing comes of it"):
+        compare_families(
+            circle,
+            families=["circle", "ellipse"],
+            load_cell=CELL,
+            seed=1,
+            nuisances=(),
+            settings=SamplerSettings(ensembles=2, min_ess=1e9),
+            progress=interrupt,
+        )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"families": "circle"}, r"families is 'circle': give several, like \['parabola', 'circle'\]"),
+        ({"families": ["circle"]}, "families are circle: give two or more different ones"),
+        ({"families": ["circle", "circle"]}, "give two or more different ones"),
+        ({"families": ["circle", "square"]}, "there is no family 'square'"),
+        ({"families": ["circle", "ellipse"], "priors": {"parabola": {}}}, "there are priors for 'parabola', which is"),
+    ],
+)
+def test_families_that_cannot_be_compared(circle, options, message):
+    with pytest.raises(ParameterError, match=message):
+        compare_families(circle, load_cell=CELL, seed=1, **options)

@@ -1,0 +1,401 @@
+"""Leave-one-out predictive densities against models in which they are known exactly.
+
+A check of estimates against five standard errors alarms falsely once in a million estimates; there are some 500.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import arviz_stats
+import numpy as np
+import pytest
+import xarray as xr
+from arviz_stats.base.array import array_stats
+from scipy import stats
+
+from helpers.load_cells import CELL, SHARED, WALK, WANDER, moments
+from tactile_bayes.comparison import leave_one_out
+from tactile_bayes.comparison.leave_one_out import (
+    difference,
+    largest_k,
+    left_out,
+    left_out_from_wider,
+    reweighted,
+    stacking_weights,
+)
+from tactile_bayes.errors import InferenceError, ParameterError
+
+SIGMAS = 5.0
+
+
+def wandering_draws(mean, covariance, shape, rng, kept=0.0):
+    """Chains (chains, draws, parameters) of a normal distribution, each draw keeping a share of the one before."""
+    draws = rng.standard_normal((*shape, mean.size))
+    for i in range(1, shape[1]):
+        draws[:, i] = kept * draws[:, i - 1] + np.sqrt(1.0 - kept**2) * draws[:, i]
+    return mean + draws @ np.linalg.cholesky(covariance).T
+
+
+# --- A linear model, its noise known ----------------------------------------------------------------------------
+
+
+class Line:
+    """y = X β + noise of 0.5, β standard normal."""
+
+    sigma = 0.5
+
+    def __init__(self, samples, seed=0):
+        rng = np.random.default_rng(seed)
+        self.design = np.column_stack([np.ones(samples), rng.normal(size=(samples, 2))])
+        self.y = self.design @ np.array([0.5, 1.0, -1.0]) + self.sigma * rng.normal(size=samples)
+
+    def posterior(self, without=()):
+        design, y = (np.delete(values, list(without), axis=0) for values in (self.design, self.y))
+        covariance = np.linalg.inv(design.T @ design / self.sigma**2 + np.eye(3))
+        return covariance @ design.T @ y / self.sigma**2, covariance
+
+    def log_densities(self, draws):
+        return stats.norm.logpdf(self.y, draws @ self.design.T, self.sigma)
+
+    def exact(self, i):
+        mean, covariance = self.posterior([i])
+        x = self.design[i]
+        return stats.norm.logpdf(self.y[i], x @ mean, np.sqrt(self.sigma**2 + x @ covariance @ x))
+
+
+def test_estimates_are_right_within_their_errors():
+    """A chain that keeps a share of 0.8 has a ninth of the draws' worth for a mean, and three times the error."""
+    line, errors = Line(24), []
+    exact = [line.exact(i) for i in range(24)]
+    for kept in (0.0, 0.8):
+        draws = wandering_draws(*line.posterior(), (4, 2000), np.random.default_rng(1), kept)
+        found = left_out(line.log_densities(draws))
+        assert found.log_density.shape == found.standard_error.shape == found.pareto_k.shape == (24,)
+        assert (np.abs(found.log_density - exact) < SIGMAS * found.standard_error).all()
+        assert (found.pareto_k < 0.5).all()
+        errors.append(found.standard_error)
+    assert (errors[0] < 0.03).all()
+    assert 2.0 < np.median(errors[1] / errors[0]) < 4.0
+
+
+@pytest.mark.parametrize("kept", [0.0, pytest.param(0.8, marks=pytest.mark.slow)])
+def test_the_standard_error_is_the_scatter_of_estimates(kept):
+    """Of 100 runs a standard deviation is known to 7 %, one that is not normal to 8 or so; chains of 250 tell their
+    own autocorrelation to 20 %, together to little."""
+    line = Line(12)
+    rng = np.random.default_rng(2)
+    runs = [
+        left_out(line.log_densities(wandering_draws(*line.posterior(), (4, 250), rng, kept))[..., [1, 2, 5]])
+        for _ in range(100)
+    ]
+    scatter = np.std([run.log_density for run in runs], axis=0)
+    stated = np.sqrt(np.mean([run.standard_error**2 for run in runs], axis=0))
+    assert ((stated > 0.7 * scatter) & (stated < 1.4 * scatter)).all()
+
+
+def test_stuck_chains_do_not_matter():
+    line = Line(24)
+    draws = wandering_draws(*line.posterior(), (4, 500), np.random.default_rng(3))
+    once = left_out(line.log_densities(draws))
+    found = left_out(line.log_densities(np.repeat(draws, 4, axis=1)))
+    assert (np.abs(found.log_density - [line.exact(i) for i in range(24)]) < SIGMAS * found.standard_error).all()
+    np.testing.assert_allclose(found.standard_error, once.standard_error, rtol=0.35)
+
+
+def test_a_sample_that_the_others_do_not_expect_is_told_by_its_tail():
+    line = Line(12)
+    line.design[0], line.y[0] = [1.0, 6.0, 6.0], 6.0
+    draws = wandering_draws(*line.posterior(), (4, 1000), np.random.default_rng(4))
+    found = left_out(line.log_densities(draws))
+    assert found.pareto_k[0] > 0.7
+    assert found.standard_error[0] == np.inf
+    assert abs(found.log_density[0] - line.exact(0)) > 1.0
+    others = [abs(found.log_density[i] - line.exact(i)) < SIGMAS * found.standard_error[i] for i in range(1, 12)]
+    assert all(others)
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.8])
+def test_from_a_wider_posterior_they_are_right_also_where_no_tail_can_be_trusted(kept):
+    line = Line(12)
+    line.design[0], line.y[0] = [1.0, 4.0, 4.0], 3.0
+    whole = left_out(line.log_densities(wandering_draws(*line.posterior(), (4, 4000), np.random.default_rng(19))))
+    assert whole.pareto_k[0] > 0.7
+    assert abs(whole.log_density[0] - line.exact(0)) > 0.5
+    events = [0, 4, 7]
+    draws = wandering_draws(*line.posterior(events), (4, 4000), np.random.default_rng(5), kept)
+    for place, i in enumerate(events):
+        found = left_out_from_wider(line.log_densities(draws)[..., events], place)
+        assert abs(found.log_density - line.exact(i)) < SIGMAS * found.standard_error
+        assert 10.0 < found.effective < 16_000.0
+    alone = left_out_from_wider(line.log_densities(draws)[..., [4]], 0)
+    assert alone.effective == pytest.approx(16_000.0)
+
+
+def test_the_standard_error_from_wider_is_the_scatter_of_estimates():
+    line = Line(12)
+    rng = np.random.default_rng(6)
+    runs = []
+    for _ in range(100):
+        draws = wandering_draws(*line.posterior([0, 1, 2]), (4, 250), rng, 0.8)
+        runs.append(left_out_from_wider(line.log_densities(draws)[..., :3], 0))
+    scatter = np.std([run.log_density for run in runs])
+    stated = np.sqrt(np.mean([run.standard_error**2 for run in runs]))
+    assert 0.7 * scatter < stated < 1.4 * scatter
+
+
+# --- Samples that know of one another ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("further", [{"drift": WALK}, {"drift": WANDER, "correlation": SHARED}])
+def test_of_a_drifting_cell_they_are_those_of_all_that_is_normal(further):
+    """Loads of an unknown size: one dense normal distribution of readings, with drift and size integrated out."""
+    sheet = replace(CELL, **further)
+    rng = np.random.default_rng(7)
+    shape = rng.normal(size=(15, 3))
+    unit, noise = shape.ravel(), moments(sheet, shape)[1]
+    measured = (1.3 * unit + np.linalg.cholesky(noise) @ rng.normal(size=45)).reshape(15, 3)
+
+    def log_density(kept):
+        whole = noise + np.outer(unit, unit)
+        return stats.multivariate_normal(cov=whole[np.ix_(kept, kept)]).logpdf(measured.ravel()[kept])
+
+    every = np.arange(45)
+    exact = [log_density(every) - log_density(every[every // 3 != i]) for i in range(15)]
+    variance = 1.0 / (1.0 + unit @ np.linalg.solve(noise, unit))
+    mean = variance * unit @ np.linalg.solve(noise, measured.ravel())
+    draws = rng.normal(mean, np.sqrt(variance), (4, 1000))
+    found = left_out(sheet.log_density_left_out(measured, draws[..., None, None] * shape))
+    assert (np.abs(found.log_density - exact) < SIGMAS * found.standard_error).all()
+    sequential = left_out(sheet.log_likelihood(measured, draws[..., None, None] * shape, pointwise=True))
+    assert (np.abs(sequential.log_density - exact) > 100.0 * sequential.standard_error).any()
+
+
+# --- A jump between two samples ---------------------------------------------------------------------------------
+
+
+class Jump:
+    """Readings at 0 … 9, of an unknown height before an unknown place, and zero after it: integrated on a grid."""
+
+    noise = 0.1
+
+    def __init__(self):
+        place = (np.arange(90) + 0.5) / 10.0
+        height = np.linspace(0.5, 1.5, 801)
+        place, height = (values.ravel() for values in np.meshgrid(place, height))
+        x = np.arange(10)
+        y = np.where(x < 4.6, 1.0, 0.0) + self.noise * np.random.default_rng(8).normal(size=10)
+        self.prior = np.ones_like(height)
+        self.logs = stats.norm.logpdf(y, np.where(x < place[:, None], height[:, None], 0.0), self.noise)
+
+    def posterior(self, without=()):
+        weight = self.prior * np.exp(np.delete(self.logs, list(without), axis=1).sum(axis=1))
+        return weight / weight.sum()
+
+    def exact(self, i):
+        return np.log(self.posterior([i]) @ np.exp(self.logs[:, i]))
+
+    def drawn(self, without, seed):
+        where = np.random.default_rng(seed).choice(self.prior.size, (4, 1000), p=self.posterior(without))
+        return self.logs[where]
+
+
+BESIDE = (4, 5)
+
+
+def test_beside_a_jump_the_tail_does_not_tell_that_draws_are_missing():
+    jump = Jump()
+    found = left_out(jump.drawn((), 20))
+    off = np.abs(found.log_density - [jump.exact(i) for i in range(10)])
+    beside = np.isin(np.arange(10), BESIDE)
+    assert (off[~beside] < SIGMAS * found.standard_error[~beside] + 1e-12).all()
+    assert (off[beside] > 0.5).all()  # half of the places without a sample are on its other side
+    assert (found.pareto_k < largest_k(4000)).all()
+
+
+def test_beside_a_jump_a_wider_posterior_is_right():
+    jump = Jump()
+    logs = jump.drawn(BESIDE, 10)[..., BESIDE]
+    for place, i in enumerate(BESIDE):
+        found = left_out_from_wider(logs, place)
+        assert abs(found.log_density - jump.exact(i)) < SIGMAS * found.standard_error
+        assert found.standard_error < 0.05
+        assert found.effective > 1000.0
+
+
+def test_weights_may_be_given_as_ratios_of_likelihoods():
+    jump = Jump()
+    logs = jump.drawn(BESIDE, 11)
+    all_but_one, given = np.delete(logs, 5, axis=-1).sum(axis=-1), np.delete(logs, BESIDE, axis=-1).sum(axis=-1)
+    expected = left_out_from_wider(logs[..., BESIDE], 1)
+    np.testing.assert_allclose(reweighted(all_but_one - given + 1e3, logs[..., 5]), expected, rtol=1e-9)
+
+
+# --- Weights of every kind --------------------------------------------------------------------------------------
+
+
+def test_they_are_those_of_arviz():
+    line = Line(6)
+    draws = wandering_draws(*line.posterior(), (4, 300), np.random.default_rng(12), 0.6)
+    logs = line.log_densities(draws)
+    found = left_out(logs)
+    tree = xr.DataTree.from_dict(
+        {
+            "posterior": xr.Dataset({"beta": (("chain", "draw", "which"), draws)}),
+            "log_likelihood": xr.Dataset({"y": (("chain", "draw", "sample"), logs)}),
+        }
+    )
+    for i in range(6):
+        efficiency = array_stats.ess(np.exp(logs[..., i]), method="mean") / 1200
+        theirs = arviz_stats.loo(tree, pointwise=True, reff=efficiency)
+        assert found.log_density[i] == pytest.approx(float(theirs.elpd_i[i]), rel=1e-12)
+        assert found.pareto_k[i] == pytest.approx(float(theirs.pareto_k[i]), rel=1e-9)
+
+
+def test_weights_that_are_all_the_same_need_no_smoothing():
+    found = left_out(np.full((4, 100, 2), [-1.0, 800.0]))
+    np.testing.assert_allclose(found.log_density, [-1.0, 800.0], rtol=1e-14)
+    assert (found.standard_error < 1e-12).all()
+    assert (found.pareto_k == -np.inf).all()
+
+
+def test_a_tail_that_cannot_be_fitted_is_not_trusted():
+    """Weights of few values: of the tail, more than a quarter are at its lower end."""
+    weights = np.repeat([1.0, 2.0, 3.0], [900, 90, 10])
+    logs = -np.log(np.random.default_rng(20).permutation(weights)).reshape(2, 500, 1)
+    found = left_out(logs)
+    assert found.log_density[0] == pytest.approx(-np.log(weights.mean()), rel=1e-12)
+    assert found.pareto_k[0] == found.standard_error[0] == np.inf
+
+
+def test_a_tail_that_is_flat_is_left_as_it_is():
+    """Half of the draws give a sample the density 1, half 3: the mean of the inverse is 2/3."""
+    logs = np.log(np.where(np.arange(1000) % 2, 1.0, 3.0)).reshape(2, 500, 1)
+    found = left_out(np.random.default_rng(13).permuted(logs, axis=1))
+    assert found.log_density[0] == pytest.approx(np.log(1.5), rel=1e-12)
+    assert found.pareto_k[0] == -np.inf
+    assert 0.0 < found.standard_error[0] < 0.05
+
+
+def test_densities_of_any_size_have_the_same_errors():
+    line = Line(6)
+    logs = line.log_densities(wandering_draws(*line.posterior(), (4, 100), np.random.default_rng(14)))
+    small, large = left_out(logs), left_out(logs + 5000.0)
+    np.testing.assert_allclose(large.log_density - 5000.0, small.log_density, atol=1e-11)
+    np.testing.assert_allclose(large.standard_error, small.standard_error, rtol=1e-9)
+    np.testing.assert_allclose(large.pareto_k, small.pareto_k, rtol=1e-6)
+
+
+def test_draws_that_exclude_a_sample_have_no_weight():
+    logs = np.zeros((1, 40, 2))
+    logs[0, :20, 0] = -np.inf
+    logs[0, ::2, 1] = np.log(0.5)
+    found = left_out_from_wider(logs, 1)
+    assert found.log_density == pytest.approx(np.log(0.75))
+    assert found.effective == pytest.approx(20.0)
+    assert 0.0 < found.standard_error < np.inf
+
+
+def test_without_draws_nothing_is_known():
+    logs = np.full((1, 40, 2), -np.inf)
+    found = left_out_from_wider(logs, 0)
+    assert np.isnan(found.log_density)
+    assert found[1:] == (np.inf, 0.0)
+    logs[..., 1] = 0.0
+    assert left_out_from_wider(logs, 0) == (-np.inf, np.inf, pytest.approx(40.0))
+
+
+def test_one_draw_does_not_pass_for_many():
+    """All others having no weight, nothing scatters."""
+    log_weights = np.zeros((4, 100))
+    log_weights[2, 7] = 100.0
+    found = reweighted(log_weights, np.random.default_rng(15).normal(size=(4, 100)))
+    assert found.effective == pytest.approx(1.0)
+    assert found.standard_error == np.inf
+
+
+# --- Models beside each other -----------------------------------------------------------------------------------
+
+
+def test_a_difference_has_the_scatter_of_the_samples():
+    one, other = np.random.default_rng(16).normal(size=(2, 50))
+    found = difference(one, other)
+    assert found.difference == pytest.approx(one.sum() - other.sum())
+    assert found.standard_error == pytest.approx(np.sqrt(50) * np.std(one - other, ddof=1))
+    assert difference(other, one) == pytest.approx((-found.difference, found.standard_error))
+
+
+def score(weights, logs):
+    return np.log(np.asarray(weights) @ np.exp(logs)).sum(axis=-1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_stacking_is_the_best_point_of_a_grid(seed):
+    rng = np.random.default_rng(seed)
+    logs = rng.normal(size=(3, 60)) + rng.normal(size=(3, 1)) * 0.3
+    steps = np.linspace(0.0, 1.0, 101)
+    grid = np.array([(a, b, 1.0 - a - b) for a in steps for b in steps if a + b <= 1.0 + 1e-9])
+    on_grid = score(grid, logs)
+    weights = stacking_weights(logs)
+    assert weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert (weights >= 0.0).all()
+    assert score(weights, logs) >= on_grid.max() - 60 * 1e-5
+    assert np.abs(weights - grid[np.argmax(on_grid)]).max() < 0.02
+
+
+@pytest.mark.parametrize("models", [1, 2, 5, 8])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 30.0, 1000.0])
+def test_no_model_would_better_a_stack(models, size):
+    """Where the best is reached, more of any model gains nothing."""
+    rng = np.random.default_rng(models)
+    logs = size * rng.normal(size=(models, 40)) + rng.normal(size=40)
+    weights = stacking_weights(logs)
+    best = logs.max(axis=0)
+    densities = np.exp(logs - best)
+    assert ((densities / (weights @ densities)).mean(axis=1) < 1.0 + 1e-5).all()
+
+
+def test_a_model_that_is_best_everywhere_has_all_weight():
+    logs = np.random.default_rng(17).normal(size=(3, 30))
+    logs[1] = logs.max(axis=0) + 0.5
+    np.testing.assert_allclose(stacking_weights(logs), [0.0, 1.0, 0.0], atol=1e-4)
+
+
+def test_models_that_exclude_samples_of_each_other_are_both_needed():
+    logs = np.zeros((2, 10))
+    logs[0, 3] = logs[1, 7] = -np.inf
+    np.testing.assert_allclose(stacking_weights(logs), [0.5, 0.5], atol=1e-3)
+    np.testing.assert_allclose(stacking_weights(np.nan_to_num(logs, neginf=-1e4)), [0.5, 0.5], atol=1e-3)
+
+
+def test_weights_that_were_not_found_are_not_given(monkeypatch):
+    minimize = leave_one_out.minimize
+    stopped = {"ftol": 1e-14, "maxiter": 1}
+    monkeypatch.setattr(leave_one_out, "minimize", lambda *a, **k: minimize(*a, **{**k, "options": stopped}))
+    with pytest.raises(InferenceError, match="stacking did not converge"):
+        stacking_weights(np.random.default_rng(18).normal(size=(3, 60)))
+
+
+# --- What is refused --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: left_out(np.zeros((4, 100))), r"shape \(4, 100\): give \(chains, draws, samples\)"),
+        (lambda: left_out(np.zeros((4, 6, 2))), "has 24 draws: give 25 at least"),
+        (lambda: left_out(np.full((4, 50, 2), -np.inf)), "sample 0 is -inf at draw 0 of chain 0: give draws of the"),
+        (lambda: left_out_from_wider(np.zeros((4, 50, 2)), 2), "chosen is 2: give the place of one of 2 samples"),
+        (lambda: left_out_from_wider(np.full((4, 50, 2), np.nan), 1), "log_weights is nan at draw 0 of chain 0"),
+        (lambda: reweighted(np.zeros((4, 50)), np.full((4, 50), np.inf)), "log_density is inf at draw 0 of chain 0"),
+        (lambda: reweighted(np.zeros((4, 50)), np.zeros((4, 51))), r"\(4, 50\) and log_density \(4, 51\): give"),
+        (lambda: difference(np.zeros(4), np.zeros(5)), r"shapes \(4,\) and \(5,\): give those of the same samples"),
+        (lambda: difference(np.zeros(1), np.zeros(1)), "2 at least"),
+        (lambda: stacking_weights(np.zeros(4)), r"shape \(4,\): give \(models, samples\)"),
+        (lambda: stacking_weights(np.array([[0.0, np.nan]])), "model 0 has a log-density of nan of sample 1"),
+        (lambda: stacking_weights(np.full((2, 3), -np.inf)), "no model allows sample 0: remove it, or add one"),
+    ],
+)
+def test_what_cannot_be_is_refused(call, message):
+    with pytest.raises(ParameterError, match=message):
+        call()

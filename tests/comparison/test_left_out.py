@@ -1,0 +1,74 @@
+"""Samples of a record foretold from the others: next to events by inferring again, elsewhere by importance sampling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from helpers.contour_posteriors import CELL, swept
+from tactile_bayes.comparison.left_out import foretold_samples
+from tactile_bayes.contours import Parabola
+from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.load_cell import LoadCell, RandomWalk
+
+SETTINGS = SamplerSettings(ensembles=2, walkers=20, min_ess=250, max_r_hat=1.05)
+
+
+def problem_of(cell=CELL):
+    measured = cell.measure(swept(Parabola(0.5, 0.5), step=0.12), seed=4)
+    return contour_problem(measured, Assumptions("parabola", cell, friction=0.0, nuisances=()))
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return problem_of()
+
+
+@pytest.fixture(scope="module")
+def foretold(problem):
+    return foretold_samples(problem, sampled(problem, seed=1, settings=SETTINGS), seed=2, settings=SETTINGS)
+
+
+def inferred_without(problem, sample):
+    """Its log-density from a posterior of all the others, and the error of that."""
+    model = problem.model
+    kept = np.arange(problem.loaded.size) != sample
+    rest = problem._replace(model=problem.without(~kept), loaded=problem.loaded[kept])
+    draws = sampled(rest, seed=5, settings=SETTINGS).draws.samples
+    points = draws[:, :: max(1, draws.shape[1] // 1000)].reshape(-1, draws.shape[-1])
+    logs = model.likelihood.score(*model.loads_with_errors(points), model.noise_scale(points), pointwise=True)
+    of_sample = logs[:, sample]
+    weights = np.exp(of_sample - of_sample.max())
+    return logsumexp(of_sample) - np.log(of_sample.size), 3.0 * np.std(weights) / np.mean(weights) / weights.size**0.5
+
+
+def test_samples_at_events_are_foretold_as_if_inferred_without_them(problem, foretold):
+    """After snap-off, where importance sampling from the posterior is off; 3 times the error for autocorrelation."""
+    events = problem.model.likelihood.event_samples(problem.loaded)
+    for sample in events[:1, 3]:
+        exact, error = inferred_without(problem, sample)
+        assert np.isnan(foretold.pareto_k[sample])
+        assert abs(foretold.log_density[sample] - exact) < 4.0 * np.hypot(error, foretold.standard_error[sample])
+
+
+@pytest.mark.slow
+def test_other_samples_are_foretold_by_importance_sampling(problem, foretold):
+    sample = int(problem.model.likelihood.event_samples(problem.loaded)[0, 1]) + 5
+    exact, error = inferred_without(problem, sample)
+    assert foretold.pareto_k[sample] < 0.5
+    assert abs(foretold.log_density[sample] - exact) < 4.0 * np.hypot(error, foretold.standard_error[sample])
+    assert np.isfinite(foretold.standard_error).all()
+
+
+@pytest.mark.slow
+def test_of_a_cell_that_drifts_samples_at_events_are_left_out():
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.002, moment=0.001))
+    problem = problem_of(cell)
+    brief = SamplerSettings(ensembles=2, max_steps=40)
+    found = foretold_samples(problem, sampled(problem, seed=1, settings=brief), seed=2, settings=brief)
+    events = np.zeros(problem.loaded.size, dtype=bool)
+    events[problem.model.likelihood.event_samples(problem.loaded)] = True
+    np.testing.assert_array_equal(np.isnan(found.log_density), events)

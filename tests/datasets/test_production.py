@@ -1,0 +1,524 @@
+"""Data sets in the making: the same whoever makes them, and whatever befalls those who do."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from helpers.data_sets import PLAIN, RICH, changed, hashes
+from helpers.tasks import alive, wait_until
+from tactile_bayes.datasets import generate, production, verify
+from tactile_bayes.datasets.manifest import read_manifest, write_manifest
+from tactile_bayes.datasets.specification_text import toml_of
+from tactile_bayes.errors import ParameterError, SpecificationError
+
+TESTS = Path(__file__).resolve().parents[1]
+on_linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+
+MANY = changed(PLAIN, records=120, shard_records=4)
+"""Thirty shards, each of some ten milliseconds."""
+
+GENERATE = "import sys; from tactile_bayes.datasets import generate; generate(*sys.argv[1:3], workers=int(sys.argv[3]))"
+
+
+def start(spec, out, workers, **options):
+    """A process of its own that makes a data set."""
+    return subprocess.Popen(
+        [sys.executable, "-c", GENERATE, str(spec), str(out), str(workers)],
+        cwd=TESTS,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        **options,
+    )
+
+
+def children(pid):
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def whole_shards(folder):
+    """Names of the shards that the manifest states, all of them checked."""
+    manifest = read_manifest(folder)
+    for shard in manifest.shards:
+        assert hashlib.sha256((folder / shard.file).read_bytes()).hexdigest() == shard.sha256, shard.file
+    return [shard.file for shard in manifest.shards]
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory):
+    """Those thirty shards made in one go: their hashes, and the specification's file."""
+    folder = tmp_path_factory.mktemp("many")
+    path = folder / "many.toml"
+    path.write_text(toml_of(MANY), encoding="utf-8")
+    generate(path, folder / "out", workers=1)
+    return hashes(folder / "out"), path
+
+
+# ---- the same numbers
+
+
+@pytest.mark.slow
+def test_neither_workers_nor_order_change_a_byte(tmp_path):
+    for workers in (1, 2):
+        assert generate(RICH, tmp_path / str(workers), workers=workers) == tmp_path / str(workers) / "manifest.json"
+    one = hashes(tmp_path / "1")
+    assert set(one) == {"README.md", "manifest.json", *(f"shard-00000{shard}.nc" for shard in range(3))}
+    assert one == hashes(tmp_path / "2")
+
+
+@pytest.mark.slow
+def test_order_does_not_change_a_byte(many, tmp_path, monkeypatch):
+    def backwards(function, tasks, **options):
+        yield from ((task, function(task)) for task in reversed(tasks))
+
+    monkeypatch.setattr(production, "run_tasks", backwards)
+    generate(MANY, tmp_path, workers=1)
+    assert hashes(tmp_path) == many[0]
+
+
+def test_manifest_states_everything(tmp_path):
+    spec = changed(PLAIN, contours=[{"family": "circle", "r": 0.5, "q": {"uniform": [0.5, 1.2]}}])
+    path = generate(spec, tmp_path, workers=1)
+    stated = json.loads(path.read_text())
+    assert stated["complete"] is True
+    assert (stated["records"], stated["seed"], stated["name"]) == (24, 7, "parabolas")
+    assert set(stated["versions"]) >= {"python", "tactile-bayes", "numpy", "scipy", "h5py"}
+    assert stated["redrawn"]["out of reach"] > 0
+    for shard in stated["shards"]:
+        content = (tmp_path / shard["file"]).read_bytes()
+        assert (hashlib.sha256(content).hexdigest(), len(content)) == (shard["sha256"], shard["bytes"])
+    assert (
+        sum(shard["redrawn"].get("out of reach", 0) for shard in stated["shards"]) == stated["redrawn"]["out of reach"]
+    )
+    card = (tmp_path / "README.md").read_text()
+    assert f"{sum(stated['redrawn'].values())} contours were drawn again (" in card
+    assert "| circle: q | uniform from 0.5 to 1.2 |" in card
+    verify(tmp_path)
+
+
+def test_progress_is_told(tmp_path):
+    told = []
+    generate(PLAIN, tmp_path, workers=1, progress=told.append)
+    assert [(p.records, p.wanted, p.made) for p in told] == [(8, 24, 8), (16, 24, 16), (24, 24, 24)]
+    (tmp_path / "shard-000001.nc").unlink()
+    generate(PLAIN, tmp_path, workers=1, progress=told.append)
+    assert told[-1][:3] == (24, 24, 8)
+    generate(PLAIN, tmp_path, workers=1, progress=told.append)
+    assert len(told) == 4
+
+
+# ---- killed
+
+
+@pytest.mark.slow
+@on_linux
+@pytest.mark.parametrize(
+    ("workers", "kills"),
+    [(2, 2), pytest.param(1, 8, marks=pytest.mark.slow), pytest.param(2, 8, marks=pytest.mark.slow)],
+)
+def test_killed_at_random_moments_it_goes_on(many, tmp_path, workers, kills):
+    """From when the folder is there: what the manifest states is whole, and nobody works on."""
+    expected, spec = many
+    moments, out = random.Random(workers), tmp_path / "out"
+    for _ in range(kills):
+        run = start(spec, out, workers)
+        wait_until(lambda run=run: run.poll() is not None or (out / "manifest.json").exists())
+        goal = len(list(out.glob("shard-*.nc"))) + moments.randrange(1, 24 // kills + 2)
+        wait_until(lambda run=run, goal=goal: run.poll() is not None or len(list(out.glob("shard-*.nc"))) >= goal)
+        time.sleep(moments.uniform(0.0, 0.02))
+        team = children(run.pid) if run.poll() is None else []
+        run.kill()
+        _, words = run.communicate()
+        assert run.returncode in (0, -signal.SIGKILL), words
+        wait_until(lambda team=team: not any(map(alive, team)), seconds=5.0)
+        whole_shards(out)
+    generate(spec, out, workers=1)
+    assert hashes(out) == expected
+    verify(out)
+
+
+@pytest.mark.slow
+@on_linux
+def test_what_was_noted_is_not_made_again(many, tmp_path):
+    expected, spec = many
+    out = tmp_path / "out"
+    slow = GENERATE.replace(
+        "; generate(", "; from tactile_bayes.datasets import production; production._NOTING = 1e9; generate("
+    )
+    run = subprocess.Popen([sys.executable, "-c", slow, str(spec), str(out), "1"], cwd=TESTS)
+    wait_until(lambda: (out / "manifest.json").exists() and len(read_manifest(out).shards) > 5)
+    run.kill()
+    run.wait()
+    noted = whole_shards(out)
+    times = {name: (out / name).stat().st_mtime_ns for name in noted}
+    generate(spec, out, workers=1)
+    assert {name: (out / name).stat().st_mtime_ns for name in noted} == times
+    assert hashes(out) == expected
+
+
+@pytest.mark.slow
+@on_linux
+def test_a_killed_worker_is_replaced(many, tmp_path):
+    expected, spec = many
+    out = tmp_path / "out"
+    run = start(spec, out, 2)
+    wait_until(lambda: len(list(out.glob("shard-*.nc"))) > 2 or run.poll() is not None)
+    victims = [pid for pid in children(run.pid) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    os.kill(victims[0], signal.SIGKILL)
+    _, words = run.communicate(timeout=60)
+    assert run.returncode == 0, words
+    assert hashes(out) == expected
+
+
+@pytest.mark.slow
+@on_linux
+@pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
+def test_an_interrupt_leaves_what_is_finished(many, tmp_path, workers):
+    expected, spec = many
+    out = tmp_path / "out"
+    run = start(spec, out, workers)
+    wait_until(lambda: len(list(out.glob("shard-*.nc"))) > 2)
+    finished = {path.name for path in out.glob("shard-*.nc")}
+    os.killpg(run.pid, signal.SIGINT)
+    _, words = run.communicate(timeout=10)
+    assert words.count("Traceback") == 1, words
+    assert words.rstrip().endswith("KeyboardInterrupt")
+    assert not list(out.glob(".*.tmp*"))
+    assert len(set(whole_shards(out)) & finished) >= len(finished) - workers
+    generate(spec, out, workers=1)
+    assert hashes(out) == expected
+
+
+@pytest.mark.slow
+@on_linux
+def test_a_cluster_makes_the_same_though_a_worker_is_killed(many, tmp_path):
+    """A scheduler and two workers, each a process of its own, on loopback."""
+    pytest.importorskip("distributed")
+    expected, spec = many
+    address = tmp_path / "scheduler.json"
+    team = []
+
+    def launch(kind, *options):
+        team.append(
+            subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *map(str, options)],
+                cwd=tmp_path,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+        )
+
+    try:
+        launch("scheduler", "--host", "127.0.0.1", "--port", 0, "--scheduler-file", address)
+        wait_until(lambda: address.exists() and address.read_text().rstrip().endswith("}"))
+        where = json.loads(address.read_text())["address"]
+        for _ in range(2):
+            launch("worker", where, "--no-nanny", "--nthreads", 1, "--local-directory", tmp_path)
+
+        def kill_one(state):
+            if state.made >= 12 and team[1].poll() is None:
+                team[1].kill()
+
+        out = tmp_path / "out"
+        generate(spec, out, scheduler=where, progress=kill_one)
+        assert team[1].wait(10) == -signal.SIGKILL
+        assert team[2].poll() is None
+        assert hashes(out) == expected
+    finally:
+        for process in reversed(team):
+            process.kill()
+            process.wait()
+
+
+def test_no_scheduler_is_told(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    with pytest.raises(ParameterError, match=r"'nowhere' is no address of a Dask scheduler \(missing port number"):
+        generate(PLAIN, tmp_path, scheduler="nowhere")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ParameterError, match=r"Dask is not installed: pip install 'tactile-bayes\[cluster\]'"):
+        generate(PLAIN, tmp_path, scheduler="tcp://127.0.0.1:1")
+
+
+# ---- folders
+
+
+@pytest.mark.slow
+def test_folders_with_blanks_and_relative_ones(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a spec.toml").write_text(toml_of(PLAIN), encoding="utf-8")
+    assert generate("a spec.toml", "deep in/the middle", workers=2) == tmp_path / "deep in/the middle/manifest.json"
+    verify("deep in/the middle")
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
+    path = tmp_path / "taken"
+    path.touch()
+    with pytest.raises(SpecificationError, match="taken is a file: give a folder"):
+        generate(PLAIN, path)
+
+
+def test_a_folder_that_cannot_be_written_says_so(tmp_path, monkeypatch):
+    def refused(*arguments, **options):
+        raise PermissionError(errno.EACCES, "Permission denied", "there")
+
+    monkeypatch.setattr(Path, "mkdir", refused)
+    with pytest.raises(PermissionError, match="there"):
+        generate(PLAIN, tmp_path / "there", workers=1)
+
+
+FULL = f"""
+import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+{GENERATE}
+"""
+
+
+@pytest.mark.slow
+@on_linux
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_disk_that_takes_no_more_is_told_and_leaves_no_half_files(tmp_path, workers):
+    """Files can grow to 40 kB only: that stops a shard in its middle, as a full disk would."""
+    (tmp_path / "spec.toml").write_text(toml_of(PLAIN), encoding="utf-8")
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", FULL, str(tmp_path / "spec.toml"), str(out), str(workers)]
+    done = subprocess.run(command, cwd=TESTS, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert f"OSError: [Errno 27] File too large: '{out}{os.sep}shard-00000" in done.stderr
+    assert [path.name for path in out.iterdir()] == ["manifest.json"]
+    generate(PLAIN, out, workers=1)
+    verify(out)
+
+
+def test_another_data_set_is_left_alone(tmp_path):
+    generate(PLAIN, tmp_path, workers=1)
+    before = hashes(tmp_path)
+    for change, message in {
+        "seed": ({"seed": 8}, r"\('parabolas'\), seed is 7 there and is 8 here: choose another folder, or give"),
+        "law": (
+            {"contours": [{**PLAIN["contours"][0], "q": 0.5}]},
+            r"\), contours\[0\]\.q is \{'uniform': \[0\.3, 0\.7\]\} there and is 0\.5 here: choose",
+        ),
+        "other law": (
+            {"contours": [{**PLAIN["contours"][0], "q": {"normal": [0.5, 0.1]}}]},
+            r"\), contours\[0\]\.q is \{'uniform': \[0\.3, 0\.7\]\} there and is \{'normal': \[0\.5, 0\.1\]\} here: ch",
+        ),
+        "more contours": (
+            {"contours": [*PLAIN["contours"], {"family": "circle", "r": 1.0, "q": {"each": [0.3, 0.5]}}]},
+            r"\), contours\[1\] is left out there and is of family 'circle' here: choose",
+        ),
+        "other family": (
+            {"contours": [{"family": "circle", "r": 1.0, "q": 0.5}]},
+            r"family is 'parabola' there and is 'circle' here, .* 2 more: choose",
+        ),
+        "new table": (
+            {"rod": {"length": 0.2, "flexural_rigidity": 2.4e-3}, "scan__bases": [[0.1, 0.2]] * 9},
+            r"\), scan\.bases is left out there and is \[\[0\.1, .{52}… here, rod\.length is left out there and is",
+        ),
+        "table": ({"scan__friction": 0.1}, r"\), scan\.friction is left out there and is 0\.1 here: choose"),
+        "many": ({"name": "n", "seed": 8, "records": 48, "precision": "single"}, r" here, 1 more: choose another"),
+        "more": ({"records": 48}, r"\), records is 24 there and is 48 here: a data set does not grow: choose another"),
+    }.values():
+        with pytest.raises(SpecificationError, match="holds a data set of another specification .*" + message):
+            generate(changed(PLAIN, **change), tmp_path)
+    assert hashes(tmp_path) == before
+
+
+def test_a_data_set_without_name_has_none_in_the_refusal(tmp_path):
+    generate(changed(PLAIN, name=None), tmp_path, workers=1)
+    with pytest.raises(SpecificationError, match="another specification, seed is 7 there"):
+        generate(changed(PLAIN, name=None, seed=8), tmp_path)
+
+
+def test_defaults_that_are_written_out_are_no_other_data_set(tmp_path):
+    generate(PLAIN, tmp_path, workers=1)
+    before = hashes(tmp_path)
+    generate(changed(PLAIN, scan__margin=0.1, precision="double", description=""), tmp_path, workers=1)
+    assert hashes(tmp_path) == before
+
+
+@pytest.mark.slow
+def test_a_run_that_made_nothing_stands_in_nobodys_way(tmp_path):
+    """Nor do shards that its manifest did not come to state."""
+    wrong = changed(PLAIN, contours=[{"family": "parabola", "a": 1.0, "q": -0.5}])
+    with pytest.raises(SpecificationError, match="drawn 1000 times"):
+        generate(wrong, tmp_path, workers=1)
+    (tmp_path / "shard-000007.nc").write_text("of a run that was killed")
+    generate(PLAIN, tmp_path, workers=1)
+    verify(tmp_path)
+
+
+CARDS = {
+    "plain": ({}, ["3 NetCDF files"], ["Of 48", "strained", "drift", "Records go", "32 bits"]),
+    "one file": ({"shard_records": 24}, ["in 1 NetCDF file, "], []),
+    "thick": (
+        {"rod": {"length": 1.0, "flexural_rigidity": 1.0, "diameter": 0.1}},
+        ["In 24 of 24 records the rod is strained beyond 0.1 (`truth_largest_strain`)"],
+        [],
+    ),
+    "fixed angles": (
+        {"scan": {"samples": 24, "from_degrees": -20, "to_degrees": -10}},
+        ["driven far enough, reaches, whatever the drive angles above", "Of 48 sweeps, 48 have no sample in contact"],
+        [],
+    ),
+    "drift": (
+        {"load_cell__ornstein_uhlenbeck_force": 0.01},
+        [
+            "| load cell: ornstein_uhlenbeck_time | 100 |",
+            "What a record's drift and its unknown bias came to is not kept",
+        ],
+        [],
+    ),
+    "single": (
+        {"precision": "single", "load_cell__force_range": 1.0},
+        ["Readings at the end of the load cell's range are that end rounded to 32 bits"],
+        [],
+    ),
+    "one list": (
+        {"load_cell__force_noise": {"each": [0.01, 0.02, 0.03]}},
+        ["Records go through the 3 entries of load_cell.force_noise, 8 times."],
+        [],
+    ),
+    "lists in step": (
+        {
+            "scan": {"samples": 24, "bases": [[{"each": [0.0, 0.1]}, 0.0]]},
+            "load_cell__force_noise": {"each": [0.01, 0.02], "axis": "noise"},
+            "load_cell__moment_noise": {"each": [0.1, 0.2], "axis": "noise"},
+        },
+        [
+            "Records go through all 4 combinations of the lists, 6 times, the last of these fastest: "
+            "scan.bases[0][0]; noise (load_cell.moment_noise and load_cell.force_noise in step).",
+            "| load cell: force_noise | each of 0.01, 0.02, on the axis noise |",
+        ],
+        [],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CARDS)
+def test_the_card_says_what_else_there_is_to_know(name, tmp_path):
+    change, said, unsaid = CARDS[name]
+    generate(changed(PLAIN, **change), tmp_path, workers=1)
+    card = (tmp_path / "README.md").read_text()
+    for words in said:
+        assert words in card
+    for words in unsaid:
+        assert words not in card
+
+
+@pytest.mark.parametrize("name", ["shard-000000.nc", "README.md"])
+def test_files_of_unknown_origin_are_left_alone(tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(SpecificationError, match=f"holds {name}, but no manifest.json: choose another folder"):
+        generate(PLAIN, tmp_path)
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_comments_in_the_specification_may_change(tmp_path):
+    path = tmp_path / "spec.toml"
+    path.write_text(toml_of(PLAIN), encoding="utf-8")
+    generate(path, tmp_path / "out", workers=1)
+    before = hashes(tmp_path / "out")
+    path.write_text("# still the same\n" + toml_of(PLAIN), encoding="utf-8")
+    (tmp_path / "out" / "shard-000001.nc").unlink()
+    generate(path, tmp_path / "out", workers=1)
+    assert hashes(tmp_path / "out") == before
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_other_versions_do_not_go_on(tmp_path, complete):
+    """Neither with what was never complete, nor with what has lost a shard since."""
+    generate(PLAIN, tmp_path, workers=1)
+    manifest = read_manifest(tmp_path)
+    versions = {**manifest.versions, "numpy": "1.0"}
+    shards = manifest.shards if complete else manifest.shards[:2]
+    write_manifest(type(manifest)(**{**vars(manifest), "versions": versions, "shards": shards}), tmp_path)
+    if complete:
+        generate(PLAIN, tmp_path, workers=1)
+        verify(tmp_path)
+        assert read_manifest(tmp_path).versions["numpy"] == "1.0"
+        (tmp_path / "shard-000001.nc").unlink()
+    with pytest.raises(SpecificationError, match=r"was made with numpy 1\.0 \(now .*: go on with those versions, or"):
+        generate(PLAIN, tmp_path, workers=1)
+
+
+def test_two_runs_at_once_in_one_folder_are_refused(tmp_path):
+    pytest.importorskip("fcntl")
+    begun, go_on = threading.Event(), threading.Event()
+
+    def wait(_):
+        begun.set()
+        go_on.wait(20)
+
+    first = threading.Thread(target=lambda: generate(PLAIN, tmp_path, workers=1, progress=wait))
+    first.start()
+    try:
+        assert begun.wait(20)
+        with pytest.raises(SpecificationError, match=r"another run is at work on .*: wait for it, or stop it"):
+            generate(PLAIN, tmp_path)
+    finally:
+        go_on.set()
+        first.join()
+    verify(tmp_path)
+
+
+def test_an_impossible_specification_ends_with_the_counts(tmp_path):
+    spec = changed(PLAIN, contours=[{"family": "circle", "r": 0.5, "q": 2.0}])
+    with pytest.raises(SpecificationError, match=r"drawn 1000 times.* \(1000 out of reach\): bring contours and"):
+        generate(spec, tmp_path, workers=1)
+
+
+UNGUARDED = """
+from helpers.data_sets import PLAIN
+from tactile_bayes.datasets import generate
+generate(PLAIN, "out", workers=2)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_without_guard_is_told_so(tmp_path):
+    """Its processes find the folder locked, or must not start others: either way they end, and it says why."""
+    path = tmp_path / "unguarded.py"
+    path.write_text(UNGUARDED)
+    environment = {**os.environ, "PYTHONPATH": str(TESTS)}
+    done = subprocess.run(
+        [sys.executable, path], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert "TaskError: a process for the work ended before it began" in last
+    assert "if __name__ == '__main__'" in last
+    assert done.stderr.count("Traceback") <= 3
+
+
+MEMORY = """
+import resource, sys
+from helpers.data_sets import PLAIN, changed
+from tactile_bayes.datasets import generate
+spec = changed(PLAIN, records=int(sys.argv[2]), shard_records=50, scan__samples=180)
+generate(spec, sys.argv[1], workers=1)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@on_linux
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_number_of_records(tmp_path):
+    """Ten times the records, at most a tenth more memory."""
+    few, many = (
+        int(subprocess.check_output([sys.executable, "-c", MEMORY, tmp_path / str(n), str(n)], cwd=TESTS))
+        for n in (200, 2000)
+    )
+    assert many < 1.1 * few

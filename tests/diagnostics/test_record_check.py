@@ -1,0 +1,158 @@
+"""The check of a record against predictions whose law is known, and against posteriors of right and wrong families."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+from helpers.predicted_records import CELL, ideal, predicted, with_readings
+from tactile_bayes.contours import paper_profile
+from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.load_cell import LoadCell, RandomWalk
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.sweep import scan
+
+SHORT = SamplerSettings(ensembles=4, walkers=12, max_steps=60, min_ess=1e9)
+
+CELLS = {
+    "white": CELL,
+    "outliers": LoadCell(force_noise=0.05, moment_noise=0.02, degrees_of_freedom=2.5),
+    "correlated": LoadCell(force_noise=0.05, moment_noise=0.02, correlation=(0.5, 0.5, 0.5)),
+    "drifting": LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(moment=0.02, force=0.05)),
+    "unknown zero": LoadCell(force_noise=0.05, moment_noise=0.02, bias_uncertainty=(0.1, 0.1, 0.1)),
+    "in steps": LoadCell(force_noise=0.05, moment_noise=0.02, force_resolution=0.1, moment_resolution=0.04),
+}
+
+
+def readings(cell, seed):
+    loads = np.stack([ideal(name) for name in CHANNELS], axis=-1)
+    return dict(zip(CHANNELS, np.moveaxis(cell.simulate(loads, seed=seed), -1, 0), strict=True))
+
+
+def mean_residual(tree, name):
+    observed = tree["observed_data"].to_dataset()[name]
+    return (observed - tree["posterior_predictive"].to_dataset()[name].median(("chain", "draw"))).values
+
+
+@pytest.mark.parametrize(
+    "name", ["white", "drifting", *(pytest.param(n, marks=pytest.mark.slow) for n in list(CELLS)[1:] if n[0] != "d")]
+)
+def test_p_values_are_uniform_where_the_posterior_is_a_point(name):
+    """Kolmogorov's test of 30 records, p = 0.001; the predictions are the same for all, which 300 hardly show."""
+    cell = CELLS[name]
+    tree = predicted(cell, chains=1, draws=300)
+    p_values = [
+        float(check_record(with_readings(tree, **readings(cell, seed))).overall_p_value) for seed in range(100, 130)
+    ]
+    assert stats.kstest(p_values, "uniform").pvalue > 1e-3
+
+
+def test_the_size_of_the_noise_does_not_matter():
+    tree = predicted()
+    quiet = {
+        name: tree["observed_data"].to_dataset()[name].values - 0.8 * mean_residual(tree, name) for name in CHANNELS
+    }
+    other = check_record(with_readings(tree, **quiet))
+    assert other.passed
+    np.testing.assert_allclose(other.score, check_record(tree).score, atol=0.05)
+
+
+def test_walkers_that_are_lost_predict_nothing():
+    tree = predicted()
+    stats_of_draws = tree["sample_stats"].to_dataset()
+    stats_of_draws["lp"][0, :5] = -1e3
+    predictive = tree["posterior_predictive"].to_dataset().copy(deep=True)
+    predictive["force_x"][0, :5] = 0.0
+    other = tree.copy()
+    other["sample_stats"], other["posterior_predictive"] = xr.DataTree(stats_of_draws), xr.DataTree(predictive)
+    check = check_record(other)
+    assert check.attrs["predictions"] == 995
+    assert check.score.max() < 5.0
+    bump = np.where(ideal("holding_moment") != 0.0, 0.2, 0.0)
+    assert not check_record(with_readings(other, force_x=readings(CELL, 7)["force_x"] + bump)).passed
+
+
+def test_a_smooth_misfit_fails_and_is_found_where_it_is():
+    tree = predicted()
+    angle, sweep = ideal("drive_angle"), ideal("sweep")
+    bump = (sweep == 0) & (angle > 1.8) & (angle < 2.4)
+    check = check_record(with_readings(tree, force_y=readings(CELL, 7)["force_y"] + 0.15 * bump))
+    assert not check.passed
+    assert check.overall_p_value == pytest.approx(1.0 / 1001.0)
+    assert check.score.sel(discrepancy="runs").idxmax().item() == "force_y"
+    worst = check.sel(channel="force_y")
+    assert worst.worst_sweep == 0
+    assert 1.75 < worst.worst_from < worst.worst_to < 2.45
+    assert worst.worst_residual == pytest.approx(0.15, abs=5.0 * 0.05 / np.sqrt(8))
+    assert worst.neighbour_noise == pytest.approx(0.05, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    ("discrepancy", "change"),
+    [
+        ("largest", lambda loaded: 8.0 * (np.arange(loaded.size) == 40)),
+        ("loaded", lambda loaded: 3.0 * loaded * (-1.0) ** np.arange(loaded.size)),
+        ("zero", lambda loaded: 2.0 * ~loaded),
+    ],
+)
+def test_each_discrepancy_has_its_cause(discrepancy, change):
+    tree = predicted()
+    loaded = ideal("holding_moment") != 0.0
+    other = with_readings(tree, force_x=readings(CELL, 7)["force_x"] + 0.05 * change(loaded))
+    check = check_record(other)
+    assert not check.passed
+    scores = check.score.sel(channel="force_x")
+    assert scores.idxmax().item() == discrepancy
+    assert check.p_value.sel(channel="force_x", discrepancy=discrepancy) == pytest.approx(1.0 / 1001.0)
+
+
+def test_a_channel_that_was_not_measured_is_left_out():
+    tree = predicted()
+    tree["posterior_predictive"] = tree["posterior_predictive"].to_dataset().drop_vars("force_x")
+    check = check_record(with_readings(tree, force_x=np.full(ideal("force_x").size, np.nan)))
+    assert check.channel.values.tolist() == ["holding_moment", "force_y"]
+    assert check.passed
+
+
+def test_few_predictions_say_so_or_bound_the_false_alarms():
+    assert check_record(predicted(chains=1, draws=199)).attrs["false_alarm"] == 1.0 / 200.0
+    with pytest.raises(InferenceError, match="holds 20 predictions of the record, too few to compare it with"):
+        check_record(predicted(chains=1, draws=20))
+    with pytest.raises(ParameterError, match=r"false_alarm is 1\.0: give a probability between 0 and 1"):
+        check_record(predicted(chains=1, draws=100), false_alarm=1.0)
+
+
+@pytest.mark.parametrize(("profile", "passes"), [("II", True), ("IV", False)])
+def test_a_parabola_is_told_from_what_is_none(profile, passes):
+    measured = CELL.measure(scan(paper_profile(profile, q=0.5), drive_step=0.1).record, seed=1)
+    check = check_record(infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=SHORT))
+    assert check.passed == passes
+    assert check.attrs["false_alarm"] < 2e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in CELLS if name != "outliers"])
+def test_records_of_the_right_family_pass(name):
+    """No alarm in 12 records of each cell: false alarm of the test 6 % if the p-values were not conservative."""
+    contour = paper_profile("II", q=0.5)
+    p_values = []
+    for seed in range(12):
+        measured = CELLS[name].measure(scan(contour, drive_step=np.radians(2.0)).record, seed=seed)
+        result = infer_contour(measured, load_cell=CELLS[name], nuisances=[], seed=seed, settings=SHORT)
+        p_values.append(float(check_record(result).overall_p_value))
+    assert min(p_values) > 5e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [0.02, 0.05, 0.1])
+def test_profile_iv_is_no_parabola(noise):
+    for seed in range(4):
+        cell = LoadCell(force_noise=noise, moment_noise=0.4 * noise)
+        measured = cell.measure(scan(paper_profile("IV", q=0.5), drive_step=np.radians(2.0)).record, seed=seed)
+        result = infer_contour(measured, load_cell=cell, nuisances=[], seed=seed, settings=SHORT)
+        assert not check_record(result).passed

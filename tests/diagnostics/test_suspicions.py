@@ -1,0 +1,61 @@
+"""Wrong units and signs, told from the record alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_bayes.contours import Circle, paper_profile
+from tactile_bayes.diagnostics.suspicions import suspicions
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import in_frame
+from tactile_bayes.runs.demonstration import LOAD_CELL
+from tactile_bayes.sweep import scan
+
+STEP = 0.05
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+RECORD = CELL.measure(scan(paper_profile("II", q=0.5), drive_step=STEP).record, seed=1)
+
+
+@pytest.mark.parametrize(
+    "contour", [*(paper_profile(name, q=0.3) for name in ("I", "II", "III", "IV")), Circle(0.1, 0.7)]
+)
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+def test_a_right_record_is_not_suspected(contour, direction):
+    record = scan(contour, direction=direction, drive_step=STEP).record
+    assert suspicions(record) == ()
+    assert suspicions(in_frame(CELL.measure(record, seed=1), "turning")) == ()
+
+
+def test_what_is_unloaded_or_missing_is_not_suspected(measured):
+    assert suspicions(measured, LOAD_CELL) == ()
+    alone = RECORD.copy(deep=True)
+    alone["force_x"][:] = alone["force_y"][:] = np.nan
+    assert suspicions(alone) == ()
+    nothing = RECORD.assign({name: 0.0 * RECORD[name] for name in ("holding_moment", "force_x", "force_y")})
+    assert suspicions(nothing) == ()
+
+
+@pytest.mark.parametrize(
+    ("factors", "words"),
+    [
+        ({"force_x": 1e3, "force_y": 1e3}, "Forces reach 1.1"),
+        ({"force_x": 1e3, "force_y": 1e3, "holding_moment": 1e3}, "EI/L², more than such a rod can carry: check the"),
+        ({"holding_moment": 1e3}, "L times the force, but no contact is further from the pivot than L: check the"),
+        ({"force_x": 1e-3, "force_y": 1e-3}, "L times the force, but no contact is further from the pivot than L"),
+        (dict.fromkeys(("force_x", "force_y", "holding_moment"), 1e-3), "only, which hardly bends such a rod: check"),
+        ({"force_y": -1.0}, "force_y is negative in contact, but the object pushes the pivot's support up: its sign"),
+        ({"holding_moment": -1.0}, "The holding moment has the sign of contacts on the other side in every sweep"),
+    ],
+)
+def test_wrong_units_and_signs_are_suspected(factors, words):
+    found = suspicions(RECORD.assign({name: factor * RECORD[name] for name, factor in factors.items()}))
+    assert len(found) == 1
+    assert words in found[0]
+
+
+def test_the_unit_of_force_is_told_for_si(measured):
+    wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
+    unit = Rod(measured.rod_length, measured.rod_flexural_rigidity).force_unit
+    assert f"(with EI/L² = {unit:.3g} N)" in suspicions(wrong)[0]

@@ -1,0 +1,171 @@
+"""Verdicts: the cause comes first, and what is right is said to be."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.predicted_records import CELL, ideal, predicted, with_readings
+from tactile_bayes.contours import paper_profile
+from tactile_bayes.diagnostics.verdicts import verdicts
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.load_cell import LoadCell, RandomWalk
+from tactile_bayes.record import CHANNELS
+from tactile_bayes.sweep import scan
+
+
+def changed(tree, group, **values):
+    """The tree with other draws of parameters in a group."""
+    other = tree.copy()
+    draws = {name: (("chain", "draw"), np.atleast_2d(v)) for name, v in values.items()}
+    other[group] = xr.DataTree(xr.Dataset(draws))
+    return other
+
+
+def readings(tree):
+    return {name: tree["observed_data"].to_dataset()[name].values for name in CHANNELS}
+
+
+def test_of_a_good_result_all_is_well():
+    found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
+    assert len(found) == 1
+    assert found[0].startswith("All is well: the ensembles agree, and the record looks like what they predict (p = 0.")
+
+
+def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
+    measured = CELL.measure(scan(paper_profile("IV", q=0.5), drive_step=0.1).record, seed=1)
+    short = SamplerSettings(ensembles=2, walkers=26, max_steps=40)
+    found = verdicts(infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=short))
+    assert re.match(
+        "The family parabola and the rig as assumed do not describe the record: none of [0-9]+ records that the "
+        "posterior predicts is so far off. Worst is (holding_moment|force_x|force_y), whose ",
+        found[0],
+    )
+    assert found[0].endswith(
+        "Do not use this contour. It may be the family or the rig. Try another family (--family shape-free, or "
+        "compare), or infer more of the rig (--nuisance friction, gain, drift, lever, backlash, "
+        "suspension_compliance); a rod that is not straight or not uniform looks like this, too."
+    )
+    assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 40 steps")
+    assert found[2].startswith("The noise is ")
+    assert found[2].endswith(" as stated: the rest is misfit, no noise.")
+
+
+def test_a_forgotten_tare_is_told_with_its_size():
+    tree = predicted()
+    found = verdicts(with_readings(tree, force_y=readings(tree)["force_y"] + 0.3))
+    assert found[0].startswith("Without load the cell does not read what is stated: force_y is off by 0.3")
+    assert found[0].endswith("or give LoadCell.from_zero_load(record).")
+    assert found[1].startswith("The family parabola and the rig as assumed do not describe the record")
+    assert "sweep" in found[1]
+
+
+def test_forces_in_another_unit_come_first():
+    tree = predicted()
+    thousandfold = {name: 1e3 * readings(tree)[name] for name in ("force_x", "force_y")}
+    found = verdicts(with_readings(tree, **thousandfold))
+    assert found[0].startswith("Forces reach 1.1")
+    assert found[1].startswith("The family parabola and the rig as assumed do not describe the record")
+
+
+def test_a_flipped_moment_comes_first():
+    tree = predicted()
+    found = verdicts(with_readings(tree, holding_moment=-readings(tree)["holding_moment"]))
+    assert found[0].startswith("The holding moment has the sign of contacts on the other side in every sweep")
+
+
+def test_what_has_not_converged_is_said_even_where_there_is_nothing_to_compare_with():
+    tree = predicted(chains=1, draws=20)
+    tree.attrs |= {"converged": 0, "message": "not converged, the steps allowed ran out"}
+    assert verdicts(tree) == ("NOT CONVERGED, the steps allowed ran out.",)
+
+
+@pytest.mark.parametrize(
+    ("factor", "scatter", "words"),
+    [
+        (4.0, 4.0, "The noise is 4 times what the load cell states, and neighbouring samples scatter alike: state the"),
+        (0.25, 0.25, "The noise is 0.25 times what the load cell states, and neighbouring samples scatter alike: st"),
+        (4.0, 1.0, "The noise is 4 times what the load cell states, but neighbouring samples scatter as stated: the"),
+    ],
+)
+def test_noise_that_is_not_as_stated(factor, scatter, words):
+    tree = changed(predicted(), "posterior", noise_scale=np.full((4, 250), factor))
+    predictive = tree["posterior_predictive"].to_dataset()
+    for name in CHANNELS:
+        predictive[name] = ideal(name) + factor * (predictive[name] - ideal(name))
+    tree["posterior_predictive"] = xr.DataTree(predictive)
+    found = verdicts(
+        with_readings(tree, **{name: ideal(name) + scatter * (v - ideal(name)) for name, v in readings(tree).items()})
+    )
+    assert len(found) == 1
+    assert found[0].startswith(words)
+
+
+def test_loads_that_contradict_one_another_unless_noise_does_it():
+    found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0}))
+    assert found[0].startswith("The loads of single samples contradict one another, whatever the contour (noise expl")
+    assert "below 1e-99" in found[0]
+    assert "friction makes it" not in found[0]
+    dragged = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
+    assert dragged[0].endswith("too small by 20 standard errors, as friction makes it: infer it (--nuisance friction).")
+    sought = predicted()
+    sought.attrs |= {"nuisances": '["friction"]'}
+    dragged = verdicts(sought, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
+    assert dragged[0].endswith("too small by 20 standard errors, as more friction than was found makes it.")
+
+
+def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():
+    rng = np.random.default_rng(5)
+    tree = predicted()
+    shape = tree["posterior"].noise_scale.shape
+    tree = changed(tree, "posterior", friction=np.abs(rng.normal(0.0003, 0.0001, shape)))
+    tree = changed(tree, "prior", friction=np.abs(rng.normal(0.0, 0.3, (1, 1000))))
+    assert verdicts(tree)[0].startswith("All is well")
+
+
+def test_what_the_prior_forbids_and_what_it_says_alone():
+    rng = np.random.default_rng(1)
+    prior = {"noise_scale": rng.lognormal(size=(1, 1000)), "rigidity_scale": rng.lognormal(0.0, 0.05, (1, 1000))}
+    tree = changed(predicted(), "prior", **prior, x_c=rng.normal(size=(1, 1000)))
+    noise = np.ones((4, 250))
+    far = {"rigidity_scale": rng.normal(1.3, 0.01, (4, 250)), "x_c": rng.normal(0.0, 0.9, (4, 250))}
+    found = verdicts(changed(tree, "posterior", noise_scale=noise, **far))
+    assert found[0].startswith("The record wants what the prior hardly allows: rigidity_scale = 1.3 (prior: 0.8")
+    assert found[1] == "The record tells little more than the prior of x_c."
+    near = {**far, "rigidity_scale": rng.normal(1.0, 0.01, (4, 250))}
+    found = verdicts(changed(tree, "posterior", noise_scale=noise, **near))
+    assert found[0].startswith("All is well")
+    assert found[1] == "The record tells little more than the prior of x_c."
+
+
+def drifted(tree, sizes=(0.0, 0.2, 0.0)):
+    """Its record with zeros that wander by so much from the first sample to the last."""
+    columns = {
+        name: values + size * np.linspace(-0.5, 0.5, values.size)
+        for (name, values), size in zip(readings(tree).items(), sizes, strict=True)
+    }
+    return with_readings(tree, **columns)
+
+
+def test_a_zero_that_moved_is_told():
+    found = verdicts(drifted(predicted()))
+    (said,) = (words for words in found if words.startswith("The zero moved"))
+    assert re.match(
+        r"The zero moved from one unloaded stretch to another, of force_x \(p = [\d.e-]+ if it had not\)", said
+    )
+    assert "--nuisance drift" in said
+
+
+def test_a_zero_that_moved_is_not_told_where_that_is_inferred_or_stated():
+    tree = drifted(predicted())
+    inferred = tree.copy()
+    inferred.attrs = tree.attrs | {"nuisances": '["force_x_drift"]'}
+    assert not [words for words in verdicts(inferred) if words.startswith("The zero moved")]
+    stated = tree.copy()
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.01))
+    stated.attrs = stated.attrs | {f"load_cell_{name}": value for name, value in cell.entries().items()}
+    assert not [words for words in verdicts(stated) if words.startswith("The zero moved")]

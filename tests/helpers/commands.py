@@ -1,0 +1,38 @@
+"""Calls of the command line, and what a refusal looks like."""
+
+from __future__ import annotations
+
+import re
+
+from typer.testing import CliRunner
+
+from tactile_bayes.cli import app
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def assert_refused(result, message):
+    """Exit code 2, a line on stderr with these words, and nothing else."""
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert message in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stderr.startswith("tactile-bayes: ")
+
+
+def assert_misused(result, message):
+    """The same for what is no proper call: usage, a hint to --help, and the reason."""
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    *usage, reason = result.stderr.splitlines()
+    assert usage[0].startswith("Usage: ")
+    assert reason.startswith("Error: ")
+    assert plain(message) in plain(reason)
+
+
+def plain(message):
+    """Words alone: versions of Typer write the same with other signs and capitals."""
+    return re.sub(r"[':]", "", message).lower()

@@ -1,0 +1,401 @@
+"""Posteriors of all contacts of a record: engines, layout, chances, and what is refused."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from arviz_stats.base.array import array_stats
+
+from helpers.contact_posteriors import CELL, EXACT_ANGLE, NAMES, ROD, SI_CELL, measured
+from tactile_bayes.contours import paper_profile
+from tactile_bayes.errors import InferenceError, ParameterError, RecordError
+from tactile_bayes.inference.contact_posterior import infer_contacts
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.result import posterior_draws, read_result, to_arviz, write_result
+from tactile_bayes.load_cell import LoadCell, RandomWalk
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, record_hash
+from tactile_bayes.sweep import scan
+
+SOME = np.array([2, 20, 21, 30, 61, 99, 120])
+"""No contact; tip or tangential; clearly tangential; before snap-off; backward ones."""
+
+
+def some(kind="plain", which=SOME):
+    return measured(kind).isel(sample=which)
+
+
+def infer(kind="plain", which=SOME, **options):
+    return infer_contacts(some(kind, which), **{"seed": 1, "load_cell": SI_CELL if kind == "SI" else CELL, **options})
+
+
+@pytest.fixture(scope="module")
+def contacts():
+    return infer(draws=2000, method="importance")
+
+
+@pytest.fixture(scope="module")
+def walked():
+    return infer(draws=2000, method="emcee", which=[2, 21, 61, 99])
+
+
+def stats_of(tree):
+    return tree["sample_stats"].to_dataset()
+
+
+def draws_of(tree, i):
+    return tree["posterior"].to_dataset().isel(sample=i)
+
+
+def ess(draws):
+    return float(array_stats.ess(draws.values, chain_axis=0, draw_axis=1, method="mean"))
+
+
+# --- Engines ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("i", "k"), [pytest.param(21, 1, marks=pytest.mark.slow), (61, 2), pytest.param(99, 3, marks=pytest.mark.slow)]
+)
+def test_emcee_and_importance_sampling_agree(i, k, walked):
+    """Means within 4 standard errors of both: false alarm 6e-5 a number."""
+    weighed = infer(draws=4000, method="importance", which=[i])
+    share = weighed["sample_stats"].tangential_probability.values[0], walked["sample_stats"].tangential_probability[k]
+    one, other = draws_of(weighed, 0), draws_of(walked, k)
+    effective = float(weighed["sample_stats"].effective_draws[0])
+    spread = float(other.tangential.std())
+    error = spread / np.sqrt(effective) + (spread / np.sqrt(ess(other.tangential)) if spread else 0.0)
+    assert abs(float(share[0] - share[1])) < 4.0 * error + 1.0 / effective
+    if share[1] > 0.999:
+        for name in NAMES:
+            error = np.hypot(
+                float(one[name].std()) / np.sqrt(min(effective, 4000.0)),
+                float(other[name].std()) / np.sqrt(ess(other[name])),
+            )
+            assert abs(float(one[name].mean() - other[name].mean())) < 4.0 * error, name
+
+
+@pytest.mark.slow
+def test_chains_of_emcee_agree(walked):
+    for k in (1, 2, 3):
+        for name in NAMES:
+            assert array_stats.rhat(draws_of(walked, k)[name].values, chain_axis=0, draw_axis=1) < 1.02
+    assert (stats_of(walked).r_hat[1:] < 1.011).all()
+    assert (stats_of(walked).ess[1:] >= 400).all()
+
+
+def test_chains_of_importance_sampling_agree_where_one_phase_is_certain(contacts):
+    """No two chains have a draw in common, and R̂ is that of independent draws."""
+    certain = np.flatnonzero(stats_of(contacts).tangential_probability > 0.9999)
+    assert certain.size >= 2
+    for i in certain:
+        x = draws_of(contacts, i).contact_x.values
+        assert np.unique(x).size == sum(np.unique(chain).size for chain in x)
+        for name in NAMES:
+            assert array_stats.rhat(draws_of(contacts, i)[name].values, chain_axis=0, draw_axis=1) < 1.02
+
+
+# --- Small errors -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("angle_noise", [0.0, 5e-4])
+def test_small_errors_leave_the_normal_distribution_of_the_constrained_estimate(angle_noise):
+    """Mean, standard deviation and correlation within 4.5 standard errors of 4000 draws, and 1 % for curvature."""
+    cell = LoadCell(force_noise=1e-3, moment_noise=4e-4, drive_angle_noise=angle_noise)
+    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.3).record, seed=4)
+    found = infer_contacts(record, load_cell=cell, seed=2, draws=4000, method="importance")
+    normal = reconstruct(record, method="constrained", load_cell=cell)
+    stats_ = stats_of(found)
+    clear = np.flatnonzero((normal.status == "ok") & (normal.edge_distance > 6.0) & (stats_.engine == 1))
+    assert clear.size >= 8
+    for i in clear:
+        assert bool(stats_.converged[i])
+        draws = draws_of(found, i)
+        error = 4.5 / np.sqrt(1.0 / (1.0 / float(stats_.effective_draws[i]) + 1.0 / 4000.0))
+        for name in NAMES:
+            spread = float(normal[f"{name}_sd"][i])
+            assert abs(float(draws[name].mean() - normal[name][i])) < (error + 0.01) * spread, (i, name)
+            assert float(draws[name].std()) == pytest.approx(spread, rel=error + 0.01), (i, name)
+        rho = np.corrcoef(draws.contact_x.values.ravel(), draws.contact_y.values.ravel())[0, 1]
+        expected = float(normal.contact_xy_correlation[i])
+        assert abs(rho - expected) < (error + 0.02) * (1.0 - expected**2) + 1e-3
+        tangential = normal.contact_phase.values[i] == "tangential"
+        assert float(draws.tangential.mean()) == float(tangential)
+
+
+# --- Chance -----------------------------------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_draws_and_another_others():
+    one, again, other = (infer(which=[2, 21, 61], draws=400, method="importance", seed=seed) for seed in (1, 1, 2))
+    xr.testing.assert_identical(again["posterior"].to_dataset(), one["posterior"].to_dataset())
+    there = stats_of(one).engine.values > 0
+    same = other["posterior"].contact_x.values == one["posterior"].contact_x.values
+    assert not same[:, :, there].any()
+
+
+def test_the_same_seed_gives_the_same_walk():
+    settings = SamplerSettings(walkers=16, min_ess=50.0, max_steps=30, max_r_hat=1.5)
+    one, other = (infer(which=[61], method="emcee", draws=100, settings=settings) for _ in range(2))
+    xr.testing.assert_identical(one["posterior"].to_dataset(), other["posterior"].to_dataset())
+
+
+def test_other_samples_do_not_matter_beyond_chance(contacts):
+    """Random numbers are shared by a block of samples; posteriors are not: 4.5 standard errors of both."""
+    alone = infer(draws=2000, method="importance", which=[61, 120])
+    for k, i in ((0, 4), (1, 6)):
+        one, other = draws_of(alone, k), draws_of(contacts, i)
+        for name in NAMES:
+            error = float(other[name].std()) * np.sqrt(4.0 / 2000.0)
+            assert abs(float(one[name].mean() - other[name].mean())) < 4.5 * error
+
+
+# --- Layout -----------------------------------------------------------------------------------------------------
+
+
+def test_layout(contacts):
+    posterior = contacts["posterior"].to_dataset()
+    assert list(posterior.data_vars) == [*NAMES, "contact_arclength", "drive_angle", "tangential"]
+    assert dict(posterior.sizes) == {"chain": 4, "draw": 500, "sample": SOME.size}
+    unloaded = stats_of(contacts).engine.values == 0
+    assert unloaded.tolist() == [True] + [False] * 6
+    for name in posterior.data_vars:
+        assert (np.isnan(posterior[name].values).all(axis=(0, 1)) == unloaded).all()
+        assert (np.isfinite(posterior[name].values).all(axis=(0, 1)) == ~unloaded).all()
+    assert (stats_of(contacts).converged.values == ~unloaded).all()
+    assert np.isnan(stats_of(contacts).r_hat).all()
+    assert set(contacts.children) == {"posterior", "sample_stats", "observed_data", "constant_data"}
+    for name in ("drive_angle", *CHANNELS):
+        np.testing.assert_array_equal(contacts["observed_data"][name], some()[name])
+    assert contacts.attrs["data_sha256"] == record_hash(some())
+    wanted = {"seed": "1", "prior": "flat", "method": "importance", "draws": 2000, "converged": 1, "friction": 0.0}
+    assert {name: contacts.attrs[name] for name in wanted} == wanted
+    assert contacts.attrs["message"] == "6 contacts, 6 by importance sampling, 0 by emcee"
+    assert contacts["sample_stats"].engine.attrs["flag_meanings"] == "none importance_sampling emcee"
+
+
+def test_draws_are_contacts(contacts):
+    posterior = contacts["posterior"].to_dataset().isel(sample=slice(1, None))
+    tip = posterior.tangential == 0.0
+    assert (posterior.contact_arclength.where(tip, 1.0) == 1.0).all()
+    assert ((posterior.contact_arclength > 0.0) & (posterior.contact_arclength <= 1.0)).all()
+    assert (posterior.contact_arclength.where(~tip, 0.5) < 1.0).all()
+    assert (np.abs(posterior.slope_angle) < 0.5 * np.pi).all()
+    assert (np.hypot(posterior.contact_x, posterior.contact_y) < 1.0).all()
+
+
+def test_an_exact_encoder_has_no_drive_angle_to_draw():
+    tree = infer_contacts(some("exact angle", [20, 61]), load_cell=EXACT_ANGLE, seed=1)
+    assert "drive_angle" not in tree["posterior"]
+
+
+def test_si_is_the_dimensionless_record_in_other_units():
+    """The same random numbers: to 1e-6."""
+    record = measured("SI").isel(sample=[25, 62, 105])
+    found = infer_contacts(record, load_cell=SI_CELL, seed=3)
+    length, thin = ROD.length_unit, replace(ROD, diameter=0.0)
+    line = infer_contacts(record, load_cell=SI_CELL, seed=3, rod=thin)
+    slope = found["posterior"].slope_angle
+    for name, shift in (("contact_x", -0.5 * np.sin(slope)), ("contact_y", 0.5 * np.cos(slope))):
+        expected = line["posterior"][name] + ROD.diameter * shift
+        np.testing.assert_allclose(found["posterior"][name], expected, rtol=0.0, atol=1e-6 * length)
+    assert found["posterior"].contact_x.attrs["units"] == "m"
+    assert float(found["posterior"].contact_arclength.max()) <= length
+
+
+def test_round_trip_and_arviz(contacts, tmp_path):
+    write_result(contacts, tmp_path / "contacts.nc")
+    xr.testing.assert_identical(read_result(tmp_path / "contacts.nc"), contacts)
+    handed = to_arviz(contacts)
+    np.testing.assert_array_equal(handed.posterior["contact_x"], contacts["posterior"].contact_x)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import arviz
+
+        draws = posterior_draws(handed) if isinstance(handed, xr.DataTree) else handed.posterior
+        table = arviz.summary(draws[list(NAMES)].isel(sample=slice(2, 4)))
+    assert len(table) == 6
+    assert table["mean"].notna().all()
+
+
+def test_progress_reaches_the_end():
+    calls = []
+    infer(which=[21, 61], progress=lambda done, of: calls.append((done, of)))
+    assert calls[-1] == (2, 2)
+
+
+# --- Load cells of every kind -----------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "further",
+    [
+        {"degrees_of_freedom": 4.0},
+        {"force_resolution": 0.1, "moment_resolution": 0.05},
+        {"bias": (0.1, -0.2, 0.3), "gain": ((1.02, 0.01, 0.0), (-0.02, 0.97, 0.03), (0.0, 0.02, 1.05))},
+        {"bias_uncertainty": (0.02, 0.05, 0.05)},
+        {"drift": RandomWalk(moment=1e-3, force=2e-3), "relative_noise": 0.05},
+        {"correlation": (0.6, -0.3, 0.2), "drive_angle_offset": 0.1},
+        {"drive_angle_resolution": 0.01},
+    ],
+    ids=lambda further: " ".join(further),
+)
+def test_the_truth_is_within_reach_of_the_posterior(further):
+    """Squared distances of the truth, in standard deviations, of 20 contacts and more; not a calibration."""
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02, **further)
+    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=6)
+    tree = infer_contacts(record, load_cell=cell, seed=1, method="importance")
+    certain = stats_of(tree).tangential_probability.values > 0.999  # else the slope is far from normal
+    on = certain & (stats_of(tree).converged.values == 1) & (record.truth_contact_phase.values != "none")
+    assert on.sum() > 20
+    posterior = tree["posterior"].to_dataset()
+    for name in ("contact_x", "slope_angle"):
+        draws = posterior[name].values[:, :, on]
+        off = (draws.mean(axis=(0, 1)) - record[f"truth_{name}"].values[on]) / draws.std(axis=(0, 1))
+        assert np.abs(off).max() < 5.0
+        # One bias shifts all contacts alike, and is in the spread of each.
+        assert 0.2 < np.mean(off**2) < (8.0 if "bias_uncertainty" in further else 2.0)
+
+
+def test_what_samples_share_is_called_an_approximation():
+    cell = replace(CELL, bias_uncertainty=(0.01, 0.01, 0.01), drive_angle_resolution=0.01)
+    words = infer(which=[61], load_cell=cell).attrs["approximations"]
+    assert "unknown bias and drift, which samples share, count as noise of each sample" in words
+    assert "the steps of the drive angle are taken for noise" in words
+    assert infer(which=[61]).attrs["approximations"] == ""
+
+
+# --- What is refused --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("draws", [0, -4, 2, 10, 4.0, True, "4"])
+def test_draws_are_a_multiple_of_four(draws):
+    with pytest.raises(ParameterError, match=r"draws is .*: give a multiple of 4, one share for each chain"):
+        infer(draws=draws)
+
+
+def test_few_draws_will_do():
+    tree = infer(which=[21, 61], draws=4)
+    assert tree["posterior"].sizes["draw"] == 1
+    assert tree.attrs["message"] == "2 contacts, 2 by importance sampling, 0 by emcee"
+
+
+def test_unknown_options_are_refused():
+    with pytest.raises(ParameterError, match="method is 'nuts': choose 'auto', 'importance' or 'emcee'"):
+        infer(method="nuts")
+    with pytest.raises(ParameterError, match="prior is 'round': choose 'flat' or 'polar'"):
+        infer(prior="round")
+    with pytest.raises(ParameterError, match="seed is -1: give a whole number"):
+        infer(seed=-1)
+    for friction in (-0.3, 2.0, np.nan):
+        with pytest.raises(ParameterError, match="the friction angle is"):
+            infer(friction=friction)
+
+
+def without(*names):
+    record = some().copy(deep=True)
+    for name in names:
+        record[name][:] = np.nan
+    record.attrs = {name: value for name, value in record.attrs.items() if not name.startswith("load_cell_")}
+    return record
+
+
+def test_a_missing_channel_is_refused():
+    with pytest.raises(RecordError, match="force_y was not measured"):
+        infer_contacts(without("force_y"), load_cell=CELL, seed=1)
+
+
+def test_a_record_without_a_load_cell_is_refused():
+    with pytest.raises(ParameterError, match="the record carries no data sheet of its load cell: give load_cell="):
+        infer_contacts(without(), seed=1)
+
+
+@pytest.mark.parametrize("cell", [LoadCell(), LoadCell(moment_noise=0.02), LoadCell(force_noise=0.05)])
+def test_a_channel_without_noise_is_refused(cell):
+    with pytest.raises(ParameterError, match="is measured, but the load cell has no noise on it"):
+        infer_contacts(without(), load_cell=cell, seed=1)
+
+
+def test_a_record_without_load_is_refused():
+    with pytest.raises(InferenceError, match="no sample carries a load that noise does not explain"):
+        infer(which=[0, 1, 2])
+
+
+def test_what_has_no_closed_form_is_refused():
+    wanders = {"bias_uncertainty": (0.01, 0.01, 0.01)}
+    with pytest.raises(ParameterError, match="with outliers"):
+        infer(load_cell=replace(CELL, degrees_of_freedom=4.0, **wanders))
+    cell = replace(CELL, moment_range=0.9, **wanders)
+    record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
+    with pytest.raises(ParameterError, match="is at the end of the load cell's range"):
+        infer_contacts(record, load_cell=cell, seed=1)
+
+
+# --- What once went wrong ---------------------------------------------------------------------------------------
+
+
+def test_draws_have_the_phases_of_the_weights():
+    tree = infer(draws=4000, method="importance", which=[20, 21, 99])
+    for i in range(3):
+        share = float(stats_of(tree).tangential_probability[i])
+        by_chain = draws_of(tree, i).tangential.values.mean(axis=1)
+        assert abs(by_chain.mean() - share) < 4.0 * np.sqrt(share * (1.0 - share) / 4000)
+        assert np.abs(by_chain - share).max() < 4.5 * np.sqrt(share * (1.0 - share) / 700)
+
+
+@pytest.mark.parametrize("method", ["auto", "importance"])
+def test_a_sample_that_no_contact_explains_leaves_the_others_alone(method):
+    bad = some(which=[20, 21, 61])
+    bad.force_y[1] = -50.0
+    tree = infer_contacts(
+        bad, load_cell=CELL, seed=1, method=method, settings=SamplerSettings(walkers=16, max_steps=20)
+    )
+    assert stats_of(tree).converged.values[[0, 2]].all()
+    assert stats_of(tree).converged[1] == 0
+    assert np.isfinite(tree["posterior"].contact_x.values[..., [0, 2]]).all()
+    assert "not converged: 1" in tree.attrs["message"]
+
+
+def test_cut_off_samples_are_left_out():
+    strong = some(which=[61, 99, 120])
+    cell = replace(CELL, force_range=1.001 * float(np.abs(strong.force_y).min()))
+    cut = strong.copy(deep=True)
+    for name in ("force_x", "force_y"):
+        cut[name] = cut[name].clip(-cell.force_range, cell.force_range)
+    left = (np.abs(strong.force_y.values) < cell.force_range) & (np.abs(strong.force_x.values) < cell.force_range)
+    assert 0 < np.count_nonzero(left) < 3
+    tree = infer_contacts(cut, load_cell=cell, seed=1, method="importance")
+    assert (np.isfinite(tree["posterior"].contact_x.values).all(axis=(0, 1)) == left).all()
+    assert (stats_of(tree).converged.values == left).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees_of_freedom", [1.5, 2.0, 3.0])
+def test_outliers_of_every_kind_have_posteriors(degrees_of_freedom):
+    cell = replace(CELL, degrees_of_freedom=degrees_of_freedom)
+    settings = SamplerSettings(walkers=24, min_ess=200.0, max_r_hat=1.05)
+    tree = infer_contacts(some(which=[21, 61, 99]), load_cell=cell, seed=1, settings=settings)
+    assert stats_of(tree).converged.all()
+
+
+def test_ensembles_are_as_many_as_chains():
+    with pytest.raises(ParameterError, match="2 ensembles: give 4, one for each chain of the result"):
+        infer(settings=SamplerSettings(ensembles=2))
+
+
+def test_spawned_seeds_are_told_apart():
+    seeds = np.random.SeedSequence(5).spawn(2)
+    words = [infer(which=[61], draws=4, method="importance", seed=seed).attrs["seed"] for seed in seeds]
+    assert words == ["5, spawn key (0,)", "5, spawn key (1,)"]
+
+
+def test_a_prior_that_is_no_number_is_refused():
+    with pytest.raises(ParameterError, match="the prior is not a number"):
+        infer(which=[61], prior=lambda x, y, slope: np.where(x > 0.0, np.nan, 0.0) + 0.0 * np.log(np.abs(slope) + 1.0))

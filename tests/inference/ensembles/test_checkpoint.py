@@ -1,0 +1,479 @@
+"""Runs that are killed, stopped or ended, and go on from what is on disk."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from functools import cache
+from importlib.metadata import version
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.ensembles import Draws, SamplerSettings, block, checkpoint, sample
+from tactile_bayes.tasks import files
+
+SMALL = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
+STEADY = SamplerSettings(ensembles=2, walkers=8, block_steps=20, max_steps=4000, min_ess=200, max_r_hat=1.05)
+
+
+class Killed(BaseException):
+    """Stands for the end of a process: nothing after it runs."""
+
+
+class Counted:
+    """A bent target, whose evaluations are counted, and which can end the process at one of them."""
+
+    def __init__(self, killed_at: int | None = None, error: type[BaseException] = Killed) -> None:
+        self.calls, self._killed_at, self._error = 0, killed_at, error
+
+    def __call__(self, x):
+        self.calls += 1
+        if self.calls == self._killed_at:
+            raise self._error
+        return -0.5 * (x[:, 0] ** 2 + (x[:, 1] - np.abs(x[:, 0])) ** 2)
+
+
+def draw(folder=None, *, target=None, settings=SMALL, seed=3, names=("a", "b"), scale=2.0, **options) -> Draws:
+    start = scale * np.random.default_rng(0).normal(size=(settings.ensembles, settings.walkers, len(names)))
+    return sample(
+        Counted() if target is None else target,
+        start,
+        names=names,
+        seed=seed,
+        settings=settings,
+        checkpoint=folder,
+        **options,
+    )
+
+
+@cache
+def whole() -> Draws:
+    """Of a run that nothing stops; not to be changed."""
+    return draw()
+
+
+def assert_same(one: Draws, other: Draws) -> None:
+    for name in ("samples", "log_probability", "r_hat", "ess_bulk", "ess_tail", "acceptance", "autocorrelation_time"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    for name in ("names", "walkers", "steps_kept", "steps_run", "evaluations", "converged", "message", "stuck"):
+        assert getattr(one, name) == getattr(other, name), name
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.slow
+def test_a_checkpoint_does_not_change_the_draws(tmp_path):
+    assert_same(draw(tmp_path / "made" / "on the way", settings=STEADY), draw(settings=STEADY))
+
+
+@pytest.mark.parametrize("calls", [1, 25, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 50, 97))])
+def test_a_run_goes_on_bit_by_bit_wherever_it_was_killed(tmp_path, calls):
+    with pytest.raises(Killed):
+        draw(tmp_path, target=Counted(killed_at=calls))
+    made = 10 * len(list(tmp_path.glob("block-*")))
+    assert made == max(0, calls - 3) // 2 // 10 * 10
+    target = Counted()
+    assert_same(draw(tmp_path, target=target), whole())
+    assert target.calls == 2 * (SMALL.max_steps - made) + (0 if made else 2)
+
+
+@pytest.mark.slow
+def test_a_run_goes_on_to_convergence_after_many_kills(tmp_path):
+    """One that is killed after every three blocks or so judges at the same steps and ends where it would have ended."""
+    kills = 0
+    while True:
+        try:
+            again = draw(tmp_path, settings=STEADY, target=Counted(killed_at=130))
+            break
+        except Killed:
+            kills += 1
+    assert kills > 2
+    steady = draw(settings=STEADY)
+    assert steady.converged
+    assert_same(again, steady)
+
+
+@pytest.mark.parametrize("moment", ["before the file", "before the rename", "after the rename"])
+def test_a_run_goes_on_when_killed_while_a_block_is_written(tmp_path, monkeypatch, moment):
+    written = 0
+
+    def write(path, block, seconds):
+        nonlocal written
+        written += 1
+        if written < 3:
+            return made(path, block, seconds)
+        if moment == "before the rename":
+            half = tmp_path / f".tactile-bayes-{files._HOST}-0123456789abcdef.tmp"
+            half.mkdir()
+            (half / "block-00000020-00000030.npz").write_bytes(b"PK half of a block")
+        if moment == "after the rename":
+            made(path, block, seconds)
+        raise Killed
+
+    made = checkpoint.Checkpoint.write
+    with monkeypatch.context() as patched:
+        patched.setattr(checkpoint.Checkpoint, "write", write)
+        with pytest.raises(Killed):
+            draw(tmp_path)
+    assert_same(draw(tmp_path), whole())
+    assert not list(tmp_path.glob(".*"))
+
+
+CHILD = """
+import sys, time
+import numpy as np
+from tactile_bayes.inference.ensembles import SamplerSettings, sample
+
+folder, pause, pauses_after = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+calls = 0
+
+def target(x):
+    global calls
+    calls += 1
+    if calls > pauses_after:
+        time.sleep(pause)
+    return -0.5 * (x[:, 0] ** 2 + (x[:, 1] - np.abs(x[:, 0])) ** 2)
+
+settings = SamplerSettings(ensembles=2, walkers=8, block_steps=10, max_steps=60, min_ess=1e9)
+start = 2.0 * np.random.default_rng(0).normal(size=(2, 8, 2))
+print("begun", flush=True)
+sample(target, start, names=["a", "b"], seed=3, settings=settings, checkpoint=folder)
+"""
+
+no_signals = pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
+
+
+def child(folder, pause, pauses_after):
+    """A process that samples as `draw` does, once it has begun."""
+    command = [sys.executable, "-c", CHILD, str(folder), str(pause), str(pauses_after)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stdout.readline()
+    return process
+
+
+@no_signals
+@pytest.mark.slow
+def test_a_process_that_is_killed_leaves_whole_blocks(tmp_path):
+    """SIGKILL amid the second block; as long as the process is there, no other run gets in."""
+    folder = tmp_path / "run"
+    with child(folder, 600.0, 30) as process:
+        while not list(folder.glob("block-*")):
+            assert process.poll() is None
+            time.sleep(1e-2)
+        with pytest.raises(InferenceError, match="another run is at work"):
+            draw(folder)
+        process.kill()
+    assert process.returncode == -signal.SIGKILL
+    assert len(list(folder.glob("block-*"))) == 1
+    assert_same(draw(folder), whole())
+
+
+@no_signals
+@pytest.mark.slow
+def test_processes_that_are_killed_at_random_moments_end_as_one_that_is_not(tmp_path):
+    folder, rng, kills = tmp_path / "run", np.random.default_rng(1), 0
+    while kills < 10 and len(list(folder.glob("block-*"))) < 6:
+        with child(folder, 4e-3, 0) as process:
+            time.sleep(rng.uniform(0.0, 0.5))
+            process.kill()
+        kills += process.returncode == -signal.SIGKILL
+    assert kills
+    assert_same(draw(folder), whole())
+
+
+@pytest.mark.slow
+def test_a_run_that_has_ended_is_not_made_again(tmp_path):
+    first = draw(tmp_path, settings=STEADY)
+    assert first.converged
+    before = content(tmp_path)
+    target = Counted()
+    seen = []
+    assert_same(draw(tmp_path, settings=STEADY, target=target, progress=seen.append), first)
+    assert target.calls == 0
+    assert [state.steps for state in seen] == [first.steps_run]
+    assert content(tmp_path) == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("steps", [30, 35, 57])
+def test_a_run_out_of_steps_goes_on_with_more_of_them(tmp_path, steps):
+    few = replace(SMALL, max_steps=steps)
+    assert_same(draw(tmp_path, settings=few), draw(settings=few))
+    target = Counted()
+    assert_same(draw(tmp_path, settings=few, target=target), draw(settings=few))
+    assert target.calls == 0
+    assert_same(draw(tmp_path), whole())
+    assert draw(tmp_path, settings=few).steps_run == SMALL.max_steps  # what is there is never dropped
+
+
+def test_a_run_out_of_time_goes_on_with_the_same_time_again(tmp_path):
+    few = replace(SMALL, max_steps=4)
+    hasty = replace(few, max_seconds=1e-9)
+    steps, seconds = [], [0.0]
+    for _ in range(4):
+        part = draw(tmp_path, settings=hasty)
+        steps.append(part.steps_run)
+        seconds.append(part.seconds)
+    assert steps == [1, 2, 3, 4]
+    assert all(later > earlier for earlier, later in pairwise(seconds))
+    np.testing.assert_array_equal(part.samples, draw(settings=few).samples)
+
+
+def test_a_run_that_ended_between_two_looks_is_judged_there_again(tmp_path):
+    """Of the plan 80, 100, 125 no look is at 101, and a run that was killed there goes on to the next."""
+    strict, loose = replace(STEADY, min_ess=1e9), replace(STEADY, min_ess=1.0, max_r_hat=10.0)
+    draw(tmp_path, settings=replace(strict, max_steps=100))
+    assert draw(tmp_path, settings=replace(strict, max_seconds=1e-9)).steps_run == 101
+    target = Counted()
+    first = draw(tmp_path, settings=loose, target=target)
+    assert (first.converged, first.steps_run, target.calls) == (True, 101, 0)
+    description = tmp_path / "checkpoint.json"
+    killed = json.loads(description.read_text(encoding="utf-8")) | {"judged": 100}
+    description.write_text(json.dumps(killed), encoding="utf-8")
+    assert draw(tmp_path, settings=loose).steps_run == 125
+
+
+@pytest.mark.slow
+def test_stricter_settings_go_on_and_looser_ones_do_not(tmp_path):
+    first = draw(tmp_path, settings=STEADY)
+    assert_same(draw(tmp_path, settings=replace(STEADY, min_ess=100)), first)
+    strict = replace(STEADY, min_ess=1.5 * float(first.ess_tail.min()))
+    longer = draw(tmp_path, settings=strict)
+    assert longer.steps_run > first.steps_run
+    assert_same(longer, draw(settings=strict))
+
+
+def test_an_interrupt_keeps_the_whole_blocks(tmp_path):
+    draws = draw(tmp_path, target=Counted(killed_at=2 + 2 * 24, error=KeyboardInterrupt))
+    assert "interrupted" in draws.message
+    assert 20 < draws.steps_run < 30
+    assert sorted(path.name for path in tmp_path.glob("block-*")) == [
+        "block-00000000-00000010.npz",
+        "block-00000010-00000020.npz",
+    ]
+    assert_same(draw(tmp_path), whole())
+
+
+def test_an_interrupt_before_the_next_block_gives_what_is_there(tmp_path):
+    few = draw(tmp_path, settings=replace(SMALL, max_steps=20))
+    draws = draw(tmp_path, target=Counted(killed_at=1, error=KeyboardInterrupt))
+    assert "interrupted" in draws.message
+    np.testing.assert_array_equal(draws.samples, few.samples)
+
+
+def test_an_interrupt_while_a_block_is_written_gives_what_is_in_memory(tmp_path, monkeypatch):
+    def interrupted(path):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(checkpoint, "write_atomically", interrupted)
+        draws = draw(tmp_path)
+    assert "interrupted" in draws.message
+    assert draws.steps_run == 10
+    assert_same(draw(tmp_path), whole())
+
+
+def test_memory_holds_what_a_run_without_checkpoint_would(tmp_path):
+    """Going on reads the later half of the steps only: the first files may be gone bad."""
+    draw(tmp_path)
+    (tmp_path / "block-00000000-00000010.npz").write_bytes(b"")
+    assert_same(draw(tmp_path), whole())
+
+
+def test_the_states_are_those_of_emcee(tmp_path):
+    draw(tmp_path, settings=replace(SMALL, max_steps=10))
+    (path,) = tmp_path.glob("block-*")
+    with np.load(path, allow_pickle=False) as arrays:
+        assert arrays["samples"].shape == (2, 10, 8, 2)
+        assert arrays["random_keys"].shape == (2, 624)
+        assert arrays["random_keys"].dtype == np.uint32
+        assert all(arrays[name].dtype != object for name in arrays)
+    description = json.loads((tmp_path / "checkpoint.json").read_text(encoding="utf-8"))
+    assert description["identity"]["version of emcee"] == version("emcee")
+
+
+# --- Refusals, which leave everything as it was -----------------------------------------------------------------------
+
+
+def refuse(folder, match, **options):
+    before = content(folder)
+    target = Counted()
+    with pytest.raises(InferenceError, match=match):
+        draw(folder, target=target, **options)
+    assert target.calls == 0
+    assert content(folder) == before
+
+
+@pytest.fixture
+def begun(tmp_path):
+    draw(tmp_path, settings=replace(SMALL, max_steps=30), identity={"data": "a" * 64, "model": "parabola"})
+    return tmp_path
+
+
+def test_another_run_is_refused_with_what_differs(begun):
+    same = {"data": "a" * 64, "model": "parabola"}
+    words = r"differs in model \(was 'parabola', now 'circle'\): give another folder, or what was given then"
+    refuse(begun, words, identity={**same, "model": "circle"})
+    refuse(begun, r"data \(was .*, now not stated\)", identity={"model": "parabola"})
+    refuse(begun, r"rod \(was not stated, now '1'\)", identity={**same, "rod": "1"})
+    refuse(
+        begun, r"differs in seed of the ensembles \(was '3, pool of 4', now '4, pool of 4'\):", identity=same, seed=4
+    )
+    child = np.random.SeedSequence(3, spawn_key=(1,))
+    refuse(begun, r"now '3, spawn key \(1,\), pool of 4'", identity=same, seed=child)
+    refuse(begun, r"differs in names of parameters \(was 'a, b', now 'a, c'\):", identity=same, names=("a", "c"))
+    refuse(begun, "differs in starting points", identity=same, scale=3.0)
+    refuse(begun, "block_steps", identity=same, settings=replace(SMALL, block_steps=20))
+    walkers = r"walkers of an ensemble \(was '8', now '10'\): give another"
+    refuse(begun, walkers, identity=same, settings=replace(SMALL, walkers=10))
+    refuse(begun, r"number of ensembles \(was '2', now '3'\)", identity=same, settings=replace(SMALL, ensembles=3))
+    draw(begun, identity=same, seed=np.random.SeedSequence(3))
+
+
+def test_a_long_entry_is_shown_where_it_differs(tmp_path):
+    few = replace(SMALL, max_steps=10)
+    priors = "; ".join(f"parameter {i} uniform" for i in range(20))
+    draw(tmp_path, settings=few, identity={"priors": priors})
+    changed = priors.replace("11 uniform", "11 normal")
+    refuse(
+        tmp_path, r"…'[^']*11 uniform[^']*'…, now …'[^']*11 normal[^']*'…", settings=few, identity={"priors": changed}
+    )
+
+
+def test_another_version_of_emcee_is_refused(begun, monkeypatch):
+    path = begun / "checkpoint.json"
+    path.write_text(path.read_text(encoding="utf-8").replace(version("emcee"), "3.1.5"), encoding="utf-8")
+    refuse(begun, r"version of emcee \(was '3.1.5'", identity={"data": "a" * 64, "model": "parabola"})
+
+
+@pytest.mark.parametrize("identity", [{"a": 1}, {1: "a"}, {"starting points": "mine"}])
+def test_a_bad_identity_is_refused(tmp_path, identity):
+    with pytest.raises(ParameterError, match="the identity says"):
+        draw(tmp_path / "run", identity=identity)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_of_other_things_is_refused(tmp_path):
+    (tmp_path / "results.nc").write_bytes(b"years of work")
+    refuse(tmp_path, "holds 'results.nc' and no checkpoint.json")
+
+
+def test_a_file_is_refused(tmp_path):
+    (tmp_path / "run").write_bytes(b"")
+    with pytest.raises(InferenceError, match="is a file: give a folder"):
+        draw(tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("", "damaged"),
+        ("[]", "damaged"),
+        ('{"step": 3}', "damaged"),
+        ('{"kind": "weights", "format": 1}', "is of kind 'weights'"),
+        ('{"kind": "ensembles of tactile-bayes", "format": 2, "more": 1}', "has format 2, and this version reads"),
+        ('{"kind": "ensembles of tactile-bayes", "format": 1, "judged": 0, "identity": []}', "damaged"),
+        ('{"kind": "ensembles of tactile-bayes", "format": 1, "judged": 0, "identity": {}}', "was not stated"),
+    ],
+)
+def test_a_description_that_is_none_is_refused(begun, text, match):
+    (begun / "checkpoint.json").write_text(text, encoding="utf-8")
+    refuse(begun, match)
+
+
+def test_a_lost_description_is_refused(begun):
+    (begun / "checkpoint.json").unlink()
+    refuse(begun, "holds 'block-00000000-00000010.npz' and no checkpoint.json")
+
+
+@pytest.mark.slow
+def test_a_gap_is_refused_and_its_remedy_works(tmp_path):
+    draw(tmp_path)
+    (tmp_path / "block-00000030-00000040.npz").unlink()
+    refuse(tmp_path, "no block that begins with step 30, but block-00000040-00000050.npz")
+    for path in [*tmp_path.glob("block-00000040-*"), *tmp_path.glob("block-00000050-*")]:
+        path.unlink()
+    assert_same(draw(tmp_path), whole())
+
+
+def test_a_damaged_block_is_refused_or_as_it_was(tmp_path):
+    """A byte flipped anywhere, or the file cut off anywhere: never other draws."""
+    reference = draw(tmp_path, settings=replace(SMALL, max_steps=10))
+    (path,) = tmp_path.glob("block-*")
+    content = path.read_bytes()
+    rng = np.random.default_rng(1)
+    refused = 0
+    size = len(content)
+    for at in sorted({*range(0, 40, 2), *range(size - 60, size, 3), *rng.integers(0, size, 30).tolist()}):
+        for damaged in (content[:at] + bytes([content[at] ^ 0x55]) + content[at + 1 :], content[:at]):
+            path.write_bytes(damaged)
+            try:
+                again = draw(tmp_path, settings=replace(SMALL, max_steps=10))
+            except InferenceError as error:
+                refused += 1
+                assert "is damaged" in str(error)  # noqa: PT017
+            else:
+                assert_same(again, reference)
+            assert path.read_bytes() == damaged
+    assert refused > 65
+
+
+def test_a_block_of_another_shape_is_refused(begun):
+    last = begun / "block-00000020-00000030.npz"
+    last.rename(begun / "block-00000020-00000031.npz")
+    refuse(begun, "its samples have shape", identity={"data": "a" * 64, "model": "parabola"})
+
+
+def test_one_folder_is_for_one_run_at_a_time(tmp_path):
+    def other(_):
+        with pytest.raises(InferenceError, match="another run is at work"):
+            draw(tmp_path)
+        raise KeyboardInterrupt
+
+    assert draw(tmp_path, progress=other).steps_run == 10
+    assert draw(tmp_path).steps_run == 60
+
+
+@pytest.mark.slow
+def test_where_there_are_no_locks_a_second_run_writes_over_nothing(tmp_path, monkeypatch):
+    """The first run finds what a second has written meanwhile, and stops; the second has ended well."""
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+
+    def other(_):
+        draw(tmp_path)
+
+    with pytest.raises(InferenceError, match=r"another run .* block-00000010-00000020\.npz is there"):
+        draw(tmp_path, progress=other)
+    assert_same(draw(tmp_path), whole())
+
+
+def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
+    draw(tmp_path, settings=replace(SMALL, max_steps=20))
+
+    def full(path):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(checkpoint, "write_atomically", full)
+        with pytest.raises(OSError, match="No space left"):
+            draw(tmp_path)
+    assert_same(draw(tmp_path), whole())
+
+
+def test_looks_do_not_depend_on_where_a_run_began():
+    looks = [block.next_look(0, 50)]
+    while looks[-1] < 20_000:
+        looks.append(block.next_look(looks[-1], 50))
+    assert looks[:7] == [50, 100, 150, 200, 250, 313, 392]
+    for before, look in pairwise(looks):
+        assert {block.next_look(steps, 50) for steps in (before, before + 1, look - 1)} == {look}

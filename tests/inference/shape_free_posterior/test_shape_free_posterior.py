@@ -1,0 +1,219 @@
+"""Contours of any shape: their prior, the coordinates that walkers walk in, and posteriors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.special import gamma, kv
+
+from tactile_bayes.contours import Parabola, Smooth, paper_profile
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.contours.random_radius import RandomRadius
+from tactile_bayes.diagnostics.record_check import check_record
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.contour_optimum import contact_fit
+from tactile_bayes.inference.contour_problem import default_priors
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.noise import noise_of
+from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
+from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import scan
+from tactile_bayes.uncertainty.band import contour_band
+
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+RADIUS = RandomRadius(shortest=0.4, longest=4.0, tolerance=0.01)
+
+
+def matern(distance, length, nu=2.5):
+    """Of Rasmussen and Williams 2006, equation 4.14."""
+    scaled = np.sqrt(2.0 * nu) * np.maximum(distance, 1e-12) / length
+    return 2.0 ** (1.0 - nu) / gamma(nu) * scaled**nu * kv(nu, scaled)
+
+
+@pytest.mark.parametrize("length", [0.5, 1.0, 2.0])
+def test_directions_add_up_to_the_covariance_less_its_means(length):
+    at = Smooth.nodes(RADIUS.nodes)
+    shapes = RADIUS.shapes(np.array([length]))[0]
+    places = np.pi * ((np.arange(600) + 0.5) / 600 - 0.5)
+    means = matern(np.abs(at[:, None] - places), length).mean(axis=1)
+    overall = matern(np.abs(places[::2, None] - places), length).mean()
+    exact = matern(np.abs(at[:, None] - at), length) - means[:, None] - means + overall
+    # What further directions would add is 1 % of the variance at a length of 0.4, on average.
+    assert np.abs(np.diag(shapes @ shapes.T - exact)).mean() < 0.01
+    assert np.abs(shapes @ shapes.T - exact).max() < 0.06
+
+
+def test_their_number_follows_from_the_tolerance():
+    counts = [RandomRadius(0.4, 4.0, tolerance).count for tolerance in (0.1, 0.01, 0.001)]
+    assert counts == sorted(set(counts))
+    assert RandomRadius(0.8, 4.0, 0.01).count < RADIUS.count
+
+
+def test_the_radius_is_a_geometric_mean():
+    rng = np.random.default_rng(1)
+    one = np.ones(50)
+    log_radius = RADIUS.log_radius(np.log(0.4) * one, 0.8 * one, 0.6 * one, rng.normal(size=(50, RADIUS.count)))
+    contours = Smooth(log_radius, q=0.3 * one)
+    slopes = np.pi * ((np.arange(500) + 0.5) / 500 - 0.5)
+    radii = np.array([contours.radius_of_curvature(np.full(50, slope)) for slope in slopes])
+    np.testing.assert_allclose(np.log(radii).mean(axis=0), np.log(0.4), atol=2e-3)
+
+
+def model_of(nuisances=STANDARD, profile="II", rod=None, cell=CELL):
+    contour = paper_profile(profile, q=0.5)
+    if rod is not None:
+        contour = Parabola(0.5 / rod.length, 0.5 * rod.length)
+    measured = cell.measure(scan(contour, rod=rod, drive_step=np.radians(5.0)).record, seed=1)
+    noise = noise_of(measured, cell)
+    rig = nuisances_of(measured, nuisances, {}, noise.cell, 0.0)
+    priors = default_priors(measured, "shape-free", cell, nuisances)
+    return ContourModel(measured, family_named("shape-free"), rig, noise, priors)
+
+
+def whitened(model):
+    stated = [float(model.priors[name].median()) for name in model.nuisances.names]
+    point = np.concatenate([contact_fit(model), stated, [1.0]])
+    return whitening_at(model, point, np.random.default_rng(1))
+
+
+SI = Rod(length=0.1, flexural_rigidity=2e-4)
+
+
+@pytest.mark.parametrize(
+    "rod", [pytest.param(None, marks=pytest.mark.slow, id="dimensionless"), pytest.param(SI, id="SI")]
+)
+def test_a_volume_grows_as_the_whitening_says(rod):
+    """Log-determinant of the derivatives, by differences."""
+    unit = (1.0, 1.0) if rod is None else (rod.force_unit, rod.moment_unit)
+    model = model_of(rod=rod, cell=LoadCell(force_noise=0.05 * unit[0], moment_noise=0.02 * unit[1]))
+    whitening = whitened(model)
+    rng = np.random.default_rng(2)
+    point = np.append(np.log(whitening.scales) + 0.2 * rng.normal(size=3), rng.normal(size=whitening.middle.size - 3))
+    steps = 1e-5 * np.eye(point.size)
+    ahead, behind = (whitening.parameters(point + sign * steps)[0] for sign in (1.0, -1.0))
+    sign, determinant = np.linalg.slogdet((ahead - behind) / 2e-5)
+    assert whitening.parameters(point[None])[1][0] == pytest.approx(determinant, abs=1e-4)
+    assert sign != 0.0
+
+
+def test_scales_that_lie_far_apart_leave_the_approximation_a_distribution():
+    """As a corner asks for them: readings then tell 1e16 times as much of one direction as the prior of another."""
+    approximation = whitened(model_of([])).approximation
+    scales = np.array([[amplitude, 0.3, noise] for amplitude in (1.0, 1e4, 1e8) for noise in (1.0, 1e-4, 1e-8)])
+    pulled, root = approximation.conditional(scales)
+    assert np.all(np.isfinite(pulled))
+    assert np.all(np.diagonal(root, axis1=1, axis2=2) > 0.0)
+
+
+def test_a_start_out_of_reach_leads_somewhere():
+    """Where the rod touches nothing there is no snap-off to be made linear."""
+    model = model_of([])
+    point = np.concatenate([contact_fit(model), [1.0]])
+    point[model.names.index("q")] = 1.5
+    centre = whitening_at(model, point, np.random.default_rng(1)).centre
+    assert np.all(np.isfinite(centre))
+
+
+def test_in_its_coordinates_the_posterior_is_nearly_standard_normal():
+    """At one noise, amplitude and length scale: what is left of the log-probability varies by less than 1."""
+    model = model_of()
+    whitening = whitened(model)
+    normal = np.random.default_rng(3).normal(size=(200, whitening.middle.size - whitening.bent))
+    points, growth = whitening.parameters(np.hstack([np.tile(np.log(whitening.scales), (200, 1)), normal]))
+    left = model.log_probability(points) + growth + 0.5 * np.sum(normal**2, axis=1)
+    assert np.std(left) < 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("profile", "nuisances"), [("I", STANDARD), ("II", STANDARD), ("II", []), ("III", STANDARD)])
+def test_a_smooth_contour_is_within_its_band(profile, nuisances):
+    """Converged in less than 60,000 evaluations; 95 % band, of nine places at most one is outside."""
+    truth = paper_profile(profile, q=0.5)
+    measured = CELL.measure(scan(truth, drive_step=np.radians(1.0)).record, seed=1)
+    result = infer_contour(measured, family="shape-free", load_cell=CELL, nuisances=nuisances, seed=1)
+    assert result.attrs["converged"], result.attrs["message"]
+    assert result["sample_stats"].attrs["evaluations"] < 60_000
+    x = np.linspace(-0.6, 0.6, 9)
+    band = contour_band(result, x)
+    inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
+    assert inside.sum() >= 8
+    assert float((band.upper - band.lower).max()) < 0.02
+    assert check_record(result).passed
+
+
+@pytest.mark.slow
+def test_a_run_is_made_again_from_its_seed_and_has_units():
+    settings = SamplerSettings(ensembles=2, max_steps=20)
+    cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
+    measured = cell.measure(scan(Parabola(5.0, 0.05), rod=SI, drive_step=0.05).record, seed=1)
+    one, other = (infer_contour(measured, family="shape-free", seed=1, settings=settings) for _ in range(2))
+    for name, draws in one["posterior"].data_vars.items():
+        np.testing.assert_array_equal(draws, other["posterior"][name])
+    units = {name: one["posterior"][name].attrs["units"] for name in ("r", "amplitude", "length_scale", "z_1", "q")}
+    assert units == {"r": "m", "amplitude": "1", "length_scale": "rad", "z_1": "1", "q": "m"}
+
+
+@pytest.mark.slow
+def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
+    measured = CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, seed=1)
+
+    def run(steps, **options):
+        settings = SamplerSettings(ensembles=2, block_steps=10, max_steps=steps)
+        return infer_contour(
+            measured, family="shape-free", load_cell=CELL, nuisances=[], seed=1, settings=settings, **options
+        )
+
+    run(10, checkpoint=tmp_path / "run")
+    resumed, whole = run(20, checkpoint=tmp_path / "run"), run(20)
+    for name, draws in whole["posterior"].data_vars.items():
+        np.testing.assert_array_equal(draws, resumed["posterior"][name])
+
+
+def test_coordinates_lead_back():
+    whitening = whitened(model_of())
+    there = np.hstack([whitening.middle[: whitening.bent], 0.3 * np.ones(whitening.middle.size - whitening.bent)])[None]
+    points, _ = whitening.parameters(there)
+    np.testing.assert_allclose(whitening.of(points), there, atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["moment alone", "friction", "drift", "two pivots", "without events", "SI"])
+def test_other_rigs(what):
+    """The truth within the band of 95 % at eight of nine places."""
+    truth, cell, options = paper_profile("II", q=0.5), CELL, {}
+    record = scan(truth, drive_step=np.radians(2.0)).record
+    if what == "friction":
+        truth = Parabola(0.5, 0.5)
+        record = scan(truth, drive_step=np.radians(2.0), friction=0.2).record
+        options = {"nuisances": ["friction"], "settings": SamplerSettings(max_steps=150)}
+    if what == "drift":
+        options = {"nuisances": ["bias", "drift"]}
+    if what == "two pivots":
+        other = scan(truth, drive_step=np.radians(2.0), base=(0.25, 0.0)).record
+        other["sweep"] = other.sweep + 2
+        record = xr.concat([record, other], "sample", combine_attrs="override")
+        options = {"nuisances": ["base"]}
+    measured_with = 2 if what == "without events" else 1
+    if what == "without events":
+        options = {"events": False}
+    scale = 1.0
+    if what == "SI":
+        truth, scale = Parabola(0.5 / SI.length, 0.5 * SI.length), SI.length
+        record = scan(truth, rod=SI, drive_step=np.radians(2.0)).record
+        cell = LoadCell(force_noise=0.05 * SI.force_unit, moment_noise=0.02 * SI.moment_unit)
+    measured = cell.measure(record, seed=measured_with)
+    if what == "moment alone":
+        for name in ("force_x", "force_y"):
+            measured[name] = measured[name] * np.nan
+        options = {"nuisances": []}
+    result = infer_contour(measured, family="shape-free", load_cell=cell, seed=1, **options)
+    x = scale * np.linspace(-0.6, 0.6, 9)
+    band = contour_band(result, x)
+    inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
+    assert inside.sum() >= 8, band
+    assert float((band.upper - band.lower).max()) < 0.1 * scale
+    assert check_record(result).passed

@@ -1,0 +1,364 @@
+"""The likelihood of a whole record, against normal densities summed over exact states."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+from scipy.optimize import brentq
+
+from helpers.contour_posteriors import CELL, DEVIATIONS, swept, without
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.simulation import simulate
+from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
+from tactile_bayes.sweep import scan
+
+SHARE = {False: 3e-4, True: 1e-6}
+"""Error of the interpolated loads over their largest value, at worst, in 150 contours."""
+
+WIRE = Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9)
+WIRE_CELL = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+
+
+def exact_loads(record, contour, friction=0.0):
+    """What an ideal sensor on the record's rig would have felt under the contour, (samples, 3), from `scan`."""
+    out = np.empty((record.sizes["sample"], 3))
+    for sweep in np.unique(record.sweep.values):
+        rows = np.flatnonzero(record.sweep.values == sweep)
+        direction = str(record.direction.values[rows[0]])
+        base = float(record.base_x[rows[0]]), float(record.base_y[rows[0]])
+        angles = record.drive_angle.values[rows]
+        other = scan(
+            contour, direction=direction, base=base, drive_angles=angles, rod=rod_of(record), friction=friction
+        ).record
+        np.testing.assert_array_equal(other.drive_angle.values, angles)
+        out[rows] = np.stack([other[name].values for name in CHANNELS], axis=-1)
+    return out
+
+
+def stack(contours):
+    family = type(contours[0])
+    return family(*(np.array([getattr(c, name) for c in contours], dtype=float) for name in vars(contours[0])))
+
+
+RIGS = {
+    "dimensionless": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "far off": (Parabola(0.5, 0.5), Parabola(0.9, 0.35, -0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "circle": (Circle(0.6, 0.4, 0.1), Circle(0.61, 0.401, 0.1), Rod(), CELL, ((0.0, 0.0),), 0.0),
+    "SI": (Parabola(2.5, 0.1), Parabola(2.52, 0.0999, 0.0004), WIRE, WIRE_CELL, ((0.0, 0.0),), 0.0),
+    "diameter": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(diameter=0.02), CELL, ((0.0, 0.0),), 0.0),
+    "pivots": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.2, 0.1), (-0.3, 0.0)), 0.0),
+    "friction": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.0, 0.0),), 0.3),
+}
+
+
+@cache
+def measured_by(rig):
+    """A record of the first contour, in steps of 5°, that is not to be changed."""
+    true, _, rod, cell, bases, friction = RIGS[rig]
+    return cell.measure(swept(true, bases=bases, rod=rod, friction=friction, step=np.radians(5.0)), seed=3)
+
+
+@cache
+def exact_by(rig):
+    """The loads of the first contour there."""
+    return exact_loads(measured_by(rig), RIGS[rig][0], RIGS[rig][5])
+
+
+ALIKE = ("far off", "circle", "diameter")
+"""Rigs of which the loads are compared in every run, and sums of densities on demand."""
+
+SUMMED = [pytest.param(rig, marks=pytest.mark.slow) if rig in ALIKE else rig for rig in RIGS]
+
+
+@pytest.mark.parametrize("rig", SUMMED)
+def test_against_an_independent_sum(rig):
+    """Loads off by e change a normal log-density by r e/σ² + e²/(2σ²) at most, r the residual."""
+    true, other, rod, cell, _, friction = RIGS[rig]
+    whole = measured_by(rig)
+    exact = [exact_by(rig), exact_loads(whole, other, friction)]
+    scale = np.array([1.0, 1.3])
+    for missing in ((), ("force_x", "force_y"), ("holding_moment",)):
+        measured = without(whole, *missing)
+        values = np.stack([measured[name].values for name in CHANNELS], axis=-1)
+        present = ~np.isnan(values[0])
+        deviation = np.array([cell.standard_deviations[name] for name in CHANNELS])[present]
+        units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])[present]
+        for exactly in (False,) if missing else (False, True):
+            likelihood = RecordLikelihood(measured, cell, friction, exactly)
+            found = likelihood.log_likelihood(stack([true, other]), scale[:, None])
+            pointwise = likelihood.log_likelihood(stack([true, other]), scale[:, None], pointwise=True)
+            np.testing.assert_allclose(pointwise.sum(axis=1), found, rtol=1e-12)
+            for k, loads in enumerate(exact):
+                sigma = scale[k] * deviation
+                densities = stats.norm.logpdf(values[:, present], loads[:, present], sigma).sum(axis=1)
+                expected = densities + np.log(units).sum()  # densities of dimensionless loads
+                error = SHARE[exactly] * np.abs(loads[:, present]).max(axis=0)
+                slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
+                assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
+
+
+def swept_in(rig):
+    true, other, _, cell, _, friction = RIGS[rig]
+    return measured_by(rig), stack([true, other]), cell, friction
+
+
+@pytest.mark.parametrize("rig", SUMMED)
+def test_the_frame_of_the_load_cell_does_not_matter(rig):
+    """With noise of one size on both forces, turning data and prediction alike changes no density."""
+    measured, contours, cell, friction = swept_in(rig)
+    scale = np.array([1.0, 1.3])[:, None]
+    fixed = RecordLikelihood(measured, cell, friction)
+    turning = RecordLikelihood(in_frame(measured, "turning"), cell, friction)
+    for pointwise in (False, True):
+        expected = fixed.log_likelihood(contours, scale, pointwise=pointwise)
+        found = turning.log_likelihood(contours, scale, pointwise=pointwise)
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_predictions_are_in_the_frame_of_the_record(rig):
+    measured, contours, cell, friction = swept_in(rig)
+    likelihood = RecordLikelihood(in_frame(measured, "turning"), cell, friction, True)
+    predicted, _ = likelihood.predict(contours)
+    rod = RIGS[rig][2]
+    load, angle = exact_by(rig), measured.drive_angle.values
+    exact = np.stack(
+        [
+            load[:, 0] / rod.moment_unit,
+            (load[:, 1] * np.cos(angle) + load[:, 2] * np.sin(angle)) / rod.force_unit,
+            (load[:, 2] * np.cos(angle) - load[:, 1] * np.sin(angle)) / rod.force_unit,
+        ],
+        axis=-1,
+    )
+    largest = np.abs(load / np.array([rod.moment_unit, rod.force_unit, rod.force_unit])).max(axis=0)
+    error = SHARE[True] * np.array([largest[0], *[np.sum(largest[1:])] * 2])
+    assert np.all(np.abs(predicted[0] - exact) <= error)
+    np.testing.assert_array_equal(likelihood.measured[:, 0], measured.holding_moment.values / rod.moment_unit)
+
+
+@pytest.mark.parametrize("missing", [("force_x", "force_y"), ("force_x",), ("force_y",), ("holding_moment", "force_y")])
+def test_channels_may_be_missing_where_the_load_cell_turns(missing):
+    """A single force is compared along its own axis, which the record alone could not be turned out of."""
+    measured, contours, cell, _ = swept_in("dimensionless")
+    turning = without(in_frame(measured, "turning"), *missing)
+    likelihood = RecordLikelihood(turning, cell)
+    whole, _ = RecordLikelihood(in_frame(measured, "turning"), cell).predict(contours)
+    present = [k for k, name in enumerate(CHANNELS) if name not in missing]
+    densities = stats.norm.logpdf(
+        np.stack([turning[CHANNELS[k]].values for k in present], axis=-1), whole[..., present], DEVIATIONS[present]
+    )
+    np.testing.assert_allclose(likelihood.log_likelihood(contours), densities.sum(axis=(1, 2)), rtol=1e-11)
+    if missing == ("force_x", "force_y"):
+        fixed = RecordLikelihood(without(measured, *missing), cell)
+        np.testing.assert_array_equal(likelihood.log_likelihood(contours), fixed.log_likelihood(contours))
+
+
+def test_truth_is_more_likely_than_what_is_a_little_off():
+    measured = CELL.measure(swept(Parabola(0.5, 0.5)), seed=3)
+    off = [Parabola(0.5, 0.5), Parabola(0.51, 0.5), Parabola(0.5, 0.502), Parabola(0.5, 0.5, 0.005)]
+    values = RecordLikelihood(measured, CELL).log_likelihood(stack(off))
+    assert np.argmax(values) == 0
+
+
+def test_a_contour_out_of_reach_of_any_pivot_is_impossible():
+    record = swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.3, 0.1)))
+    likelihood = RecordLikelihood(record, CELL)
+    contours = [
+        Parabola(0.5, 0.5),
+        Parabola(0.5, 1.02),  # within reach of the second pivot only
+        Parabola(0.5, 1.3),
+        Parabola(0.5, -0.1),
+        Parabola(2.0, 0.05, 0.3),  # cuts the second pivot
+    ]
+    found = likelihood.log_likelihood(stack(contours))
+    assert np.isfinite(found).tolist() == [True, False, False, False, False]
+    assert np.all(np.isneginf(found[1:]))
+    assert np.all(np.isneginf(likelihood.log_likelihood(stack(contours), pointwise=True)[1:]))
+
+
+def test_snap_off_tells_contours_apart():
+    """Across the contour that lets go at a sample's drive angle, likelihood jumps by what that sample says."""
+    record = swept(Parabola(0.5, 0.5), direction="forward")
+    measured = CELL.measure(record, seed=3)
+    last = int(np.flatnonzero(record.force_y.values)[-1])
+    angle = float(record.drive_angle[last])
+
+    def late(q):
+        return (
+            scan(Parabola(0.5, q), direction="forward", drive_step=0.5).events["forward"].snap_off.drive_angle - angle
+        )
+
+    q = brentq(late, 0.45, 0.55, xtol=1e-13)
+    sides = sorted((q - 1e-9, q + 1e-9), key=late)
+    assert late(sides[0]) < 0.0 < late(sides[1])
+    likelihood = RecordLikelihood(measured, CELL, exact=True)
+    let_go, held_on = likelihood.log_likelihood(stack([Parabola(0.5, q) for q in sides]))
+    values = np.array([float(measured[name][last]) for name in CHANNELS])
+    load = exact_loads(measured, Parabola(0.5, sides[1]))[last]
+    jump = (stats.norm.logpdf(values, load, DEVIATIONS) - stats.norm.logpdf(values, 0.0, DEVIATIONS)).sum()
+    assert held_on - let_go > 1000.0
+    # All loads of a contour that is 1e-9 off change by about as much, over deviations of 0.02 in 100 samples.
+    np.testing.assert_allclose(held_on - let_go, jump, rtol=1e-4)
+
+
+def test_order_of_sweeps_and_their_number_do_not_matter():
+    measured = CELL.measure(swept(Parabola(0.5, 0.5), bases=((0.0, 0.0), (0.2, 0.1))), seed=3)
+    contours = stack([Parabola(0.5, 0.5), Parabola(0.505, 0.5)])
+    expected = RecordLikelihood(measured, CELL).log_likelihood(contours)
+    mixed = measured.isel(sample=np.random.default_rng(1).permutation(measured.sizes["sample"]).argsort(kind="stable"))
+    mixed = mixed.sortby("sweep", ascending=False)
+    pointwise = RecordLikelihood(mixed, CELL).log_likelihood(contours, pointwise=True)
+    np.testing.assert_allclose(pointwise.sum(axis=1), expected, rtol=1e-12)
+    again = measured.copy()
+    again["sweep"] = again.sweep + 4
+    twice = xr.concat([measured, again], "sample", combine_attrs="override")
+    np.testing.assert_allclose(RecordLikelihood(twice, CELL).log_likelihood(contours), 2.0 * expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+def test_a_drive_that_turns_back_in_contact_meets_the_same_side(direction):
+    """The way back takes the same states in reverse: contact points and likelihood know it by the moment's sign."""
+    contour = Parabola(0.5, 0.5)
+    out = scan(contour, direction=direction).record
+    out = out.isel(sample=slice(0, 100)).drop_vars([n for n in out.data_vars if n.startswith("truth_holding")])
+    back = out.isel(sample=slice(None, None, -1))
+    other = {"forward": "backward", "backward": "forward"}[direction]
+    columns = {
+        name: np.concatenate([out[name].values, back[name].values])
+        for name in (*CHANNELS, "drive_angle", "truth_contact_x")
+    }
+    columns |= {"sweep": np.repeat([0, 1], 100), "direction": np.repeat([direction, other], 100)}
+    both = make_record(columns)
+    contacts = reconstruct(both)
+    np.testing.assert_allclose(contacts.contact_x, both.truth_contact_x, atol=1e-10)
+    likelihood = RecordLikelihood(both, CELL)
+    predicted, _ = likelihood.predict(stack([contour]))
+    np.testing.assert_allclose(predicted[0], likelihood.measured, atol=1e-3)
+    noisy = RecordLikelihood(CELL.measure(both, seed=1), CELL)
+    np.testing.assert_array_equal(noisy.predict(stack([contour]))[0], predicted)
+
+
+def test_a_channel_without_noise_is_refused():
+    likelihood = RecordLikelihood(swept(Parabola(0.5, 0.5)), LoadCell(moment_noise=0.02))
+    with pytest.raises(ParameterError, match="force_x is measured, but the load cell has no noise on it"):
+        likelihood.log_likelihood(stack([Parabola(0.5, 0.5)]))
+
+
+@pytest.mark.parametrize("missing", [(), ("force_x", "force_y")])
+def test_a_moment_that_is_counted_the_other_way_round_turns_no_side(missing):
+    """The side of contact follows the moment's sign, once the cell's known gain and bias are taken out of it."""
+    upright = LoadCell(force_noise=0.05, moment_noise=0.02)
+    turned = LoadCell(
+        force_noise=0.05,
+        moment_noise=0.02,
+        gain=((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        bias=(30.0, 0.0, 0.0),
+    )
+    contour = Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0]))
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(3.0)).record
+    values = []
+    for cell in (upright, turned):
+        measured = without(cell.measure(record, seed=1), *missing)
+        values.append(RecordLikelihood(measured, cell).log_likelihood(contour)[0])
+    # Not one number: the noise on the moment has the other sign.
+    assert values[0] == pytest.approx(values[1], abs=4.0 * np.sqrt(2.0 * record.sizes["sample"]))
+
+
+def test_events_lie_where_most_samples_say():
+    """Also where some of them are taken for what they are not."""
+    record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
+    likelihood = RecordLikelihood(record, LoadCell(force_noise=0.05, moment_noise=0.02))
+    loaded = (record.force_y != 0.0).values
+    events = likelihood.event_samples(loaded)
+    for row, direction in zip(events, ("forward", "backward"), strict=True):
+        own = np.flatnonzero((record.direction == direction).values)
+        inside = own[loaded[own]]
+        assert row.tolist() == [inside[0] - 1, inside[0], inside[-1], inside[-1] + 1]
+    mistaken = loaded.copy()
+    mistaken[[events[0, 3] + 3, events[1, 0] - 2, events[0, 1] + 4]] ^= True
+    np.testing.assert_array_equal(likelihood.event_samples(mistaken), events)
+    angles = likelihood.event_angles(loaded)
+    snap_offs = likelihood.snap_offs(Parabola(np.array([0.5]), np.array([0.5]), np.array([0.0])))[0]
+    assert np.all((angles[:, 2] < snap_offs) & (snap_offs < angles[:, 3]))
+
+
+def test_no_events_without_a_load():
+    record = scan(Parabola(0.5, 0.5), drive_step=0.05).record
+    likelihood = RecordLikelihood(record, LoadCell(force_noise=0.05, moment_noise=0.02))
+    assert (likelihood.event_samples(np.zeros(record.sizes["sample"], dtype=bool)) == -1).all()
+
+
+def exact_sensed(model, point):
+    """What the cell senses of one point, (1, samples, 3), from states at the drive angles to rounding."""
+    likelihood, rig = model.likelihood, model.rig(point)
+    paths = likelihood.paths(model.contours(point), rig)
+    stroke = likelihood.stroke_of_sample
+    signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.strokes])[stroke]
+    found = paths.states(stroke, likelihood.seen_angles - signs * likelihood.misread(rig)[0]).wrench
+    loads = np.stack([signs * found.holding_moment, signs * found.force_x, found.force_y], axis=-1)
+    scaled = np.atleast_1d(rig.rigidity_scale)[:, None, None] * np.nan_to_num(loads)[None]
+    return model.nuisances.sensed(scaled, model.values(point), likelihood.load_cell)
+
+
+def off_at_the_truth(noise, family, numbers):
+    """By how much log-likelihoods of records from the default prior differ from exact ones."""
+    cell = LoadCell(force_noise=0.05 * noise, moment_noise=0.02 * noise)
+    experiment = experiment_of(
+        seed=1,
+        family=family,
+        load_cell=cell,
+        rod=None,
+        base=(0.0, 0.0),
+        direction="both",
+        drive_angles=None,
+        priors=None,
+        nuisances=STANDARD,
+        friction=0.0,
+        events=True,
+        settings=None,
+        probability=0.9,
+        world=None,
+    )
+    off = []
+    for number in numbers:
+        simulation = simulate(experiment, np.random.default_rng([9, number]))
+        model = experiment.problem_of(simulation.measured).model
+        point = np.array([[simulation.truth[name] for name in model.names]])
+        reached = np.ones(1, dtype=bool)
+        scale = model.noise_scale(point)
+        exact = model.likelihood.score(exact_sensed(model, point)[:, None], reached, scale)
+        off.append(float((model.likelihood.score(model.loads(point)[:, None], reached, scale) - exact)[0]))
+    return np.abs(off)
+
+
+@pytest.mark.parametrize(
+    ("noise", "family", "count"),
+    [
+        (1.0, "parabola", 30),
+        (0.01, "parabola", 30),
+        *(pytest.param(noise, "parabola", 1000, marks=pytest.mark.slow) for noise in (1.0, 0.1, 0.01)),
+        *(
+            pytest.param(noise, name, 300, marks=pytest.mark.slow)
+            for noise in (1.0, 0.1, 0.01)
+            for name in ("power-law", "ellipse")
+        ),
+    ],
+)
+def test_interpolation_is_not_felt_at_the_truth(noise, family, count):
+    """Log-likelihoods of default-prior records, near pivots too, are within 0.05 of the exact ones."""
+    assert off_at_the_truth(noise, family, range(count)).max() < 0.05
+
+
+def test_interpolation_is_not_felt_where_the_tip_touches_for_a_millionth_of_the_path():
+    assert off_at_the_truth(0.01, "parabola", [610]).max() < 0.05

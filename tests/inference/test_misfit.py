@@ -1,0 +1,54 @@
+"""Misfit: both family and rig are named, and nothing is suggested that was done already."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from helpers.comparisons import made_up
+from tactile_bayes.comparison.verdict import NONE_FITS, verdict_on
+from tactile_bayes.inference.misfit import what_to_try
+
+EVERY = ["friction", "gain", "drift", "lever", "backlash", "suspension_compliance"]
+
+
+def suggested(nuisances, **stated):
+    found = re.search(r"--nuisance ([^)]*)\)", what_to_try(["parabola"], nuisances, **stated))
+    return found[1].split(", ") if found else []
+
+
+@pytest.mark.parametrize(
+    ("inferred", "name"),
+    [
+        (["friction"], "friction"),
+        (["moment_gain"], "gain"),
+        (["force_x_drift", "force_y_drift"], "drift"),
+        (["lever_x"], "lever"),
+        (["backlash"], "backlash"),
+        (["suspension_compliance"], "suspension_compliance"),
+    ],
+)
+def test_what_was_inferred_is_not_suggested(inferred, name):
+    assert suggested(inferred) == [other for other in EVERY if other != name]
+
+
+def test_what_would_be_refused_is_not_suggested():
+    assert suggested([], friction=0.2) == EVERY[1:]
+    assert suggested(["rigidity_scale"])[1] == "gain in place of rigidity_scale"
+
+
+def test_where_everything_was_inferred_only_family_and_rod_are_left():
+    words = what_to_try(["circle"], ["friction", "moment_gain", "force_y_drift", "lever_y", "backlash", EVERY[-1]])
+    assert "It may be the family or the rig. Try another family (--family shape-free, or compare); a rod that" in words
+
+
+def test_the_smooth_family_is_not_suggested_where_it_was_tried():
+    assert "Try another family (compare), or infer more" in what_to_try(["parabola", "shape-free"])
+
+
+def test_a_comparison_in_which_none_fits_names_both():
+    found = made_up([0.6, 0.4], fits=False).assign_attrs(nuisances='["rigidity_scale", "friction"]')
+    words = verdict_on(found)
+    assert words.startswith(f"{NONE_FITS} (parabola, circle). ")
+    assert words.endswith(what_to_try(["parabola", "circle"], ["rigidity_scale", "friction"]))

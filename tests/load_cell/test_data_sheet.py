@@ -1,0 +1,285 @@
+"""The data sheet of a load cell: what it refuses, its units, and its way through records and files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from helpers.load_cells import cell, ideal, load_cells
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import CHANNELS, LOAD_CELL_UNITS, frame_of, read_record, to_dimensionless, write_record
+
+SIZES = ("force_noise", "moment_noise", "relative_noise", "force_resolution", "moment_resolution")
+rods = st.builds(Rod, st.floats(0.3, 3.0), st.floats(0.3, 3.0))
+
+
+@pytest.mark.parametrize(
+    ("sheet", "has_them"),
+    [
+        ({}, False),
+        ({"force_noise": 0.1}, False),
+        ({"moment_noise": 0.1, "force_resolution": 0.1}, False),
+        ({"force_noise": 0.1, "moment_noise": 0.1}, True),
+        ({"force_noise": 0.1, "moment_noise": 0.1, "degrees_of_freedom": 2.1}, True),
+        ({"force_noise": 0.1, "moment_noise": 0.1, "degrees_of_freedom": 2.0}, False),
+    ],
+)
+def test_variances_are_of_every_channel_and_finite(sheet, has_them):
+    cell = LoadCell(**sheet)
+    assert cell.has_variances is has_them
+    assert all(0.0 < deviation < np.inf for deviation in cell.standard_deviations.values()) is has_them
+
+
+# --- What is refused --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [*SIZES, "drive_angle_noise", "drive_angle_resolution"])
+@pytest.mark.parametrize("value", [-1e-9, np.nan, np.inf])
+def test_an_impossible_size_is_refused(name, value):
+    with pytest.raises(ParameterError, match=f"the load cell's {name} is .*: give a (standard dev|step, z|share, z)"):
+        LoadCell(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["force_range", "moment_range", "degrees_of_freedom"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan])
+def test_an_impossible_range_is_refused(name, value):
+    with pytest.raises(ParameterError, match=f"the load cell's {name} is .*: give a positive number, inf for none"):
+        LoadCell(**{name: value})
+
+
+@pytest.mark.parametrize(
+    "name", [*SIZES, "force_range", "degrees_of_freedom", "drive_angle_offset", "drive_angle_backlash"]
+)
+@pytest.mark.parametrize("value", ["0.1", None, (0.1, 0.2), np.ones(1), [[1], [2, 3]], {}, 1j, True, np.False_])
+def test_what_is_no_number_is_refused(name, value):
+    with pytest.raises(ParameterError, match=rf"the load cell's {name} is .*: give a number"):
+        LoadCell(**{name: value})
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("name", ["drive_angle_offset", "drive_angle_backlash"])
+def test_an_offset_that_is_no_angle_is_refused(name, value):
+    with pytest.raises(ParameterError, match=rf"{name} is .*: give an angle \[rad\]"):
+        LoadCell(**{name: value})
+
+
+@pytest.mark.parametrize("value", [0.1, (0.1,), (0.1, 0.2, 0.3), "12", (0.1, np.nan), None, (True, 0)])
+def test_a_lever_that_is_no_point_is_refused(value):
+    with pytest.raises(ParameterError, match=r"(?s)the load cell's lever is .*: give two finite numbers \(x, y\)"):
+        LoadCell(lever=value)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        0.1,
+        (0.1, 0.2),
+        "123",
+        (0.1, 0.2, np.nan),
+        (0.1, 0.2, "3"),
+        np.eye(3),
+        None,
+        {"force_x": 1},
+        (1j, 0, 0),
+        (True, 0, 0),
+    ],
+)
+@pytest.mark.parametrize("name", ["bias", "bias_uncertainty", "correlation"])
+def test_three_numbers_are_wanted(name, value):
+    first = "holding_moment with force_x" if name == "correlation" else "holding_moment, force_x"
+    with pytest.raises(ParameterError, match=rf"(?s)the load cell's {name} is .*: give three finite numbers \({first}"):
+        LoadCell(**{name: value})
+
+
+@pytest.mark.parametrize(
+    "value",
+    [1.01, (1.0, 1.0, 1.0), np.eye(2), "abc", None, [[1, 0, 0], [0, 1, 0], 1], ((1, 0, 0), (0, 1, 0), (0, 0, np.nan))],
+)
+def test_a_gain_that_is_no_matrix_is_refused(value):
+    with pytest.raises(ParameterError, match=r"(?s)load cell's gain is .*: give three rows of three numbers, \(\(1"):
+        LoadCell(gain=value)
+
+
+@pytest.mark.parametrize("value", [np.zeros((3, 3)), ((1, 0, 0), (0, 1, 1), (0, 1, 1)), np.diag([1.0, 0.0, 1.0])])
+def test_a_gain_that_loses_a_load_is_refused(value):
+    with pytest.raises(ParameterError, match="such a cell cannot tell three loads apart: give rows that are"):
+        LoadCell(gain=value)
+
+
+def test_a_negative_uncertainty_is_refused():
+    with pytest.raises(ParameterError, match="give three standard deviations, each zero or positive"):
+        LoadCell(bias_uncertainty=(0.0, -0.1, 0.0))
+
+
+@pytest.mark.parametrize("value", [(1.0, 0.0, 0.0), (0.9, 0.9, -0.9), (-0.6, -0.6, -0.6), (0.0, 1.5, 0.0)])
+def test_a_correlation_that_nothing_has_is_refused(value):
+    with pytest.raises(
+        ParameterError, match=r"no noise has these coefficients between holding_moment .*: give smaller"
+    ):
+        LoadCell(correlation=value)
+
+
+def test_a_step_beyond_the_range_is_refused():
+    with pytest.raises(ParameterError, match=r"force_resolution is 2\.0, more than its force_range, 1\.0: give"):
+        LoadCell(force_resolution=2.0, force_range=1.0)
+    assert LoadCell(force_resolution=1.0, force_range=1.0).limit[1] == 1.0
+
+
+@pytest.mark.parametrize("value", [0.1, "random_walk", RandomWalk, (0.1, 0.1)])
+def test_a_drift_that_is_no_law_is_refused(value):
+    with pytest.raises(ParameterError, match=r"drift is .*: give RandomWalk\(...\) or OrnsteinUhlenbeck\(...\)"):
+        LoadCell(drift=value)
+
+
+@pytest.mark.parametrize("law", [RandomWalk, OrnsteinUhlenbeck])
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, "0.1", None, (0.1,)])
+def test_an_impossible_drift_is_refused(law, value):
+    for name in ("moment", "force"):
+        with pytest.raises(ParameterError, match=f"{law.__name__}: {name} is .*: give zero or a positive number"):
+            law(**{name: value})
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "3"])
+def test_an_impossible_time_is_refused(value):
+    with pytest.raises(ParameterError, match=r"OrnsteinUhlenbeck: time is .*: give"):
+        OrnsteinUhlenbeck(moment=0.1, time=value)
+
+
+@pytest.mark.parametrize("value", ["rotating", "", 1, ["fixed"], np.array(["fixed"])])
+def test_a_frame_that_is_none_is_refused(value):
+    with pytest.raises(ParameterError, match=r"frame is .*: choose 'fixed' or 'turning', or None"):
+        LoadCell(frame=value)
+
+
+def test_outliers_that_are_correlated_are_refused():
+    with pytest.raises(ParameterError, match="go together in more than one way: leave one of the two out"):
+        LoadCell(degrees_of_freedom=4.0, correlation=(0.0, 0.1, 0.0))
+
+
+# --- One form ---------------------------------------------------------------------------------------------------
+
+
+def test_lists_arrays_and_whole_numbers_are_the_same_as_tuples():
+    lists = LoadCell(force_noise=np.float64(1), bias=[1, 2, 3], gain=np.eye(3), drift=RandomWalk(force=np.int64(1)))
+    tuples = LoadCell(force_noise=1.0, bias=(1.0, 2.0, 3.0), drift=RandomWalk(force=1.0))
+    assert lists == tuples
+    assert hash(lists) == hash(tuples)
+    assert type(lists.force_noise) is float
+
+
+def test_a_drift_of_no_size_is_none():
+    assert LoadCell(drift=RandomWalk()) == LoadCell(drift=OrnsteinUhlenbeck(time=7.0)) == LoadCell()
+
+
+@given(load_cells())
+def test_entries_say_everything(sheet):
+    assert LoadCell.from_entries(sheet.entries()) == sheet
+    assert set(sheet.entries()) <= {*LOAD_CELL_UNITS, "frame"}
+    assert LoadCell().entries() == {}
+
+
+def test_entries_that_are_none_are_refused():
+    with pytest.raises(ParameterError, match=r"has no entry 'Force_noize': did you mean 'force_noise'\? An attribute"):
+        LoadCell.from_entries({"Force_noize": 0.1})
+    with pytest.raises(ParameterError, match=r"has no entry 'q': there are frame, force_noise, .*, drive_angle_resol"):
+        LoadCell.from_entries({"q": 0.1})
+    both = {"random_walk_force": 0.1, "ornstein_uhlenbeck_force": 0.1}
+    with pytest.raises(ParameterError, match="drifts by a random walk or an Ornstein-Uhlenbeck process, not by both"):
+        LoadCell.from_entries(both)
+    with pytest.raises(ParameterError, match="force_noise is 'much': give a number"):
+        LoadCell.from_entries({"force_noise": "much"})
+
+
+# --- Records and files ------------------------------------------------------------------------------------------
+
+
+def test_the_data_sheet_goes_with_the_record():
+    assert LoadCell.from_record(ideal()) is None
+    half = ideal()
+    half.attrs["load_cell_force_noise"] = 0.5
+    assert LoadCell.from_record(half) == LoadCell(force_noise=0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ["csv", "nc"])
+@settings(max_examples=4, deadline=None)
+@given(sheet=load_cells(), rod=rods)
+def test_files_keep_the_data_sheet(tmp_path_factory, ending, sheet, rod):
+    measured = sheet.measure(ideal(20, rod=rod), seed=1)
+    assert frame_of(measured) == (sheet.frame or "fixed")
+    path = tmp_path_factory.mktemp("measured") / f"record.{ending}"
+    write_record(measured, path)
+    read = read_record(path)
+    for record in (measured, read):
+        assert LoadCell.from_record(record) == LoadCell.from_entries({**sheet.entries(), "frame": None})
+    for name in (*CHANNELS, "drive_angle"):
+        np.testing.assert_array_equal(read[name], measured[name])
+
+
+@pytest.mark.parametrize("ending", ["csv", "nc"])
+def test_a_lever_and_a_backlash_are_kept_with_their_units(tmp_path, ending):
+    sheet, path = LoadCell(lever=(0.001, -0.002), drive_angle_backlash=-0.003), tmp_path / f"record.{ending}"
+    write_record(sheet.measure(ideal(20, rod=Rod(0.2, 2.4e-3)), seed=1), path)
+    assert LoadCell.from_record(read_record(path)) == sheet
+    if ending == "csv":
+        header = path.read_text(encoding="utf-8")
+        assert "# load_cell_lever_y: -0.002 [m]" in header
+        assert "# load_cell_drive_angle_backlash: -0.003 [rad]" in header
+        path.write_text(header.replace("lever_y: -0.002 [m]", "lever_y: -2.0 [mm]"), encoding="utf-8")
+        assert LoadCell.from_record(read_record(path)) == sheet
+
+
+@pytest.mark.parametrize(("name", "value"), [("noise", 1e3), ("offset", 57.3)])
+def test_an_encoder_in_degrees_is_refused_where_it_measures(name, value):
+    with pytest.raises(ParameterError, match=r"the encoder reads .* more than a turn \(2π\): give a smaller .*radians"):
+        LoadCell(**{f"drive_angle_{name}": value}).measure(ideal(), seed=1)
+
+
+# --- Units ------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=15, deadline=None)
+@given(load_cells(), rods, st.integers(0, 2**31))
+def test_what_it_does_is_the_same_in_all_units(sheet, rod, seed):
+    record = ideal(20, rod=rod)
+    si = sheet.measure(record, seed=seed)
+    dimensionless = sheet.dimensionless(rod).measure(to_dimensionless(record), seed=seed)
+    converted = to_dimensionless(si)
+    assert set(converted.data_vars) == set(dimensionless.data_vars)
+    for name in (*CHANNELS, "drive_angle"):
+        np.testing.assert_allclose(converted[name], dimensionless[name], rtol=1e-9, atol=1e-9)
+    assert entries_of(LoadCell.from_record(converted)) == pytest.approx(
+        entries_of(LoadCell.from_record(dimensionless)), rel=1e-13
+    )
+
+
+def entries_of(sheet):
+    return {name: value for name, value in sheet.entries().items() if value != 0.0}
+
+
+@settings(max_examples=15, deadline=None)
+@given(load_cells(frames=(None,)), rods, st.integers(0, 2**31))
+def test_the_likelihood_is_the_same_in_all_units_but_for_their_jacobian(sheet, rod, seed):
+    loads = np.random.default_rng(seed).normal(size=(4, 6, 3))
+    measured = sheet.simulate(loads[0], seed=seed)
+    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    try:
+        si = sheet.log_likelihood(measured, loads, pointwise=True)
+    except ParameterError:
+        with pytest.raises(ParameterError):
+            sheet.dimensionless(rod).log_likelihood(measured / units, loads / units, pointwise=True)
+        assume(False)
+    dimensionless = sheet.dimensionless(rod).log_likelihood(measured / units, loads / units, pointwise=True)
+    steps = (sheet.resolution > 0.0) & (not sheet.approximations)
+    density = ~steps & (np.abs(measured) < sheet.limit * (1 - 1e-9))
+    shift = np.sum(density * np.log(units), axis=-1)
+    np.testing.assert_allclose(dimensionless, si + shift, rtol=1e-7, atol=1e-7)
+
+
+def test_a_rod_without_size_changes_nothing():
+    sheet = cell(gain=np.eye(3) + 0.01, lever=(0.1, 0.2), drift=RandomWalk(force=0.1), force_range=1.0, frame="turning")
+    assert sheet.dimensionless(Rod()) == sheet

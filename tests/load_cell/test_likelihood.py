@@ -1,0 +1,381 @@
+"""How likely readings are where they are normal: against the dense covariance of all of them, written out."""
+
+from __future__ import annotations
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis.extra import numpy as hnp
+from scipy import stats
+
+from helpers.load_cells import CELL, NORMAL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS
+
+numbers = st.floats(-100, 100)
+factors = st.floats(0.01, 100)
+
+
+# --- White noise ------------------------------------------------------------------------------------------------
+
+
+def log_densities(measured, predicted, noise_scale):
+    """Every sample and channel by itself."""
+    deviations = np.array(list(CELL.standard_deviations.values())) * noise_scale
+    return stats.norm.logpdf(measured, predicted, deviations[..., None, :])
+
+
+# The sum of n log-densities is right to n roundings of its largest terms.
+@given(
+    st.integers(1, 8).flatmap(
+        lambda n: st.tuples(
+            hnp.arrays(float, (n, 3), elements=numbers), hnp.arrays(float, (2, 4, n, 3), elements=numbers)
+        )
+    ),
+    st.sets(st.sampled_from([0, 1, 2])),
+    st.sampled_from([(), (1,), (3,), (4, 1), (4, 3), (2, 1, 1), (2, 1, 3), (2, 4, 3)]).flatmap(
+        lambda shape: hnp.arrays(float, shape, elements=factors)
+    ),
+)
+def test_the_log_likelihood_is_the_sum_of_normal_log_densities(arrays, missing, noise_scale):
+    measured, predicted = arrays
+    present = [index for index in range(3) if index not in missing]
+    measured[:, list(missing)] = np.nan
+    densities = log_densities(measured, predicted, noise_scale)[..., present]
+    result = CELL.log_likelihood(measured, predicted, noise_scale=noise_scale)
+    assert result.shape == (2, 4)
+    tolerance = 1e-14 * (np.abs(densities).sum(axis=(-2, -1)) + 24 * np.log(100) + 1)
+    assert (np.abs(result - densities.sum(axis=(-2, -1))) <= tolerance).all()
+    pointwise = CELL.log_likelihood(measured, predicted, noise_scale=noise_scale, pointwise=True)
+    assert pointwise.shape == (2, 4, len(measured))
+    assert (np.abs(pointwise - densities.sum(axis=-1)) <= tolerance[..., None]).all()
+    assert (np.abs(pointwise.sum(axis=-1) - result) <= 2 * tolerance).all()
+
+
+def test_one_prediction_or_a_batch_give_the_same():
+    rng = np.random.default_rng(5)
+    measured, predicted = rng.normal(size=(9, 3)), rng.normal(size=(4, 9, 3))
+    batch = CELL.log_likelihood(measured, predicted)
+    single = [CELL.log_likelihood(measured, one) for one in predicted]
+    assert np.shape(single[0]) == ()
+    np.testing.assert_allclose(batch, single, rtol=1e-14)
+    scales = np.array([0.5, 1.0, 2.0, 4.0])
+    one_by_one = [CELL.log_likelihood(measured, predicted[0], noise_scale=scale) for scale in scales]
+    result = CELL.log_likelihood(measured, predicted[0], noise_scale=scales[:, None])
+    np.testing.assert_allclose(result, one_by_one, rtol=1e-14)
+
+
+def test_one_prediction_takes_many_factors_for_each_channel():
+    rng = np.random.default_rng(7)
+    measured, predicted = rng.normal(size=(2, 9, 3))
+    scales = rng.uniform(0.5, 2.0, (4, 3))
+    expected = log_densities(measured, predicted, scales).sum(axis=-1)
+    pointwise = CELL.log_likelihood(measured, predicted, noise_scale=scales, pointwise=True)
+    np.testing.assert_allclose(pointwise, expected, rtol=1e-13)
+    total = CELL.log_likelihood(measured, predicted, noise_scale=scales)
+    np.testing.assert_allclose(total, expected.sum(axis=-1), rtol=1e-13)
+
+
+@pytest.mark.parametrize("pointwise", [False, True])
+@pytest.mark.parametrize("missing", [[0], [1], [0, 2]])
+def test_the_factor_of_a_missing_channel_does_not_matter(missing, pointwise):
+    rng = np.random.default_rng(8)
+    measured, predicted = rng.normal(size=(9, 3)), rng.normal(size=(4, 9, 3))
+    measured[:, missing] = np.nan
+    scales = rng.uniform(0.5, 2.0, (4, 3))
+    result = CELL.log_likelihood(measured, predicted, noise_scale=scales, pointwise=pointwise)
+    others = scales.copy()
+    others[:, missing] = 7.0
+    again = CELL.log_likelihood(measured, predicted, noise_scale=others, pointwise=pointwise)
+    np.testing.assert_array_equal(again, result)
+    present = [index for index in range(3) if index not in missing]
+    expected = log_densities(measured, predicted, scales)[..., present].sum(axis=-1)
+    np.testing.assert_allclose(result, expected if pointwise else expected.sum(axis=-1), rtol=1e-13)
+
+
+def test_the_arguments_are_not_changed():
+    measured, predicted = np.ones((4, 3)), np.zeros((2, 4, 3))
+    scales = np.full((2, 3), 2.0)
+    for pointwise in (False, True):
+        CELL.log_likelihood(measured, predicted, noise_scale=scales, pointwise=pointwise)
+    assert (measured == 1).all()
+    assert (predicted == 0).all()
+    assert (scales == 2).all()
+
+
+def test_a_prediction_without_a_value_has_none_either():
+    predicted = np.zeros((2, 4, 3))
+    predicted[1, 2, 0] = np.nan
+    result = CELL.log_likelihood(np.ones((4, 3)), predicted)
+    assert np.isfinite(result).tolist() == [True, False]
+    pointwise = CELL.log_likelihood(np.ones((4, 3)), predicted, pointwise=True)
+    assert np.argwhere(np.isnan(pointwise)).tolist() == [[1, 2]]
+
+
+def test_nothing_measured_says_nothing():
+    assert CELL.log_likelihood(np.full((4, 3), np.nan), np.zeros((2, 4, 3))).tolist() == [0, 0]
+    assert LoadCell().log_likelihood(np.empty((0, 3)), np.empty((0, 3))) == 0
+    pointwise = CELL.log_likelihood(np.full((4, 3), np.nan), np.zeros((2, 4, 3)), noise_scale=[2, 3, 4], pointwise=True)
+    assert pointwise.tolist() == [[0] * 4] * 2
+    assert LoadCell().log_likelihood(np.empty((0, 3)), np.empty((0, 3)), pointwise=True).shape == (0,)
+
+
+# --- Everything that is normal ----------------------------------------------------------------------------------
+
+N = 6
+MISSING = ((), (0,), (2,), (0, 1))
+
+
+def dense(sheet, measured, loads, noise_scale, samples=N):
+    """Log-density of the first samples from the covariance of all readings that were made."""
+    mean, covariance = moments(sheet, loads, noise_scale)
+    there = np.flatnonzero(~np.isnan(measured.ravel()) & (np.arange(measured.size) < 3 * samples))
+    if not there.size:
+        return 0.0
+    return stats.multivariate_normal(mean[there], covariance[np.ix_(there, there)]).logpdf(measured.ravel()[there])
+
+
+def drawn(seed, batch=(), missing=()):
+    rng = np.random.default_rng(seed)
+    measured = 0.2 * rng.normal(size=(N, 3))
+    measured[:, list(missing)] = np.nan
+    return measured, 0.5 * rng.normal(size=(*batch, N, 3)), rng
+
+
+@pytest.mark.parametrize("missing", MISSING)
+@pytest.mark.parametrize("name", NORMAL)
+def test_it_is_the_dense_normal_density(name, missing):
+    sheet = NORMAL[name]
+    measured, loads, rng = drawn(1, (4,), missing)
+    if sheet.gain != CELL.gain and missing:
+        loads[..., list(missing)] = 0.0
+    scale = rng.uniform(0.5, 2.0, (4, 3))
+    expected = [dense(sheet, measured, *pair) for pair in zip(loads, scale, strict=True)]
+    np.testing.assert_allclose(sheet.log_likelihood(measured, loads, noise_scale=scale), expected, rtol=1e-11)
+
+
+@pytest.mark.parametrize("name", NORMAL)
+def test_a_sample_is_given_those_before_it(name):
+    """The ratio of the densities of i + 1 samples and of i."""
+    sheet = NORMAL[name]
+    measured, loads, _ = drawn(2)
+    pointwise = sheet.log_likelihood(measured, loads, pointwise=True)
+    logs = [dense(sheet, measured, loads, (1.0, 1.0, 1.0), samples) for samples in range(N + 1)]
+    np.testing.assert_allclose(pointwise, np.diff(logs), rtol=1e-10)
+    np.testing.assert_allclose(pointwise.sum(), sheet.log_likelihood(measured, loads), rtol=1e-13)
+
+
+SHAPES = [
+    ((), ()), ((), (1,)), ((), (3,)), ((), (2, 1)), ((), (4, 3)), ((), (2, 1, 3)), ((4,), (3,)), ((4,), (4, 1)),
+    ((4,), (1, 3)), ((2, 4), (4, 1)), ((2, 4), (4, 3)), ((2, 4), (2, 1, 1)), ((2, 4), (2, 4, 3)), ((2, 1), (4, 3)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("pointwise", [False, True])
+@pytest.mark.parametrize("name", NORMAL)
+def test_batches_of_every_shape_are_one_by_one(name, pointwise):
+    sheet = NORMAL[name]
+    for batch, shape in SHAPES:
+        measured, loads, rng = drawn(3, batch)
+        scale = rng.uniform(0.5, 2.0, shape)
+        result = sheet.log_likelihood(measured, loads, noise_scale=scale, pointwise=pointwise)
+        whole = np.broadcast_shapes(batch, shape[:-1])
+        assert result.shape == ((*whole, N) if pointwise else whole)
+        every_load = np.broadcast_to(loads, (*whole, N, 3)).reshape(-1, N, 3)
+        every_scale = np.broadcast_to(scale, (*whole, 3)).reshape(-1, 3)
+        expected = [
+            sheet.log_likelihood(measured, load, noise_scale=factor, pointwise=pointwise)
+            for load, factor in zip(every_load, every_scale, strict=True)
+        ]
+        np.testing.assert_allclose(result.reshape(np.shape(expected)), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("bias", [1e-8, 100.0])
+@pytest.mark.parametrize("drift", [None, WALK, WANDER])
+def test_a_bias_that_is_hardly_or_not_at_all_known(drift, bias):
+    sheet = cell(bias_uncertainty=(bias, bias, bias), drift=drift)
+    measured, loads, _ = drawn(4)
+    # The dense covariance has the condition (bias / noise)², and loses as many digits.
+    np.testing.assert_allclose(
+        sheet.log_likelihood(measured, loads), dense(sheet, measured, loads, (1.0, 1.0, 1.0)), rtol=1e-7
+    )
+
+
+def test_a_drift_that_forgets_at_once_is_white_noise_and_one_that_never_does_is_a_bias():
+    measured, loads, _ = drawn(5)
+    drift = type(WANDER)(moment=0.03, force=0.02, time=1e-3)
+    white = LoadCell(moment_noise=np.hypot(0.02, 0.03), force_noise=np.hypot(0.05, 0.02))
+    np.testing.assert_allclose(
+        cell(drift=drift).log_likelihood(measured, loads), white.log_likelihood(measured, loads), rtol=1e-13
+    )
+    drift = type(WANDER)(moment=0.03, force=0.02, time=1e14)
+    constant = cell(bias_uncertainty=(0.03, 0.02, 0.02))
+    np.testing.assert_allclose(
+        cell(drift=drift).log_likelihood(measured, loads), constant.log_likelihood(measured, loads), rtol=1e-9
+    )
+
+
+def test_drift_of_a_channel_that_is_missing_does_not_matter():
+    measured, loads, _ = drawn(6, missing=(1, 2))
+    sheet = cell(drift=type(WALK)(force=0.1), bias_uncertainty=(0.0, 1.0, 1.0), degrees_of_freedom=4.0)
+    expected = stats.t(4.0, loads[:, 0], 0.02).logpdf(measured[:, 0]).sum()
+    assert sheet.log_likelihood(measured, loads) == pytest.approx(expected, rel=1e-13)
+
+
+# --- Steps beside something that wanders: an approximation that is named -----------------------------------------
+
+
+@pytest.mark.parametrize(
+    "further",
+    [
+        {"drift": WALK},
+        {"drift": WANDER, "bias_uncertainty": UNKNOWN},
+        {"bias_uncertainty": UNKNOWN},
+        {"correlation": SHARED},
+        {"correlation": SHARED, "relative_noise": 0.2},
+        {"correlation": SHARED, "drift": WALK},
+        {"correlation": SHARED, "bias_uncertainty": UNKNOWN},
+    ],
+)
+def test_steps_beside_what_wanders_are_noise_and_this_is_named(further):
+    sheet = cell(force_resolution=0.05, moment_resolution=0.02, **further)
+    measured, loads, _ = drawn(7)
+    measured = np.round(measured / 0.1) * 0.1
+    expected = dense(sheet, measured, loads, (0.5, 1.0, 2.0))
+    result = sheet.log_likelihood(measured, loads, noise_scale=(0.5, 1.0, 2.0))
+    assert result == pytest.approx(expected, rel=1e-11)
+    (words,) = sheet.approximations
+    assert "the steps of the reading are taken for white noise of a twelfth of their square" in words
+    assert ("drift" in words) == (set(further) & {"drift", "bias_uncertainty"} != set())
+    assert cell(**further).approximations == ()
+
+
+def test_what_is_exact_is_not_called_an_approximation():
+    exact = cell(force_resolution=0.05, moment_range=1.0, degrees_of_freedom=4.0, relative_noise=0.1)
+    assert exact.approximations == ()
+
+
+@pytest.mark.parametrize(("step", "stated", "stated_ratio"), [(0.5, 3e-5, 2e-4), (1.0, 4e-4, 3e-3), (2.0, 4e-3, 3e-2)])
+def test_the_approximation_is_as_good_as_stated(step, stated, stated_ratio):
+    """Against integration over the bias, for 10 samples of one channel with noise and bias of 1.
+
+    What is stated is a standard deviation over records, to one digit; that of 300 has an error from its fourth moment.
+    """
+    rng = np.random.default_rng(8)
+    sheet = LoadCell(moment_noise=1.0, moment_resolution=step, bias_uncertainty=(1.0, 0.0, 0.0))
+    known = LoadCell(moment_noise=1.0, moment_resolution=step)
+    bias = np.linspace(-6.0, 6.0, 241)
+    weight = stats.norm.logpdf(bias) + np.log(bias[1] - bias[0])
+    shift = np.where(np.arange(10) % 2, 1.0, -1.0) * np.sqrt((1.0 + step**2 / 12) / 10)
+    errors, ratios = [], []
+    for _ in range(300):
+        loads = np.zeros((2, 10, 3))
+        loads[..., 0] = rng.uniform(-3.0, 3.0, 10)
+        measured = sheet.simulate(loads[0], seed=rng)
+        measured[:, 1:] = np.nan
+        loads[1, :, 0] += shift
+        approximate = sheet.log_likelihood(measured, loads) + 10 * np.log(step)
+        at_bias = loads[:, None] + np.stack([bias, 0 * bias, 0 * bias], axis=-1)[:, None, :]
+        exact = np.logaddexp.reduce(known.log_likelihood(measured, at_bias) + weight, axis=-1)
+        errors.append((approximate - exact)[0] / 10)
+        ratios.append(np.diff(approximate - exact)[0])
+    for values, digit in ((errors, stated), (ratios, stated_ratio)):
+        spread = np.std(values)
+        error = np.sqrt((np.mean(np.square(values) ** 2) - spread**4) / 300) / (2.0 * spread)
+        assert abs(spread - digit) < 0.5 * 10.0 ** np.floor(np.log10(digit)) + 5.0 * error
+    assert abs(np.mean(errors)) < 5.0 * np.std(errors) / np.sqrt(300) + 0.1 * stated
+
+
+# --- What is refused --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("further", [{"drift": WALK}, {"drift": WANDER}, {"bias_uncertainty": UNKNOWN}])
+def test_outliers_beside_drift_are_refused(further):
+    message = r"drift or an unknown bias with outliers \(degrees_of_freedom\) has no closed form: leave one of them out"
+    with pytest.raises(ParameterError, match=message):
+        cell(degrees_of_freedom=4.0, **further).log_likelihood(np.zeros((4, 3)), np.zeros((4, 3)))
+
+
+@pytest.mark.parametrize(
+    ("further", "what"),
+    [({"drift": WALK}, "drift"), ({"bias_uncertainty": UNKNOWN}, "drift"), ({"correlation": SHARED}, "correlated")],
+)
+def test_a_sample_at_the_end_of_the_range_beside_drift_is_refused(further, what):
+    sheet = cell(force_range=1.0, force_resolution=0.3, **further)
+    measured = np.zeros((4, 3))
+    measured[2, 1] = -0.6
+    assert np.isfinite(sheet.log_likelihood(measured, np.zeros((4, 3))))
+    measured[2, 1] = -0.9
+    message = f"sample 2 of force_x is at the end of the load cell's range, and with {what}.*remove it, or leave one"
+    with pytest.raises(ParameterError, match=message):
+        sheet.log_likelihood(measured, np.zeros((4, 3)))
+
+
+@pytest.mark.parametrize("further", [{"drift": WALK}, {"drift": WANDER}, {"bias_uncertainty": UNKNOWN}])
+def test_three_at_once_are_refused(further):
+    measured = np.zeros((4, 3))
+    with pytest.raises(ParameterError, match="correlated noise and relative_noise together are not offered: leave one"):
+        cell(correlation=SHARED, relative_noise=0.1, **further).log_likelihood(measured, measured)
+    if "drift" in further:
+        with pytest.raises(ParameterError, match="unknown bias and correlated noise together are not offered: leave"):
+            cell(correlation=SHARED, bias_uncertainty=UNKNOWN, **further).log_likelihood(measured, measured)
+
+
+def test_a_reading_beyond_the_range_is_refused():
+    measured = np.zeros((4, 3))
+    measured[3, 0] = 1.1
+    message = "sample 3 of holding_moment reads 1.1, beyond the load cell's range of 1.0: is the range in the record's"
+    with pytest.raises(ParameterError, match=message):
+        cell(moment_range=1.0).log_likelihood(measured, measured)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "name", "argument"),
+    [
+        (LoadCell(force_noise=1.0), "holding_moment", "moment_noise"),
+        (LoadCell(moment_noise=1.0), "force_x", "force_noise"),
+    ],
+)
+def test_a_channel_without_noise_is_refused_if_it_was_measured(sheet, name, argument):
+    measured = np.zeros((4, 3))
+    message = rf"{name} is measured, but the load cell has no noise on it: give LoadCell\({argument}=...\)"
+    with pytest.raises(ParameterError, match=message):
+        sheet.log_likelihood(measured, measured)
+    for index, channel in enumerate(CHANNELS):
+        if sheet.standard_deviations[channel] == 0:
+            measured[:, index] = np.nan
+    assert np.isfinite(sheet.log_likelihood(measured, np.zeros((4, 3))))
+
+
+def test_a_channel_with_holes_is_refused():
+    measured = np.zeros((4, 3))
+    measured[2, 1] = np.nan
+    with pytest.raises(ParameterError, match="measured misses sample 2 of force_x, but has others"):
+        CELL.log_likelihood(measured, np.zeros((4, 3)))
+
+
+@pytest.mark.parametrize("noise_scale", [0.0, -1.0, np.nan])
+def test_an_impossible_noise_scale_is_refused(noise_scale):
+    with pytest.raises(ParameterError, match=r"a noise_scale is .*: give positive factors"):
+        CELL.log_likelihood(np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=[[1.0], [noise_scale]])
+    with pytest.raises(ParameterError, match=r"a noise_scale is .*: give positive factors"):
+        CELL.log_likelihood(np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=[1.0, noise_scale, 1.0])
+
+
+@pytest.mark.parametrize("pointwise", [False, True])
+@pytest.mark.parametrize("missing", [[], [1]])
+@pytest.mark.parametrize("shape", [(2,), (4,), (0,), (4, 3), (2, 4), (2, 4, 3)])
+def test_noise_scales_that_do_not_fit_are_refused(shape, missing, pointwise):
+    measured = np.zeros((4, 3))
+    measured[:, missing] = np.nan
+    message = r"noise_scale has shape \(.*\) and predicted \(2, 4, 3\): give factors that broadcast to \(2, 3\)"
+    with pytest.raises(ParameterError, match=message):
+        CELL.log_likelihood(measured, np.zeros((2, 4, 3)), noise_scale=np.ones(shape), pointwise=pointwise)
+
+
+@pytest.mark.parametrize(("measured", "predicted"), [((4, 2), (4, 2)), ((4, 3), (5, 3)), ((3,), (3,))])
+def test_shapes_that_do_not_fit_are_refused(measured, predicted):
+    with pytest.raises(ParameterError, match=r"give \(n_samples, 3\) and \(..., n_samples, 3\)"):
+        CELL.log_likelihood(np.zeros(measured), np.zeros(predicted))

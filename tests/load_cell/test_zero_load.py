@@ -1,0 +1,390 @@
+"""The zero load of a record: contact without labels, bias, and noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+from tactile_bayes.contours import Circle, Ellipse, paper_profile
+from tactile_bayes.errors import DriftWarning, ParameterError, RecordError
+from tactile_bayes.load_cell import LoadCell, zero_load
+from tactile_bayes.load_cell.contact_bounds import contact_bounds
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import CHANNELS, in_frame, make_record, to_si
+from tactile_bayes.sweep import scan
+
+RIG = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, -0.3, 0.7))
+SHARES = np.array([1.0, -0.6, 0.8])
+"""Loads on the channels, of the largest."""
+
+
+def ramp(before, loaded, after, slope, offset=0.5):
+    """Loads that begin straight between two samples and end at once, shape (samples, 3)."""
+    loads = np.zeros((before + loaded + after, 3))
+    loads[before : before + loaded] = np.outer(slope * (np.arange(loaded) + offset), SHARES)
+    return loads
+
+
+def record_of(*sweeps, **options):
+    """A record of sweeps of readings, each of shape (samples, 3)."""
+    loads = np.concatenate(sweeps)
+    columns = {
+        "sweep": np.repeat(np.arange(len(sweeps)), [len(sweep) for sweep in sweeps]),
+        "direction": "forward",
+        "drive_angle": np.concatenate([np.linspace(1.0, 2.0, len(sweep)) for sweep in sweeps]),
+        **dict(zip(CHANNELS, loads.T, strict=True)),
+    }
+    return make_record(columns, **options)
+
+
+def noisy(loads, seed, deviation=1.0, bias=(0.0, 0.0, 0.0)):
+    return loads + bias + deviation * np.random.default_rng(seed).standard_normal(loads.shape)
+
+
+def loaded_of(record, sweep):
+    """First and last loaded sample of a sweep, by the truth."""
+    loaded = np.flatnonzero((record.truth_contact_phase.values != "none") & (record.sweep.values == sweep))
+    return int(loaded[0]), int(loaded[-1])
+
+
+# --- Contact that is not there ------------------------------------------------------------------------------------
+
+
+def alarms(samples, channels, sweeps, false_alarm, draw=np.random.Generator.standard_normal):
+    rng = np.random.default_rng([samples, channels])
+    floor = np.zeros(channels)
+    return sum(contact_bounds(7.0 + draw(rng, (samples, channels)), false_alarm, floor).found for _ in range(sweeps))
+
+
+def most(sweeps, false_alarm):
+    """What a binomial count exceeds once in 10⁴ tests, if the rate is what is allowed."""
+    return stats.binom.isf(1e-4, sweeps, false_alarm)
+
+
+@pytest.mark.parametrize(
+    ("samples", "sweeps", "channels"),
+    [
+        (3, 300, 3),
+        (5, 300, 3),
+        (20, 300, 1),
+        (200, 200, 3),
+        *(pytest.param(*case, 1, marks=pytest.mark.slow) for case in ((3, 300), (5, 300), (200, 200), (2000, 60))),
+        *(pytest.param(*case, 3, marks=pytest.mark.slow) for case in ((20, 300), (2000, 60))),
+    ],
+)
+def test_contact_is_claimed_no_more_often_than_allowed(samples, sweeps, channels):
+    assert alarms(samples, channels, sweeps, 0.1) <= most(sweeps, 0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channels", [1, 2, 3])
+@pytest.mark.parametrize(("samples", "sweeps"), [(5, 20_000), (20, 20_000), (200, 20_000), (2000, 8_000)])
+def test_false_alarms_at_the_default(samples, sweeps, channels):
+    assert alarms(samples, channels, sweeps, 1e-3) <= most(sweeps, 1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("samples", [20, 200, 2000])
+@pytest.mark.parametrize(("freedom", "rate"), [(5.0, 0.01), (3.0, 0.04)])
+def test_outliers_alone_seldom_make_a_contact(samples, freedom, rate):
+    draw = lambda rng, shape: rng.standard_t(freedom, shape)  # noqa: E731
+    assert alarms(samples, 3, 2000, 1e-3, draw) <= most(2000, rate)
+
+
+def test_correlated_channels_keep_the_rate():
+    root = np.linalg.cholesky([[1.0, 0.9, 0.8], [0.9, 1.0, 0.9], [0.8, 0.9, 1.0]])
+    draw = lambda rng, shape: rng.standard_normal(shape) @ root.T  # noqa: E731
+    assert alarms(40, 3, 400, 0.1, draw) <= most(400, 0.1)
+
+
+def test_sweeps_without_contact_are_unloaded():
+    used = 0
+    for seed in range(30):
+        found = zero_load(record_of(noisy(np.zeros((60, 3)), seed)))
+        assert not found.contact.item()
+        assert found.unloaded.all() or not found.unloaded.any()
+        used += bool(found.unloaded[0])
+        assert (found.onset == -1).all()
+        assert (found.snap_off == -1).all()
+        assert np.isnan(found.onset_drive_angle).all()
+    assert used >= stats.binom.ppf(1e-4, 30, 0.9)  # in doubt at two levels of 5 %
+
+
+# --- Contact that is there ----------------------------------------------------------------------------------------
+
+
+CONTOURS = [
+    paper_profile("I", q=0.3),
+    paper_profile("II", q=0.5),
+    paper_profile("III", q=0.9),
+    paper_profile("IV", q=0.3),  # lets go with one force left of three loads
+    Circle(0.1, 0.5),
+    Ellipse(0.4, 0.1, 0.4),
+]
+
+
+@pytest.mark.parametrize("noise", [pytest.param(1e-4, marks=pytest.mark.slow), 1e-2, 0.2])
+@pytest.mark.parametrize("step", [*(pytest.param(step, marks=pytest.mark.slow) for step in (0.4, 1.0)), 3.0])
+@pytest.mark.parametrize("contour", CONTOURS)
+def test_events_of_real_sweeps_are_bracketed(contour, step, noise):
+    ideal = scan(contour, drive_step=np.radians(step)).record
+    bias = (0.3, -2.0, 5.0)
+    cell = LoadCell(force_noise=noise, moment_noise=0.4 * noise, bias=bias, drive_angle_noise=1e-3)
+    measured = cell.measure(ideal, seed=3)
+    found = zero_load(measured)
+    assert found.contact.all()
+    for sweep in (0, 1):
+        first, last = loaded_of(ideal, sweep)
+        before, after = found.onset.values[sweep]
+        assert before < first <= after
+        assert found.snap_off.values[sweep].tolist() == [last, last + 1]
+        angles = found.snap_off_drive_angle.values[sweep]
+        np.testing.assert_array_equal(angles, measured.drive_angle.values[[last, last + 1]])
+    assert not (found.unloaded.values & (ideal.truth_contact_phase.values != "none")).any()
+    # 3 channels in 54 records: beyond 6 standard errors (Student's t, 20 degrees of freedom) once in 1000 runs.
+    assert (abs(found.bias - bias) < 6.0 * found.bias_uncertainty).all()
+    truth = [0.4 * noise, noise, noise]
+    assert (abs(found.noise - truth) < 6.0 * found.noise_uncertainty).all()
+
+
+@pytest.mark.parametrize(
+    ("before", "loaded", "after", "slope"),
+    [
+        (15, 60, 15, 1.0),
+        (3, 30, 3, 5.0),
+        pytest.param(15, 100, 15, 0.2, marks=pytest.mark.slow),
+        pytest.param(15, 60, 15, 20.0, marks=pytest.mark.slow),
+        pytest.param(40, 60, 0, 1.0, marks=pytest.mark.slow),
+        pytest.param(0, 60, 15, 1.0, marks=pytest.mark.slow),
+    ],
+)
+def test_bias_over_its_uncertainty_is_students_t(before, loaded, after, slope):
+    rng, pulls, freedoms = np.random.default_rng(8), [], []
+    for seed in range(80):
+        readings = noisy(ramp(before, loaded, after, slope, rng.random()), seed)
+        found = zero_load(record_of(readings), false_alarm=1e-3)
+        count = int(found.unloaded.sum())
+        if count < 3:
+            continue
+        pulls.append((found.bias / found.bias_uncertainty).values)
+        freedoms.append(count - int(found.unloaded[0]) - int(found.unloaded[-1]))
+    assert len(pulls) > 75
+    scores = stats.norm.ppf(stats.t.cdf(np.array(pulls), np.array(freedoms)[:, None]))
+    # Normal numbers: mean and variance of 240 of them, each off by more than this once in 10⁴ tests.
+    assert abs(scores.mean()) < stats.norm.isf(0.5e-4) / np.sqrt(scores.size)
+    assert (scores**2).sum() < stats.chi2.isf(1e-4, scores.size)
+    assert (scores**2).sum() > stats.chi2.ppf(1e-4, scores.size)
+
+
+def test_noise_over_its_truth_is_chi_squared():
+    total, freedom = 0.0, 0
+    for seed in range(30):
+        found = zero_load(record_of(noisy(ramp(15, 60, 15, 1.0), seed, 0.3)))
+        of_each = int(found.unloaded.sum()) - 2
+        total += of_each * float(((found.noise / 0.3) ** 2).sum())
+        freedom += 3 * of_each
+    assert stats.chi2.ppf(1e-4, freedom) < total < stats.chi2.isf(1e-4, freedom)
+
+
+@pytest.mark.parametrize(
+    ("parts", "height"),
+    [
+        ((15, 15, 15), 9.0),
+        ((15, 100, 15), 5.5),
+        pytest.param((100, 500, 100), 2.5, marks=pytest.mark.slow),
+    ],
+)
+def test_a_weak_load_on_one_channel_is_found(parts, height):
+    before, loaded, after = parts
+    loads = ramp(before, loaded, after, height / loaded) * [1.0, 0.0, 0.0]
+    found = sum(contact_bounds(noisy(loads, seed), 1e-3, np.zeros(3)).found for seed in range(60))
+    assert found >= stats.binom.ppf(1e-4, 60, 0.95)
+
+
+# --- Records that lack something ----------------------------------------------------------------------------------
+
+
+def test_a_sweep_that_begins_or_ends_loaded_says_so():
+    readings = noisy(np.concatenate([10.0 + ramp(0, 30, 0, 1.0), np.zeros((15, 3))]), 1)
+    found = zero_load(record_of(readings, noisy(ramp(15, 30, 0, 1.0), 2)))
+    assert found.contact.all()
+    assert found.onset.sel(sweep=0).values.tolist() == [-1, 0]
+    assert found.snap_off.sel(sweep=0).values.tolist() == [29, 30]
+    assert found.snap_off.sel(sweep=1).values.tolist() == [89, -1]
+    assert np.isnan(found.snap_off_drive_angle.sel(sweep=1, side="after"))
+    assert (abs(found.bias) < 5.0 * found.bias_uncertainty).all()
+
+
+@pytest.mark.parametrize("samples", [30, 300])
+def test_a_sweep_that_is_loaded_throughout_tells_nothing(samples):
+    load = np.linspace(0.2, 1.0, samples)
+    record = record_of(noisy(1e3 * np.stack([load**1.5, -load, np.sin(3.0 * load)], axis=-1), 1))
+    found = zero_load(record)
+    assert not found.unloaded.any()
+    assert np.isnan(found.bias).all()
+    with pytest.raises(RecordError, match=r"0 samples that are unloaded for certain.* record some before"):
+        LoadCell.from_zero_load(record)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 11])
+def test_a_few_samples_tell_nothing(samples):
+    found = zero_load(record_of(noisy(np.zeros((samples, 3)), 1)))
+    assert not found.contact.item()
+    assert not found.unloaded.any()
+
+
+@pytest.mark.parametrize(
+    "missing", [("holding_moment",), ("force_x", "force_y"), pytest.param(("force_y",), marks=pytest.mark.slow)]
+)
+def test_missing_channels_stay_missing(missing):
+    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    complete = zero_load(measured)
+    for name in missing:
+        measured[name][:] = np.nan
+    found = zero_load(measured)
+    xr.testing.assert_identical(found.snap_off, complete.snap_off)
+    for name in CHANNELS:
+        assert bool(np.isnan(found.noise.sel(channel=name))) == (name in missing)
+    cell = LoadCell.from_zero_load(measured)
+    for index, name in enumerate(CHANNELS):
+        assert (cell.bias_uncertainty[index] == 0.0) == (name in missing)
+    assert (cell.moment_noise == 0.0) == ("holding_moment" in missing)
+    assert (cell.force_noise == 0.0) == ("force_x" in missing)
+
+
+def test_without_noise_everything_is_exact():
+    ideal = LoadCell(bias=RIG.bias).measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    found = zero_load(ideal)
+    for sweep in (0, 1):
+        first, last = loaded_of(ideal, sweep)
+        assert found.onset.values[sweep].tolist() == [first - 2, first]
+        assert found.snap_off.values[sweep].tolist() == [last, last + 1]
+    np.testing.assert_allclose(found.bias, RIG.bias, rtol=1e-15)
+    assert (found.noise < 1e-15).all()
+
+
+def test_a_hundred_thousand_samples():
+    found = zero_load(record_of(noisy(ramp(30_000, 40_000, 30_000, 1.25e-3), 1)))
+    before, after = found.onset.values[0]
+    assert before < 30_000 <= after
+    assert found.snap_off.values[0].tolist() == [69_999, 70_000]
+
+
+# --- Sensors with other flaws -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 3e-2, 0.3])
+def test_steps_are_seen_and_bound_what_is_known(noise):
+    step, bias = 0.1, (0.037, -0.311, 0.049)
+    cell = LoadCell(force_noise=noise, moment_noise=noise, bias=bias, force_resolution=step, moment_resolution=step)
+    ideal = scan(paper_profile("II", q=0.5)).record
+    found = zero_load(cell.measure(ideal, seed=1))
+    np.testing.assert_allclose(found.resolution, step, rtol=1e-6)
+    assert (found.noise >= step / np.sqrt(12.0) * (1.0 - 1e-9)).all()
+    assert (found.noise < 1.5 * np.hypot(noise, step / np.sqrt(12.0)) + 0.5 * step * (noise < step)).all()
+    assert (abs(found.bias - bias) < 5.0 * found.bias_uncertainty).all()
+    for sweep in (0, 1):
+        first, last = loaded_of(ideal, sweep)
+        before, after = found.onset.values[sweep]
+        assert before < first <= after
+        assert found.snap_off.values[sweep].tolist() == [last, last + 1]
+
+
+def test_steps_alone_make_no_contact():
+    sweeps = np.random.default_rng(1).normal(0.3, 0.1, (200, 100, 3)).round()
+    assert sum(contact_bounds(readings, 1e-3, np.full(3, 1.0 / 12.0)).found for readings in sweeps) <= most(200, 1e-3)
+
+
+def test_outliers_leave_the_events_where_they_are():
+    cell = LoadCell(force_noise=0.02, moment_noise=0.01, degrees_of_freedom=4.0)
+    ideal = scan(paper_profile("II", q=0.5)).record
+    for seed in range(10):
+        found = zero_load(cell.measure(ideal, seed=seed))
+        assert (found.snap_off.values[:, 0] == [loaded_of(ideal, sweep)[1] for sweep in (0, 1)]).all()
+        assert (found.unloaded.groupby(ideal.sweep).sum() > 20).all()
+
+
+def test_a_zero_that_moves_between_sweeps_is_told_and_counted():
+    loads = ramp(15, 60, 15, 5.0)
+    moved = record_of(noisy(loads, 1), noisy(loads, 2, bias=(3.0, 0.0, 0.0)), noisy(loads, 3, bias=(-3.0, 0.0, 0.0)))
+    with pytest.warns(DriftWarning, match="the zero of holding_moment moved from one unloaded stretch to another"):
+        found = zero_load(moved)
+    assert found.same_bias_p_value[0] < 1e-10
+    assert 2.0 < found.bias_uncertainty[0] < 4.0  # of 3, 0 and −3: √6 = 2.4 to 3
+    assert (found.bias_uncertainty[1:] < 0.2).all()
+    assert 0.8 < found.noise[0] < 1.2
+
+
+def test_every_zero_that_moves_is_named():
+    loads = ramp(15, 60, 15, 5.0)
+    moved = record_of(noisy(loads, 1), noisy(loads, 2, bias=(3.0, 0.0, 1.0)))
+    with pytest.warns(DriftWarning, match=r"the zeros of holding_moment and force_y moved .*\(p = \S+ and \S+ if they"):
+        zero_load(moved)
+
+
+def test_a_zero_that_moves_during_contact_is_told_and_the_snap_off_stays():
+    readings = ramp(15, 100, 15, 1.0)
+    readings[115:] += (5.0, 0.0, 0.0)
+    with pytest.warns(DriftWarning, match="the zero of holding_moment moved"):
+        found = zero_load(record_of(noisy(readings, 1)))
+    assert found.snap_off.values.tolist() == [[114, 115]]
+
+
+def test_a_zero_that_stays_is_not_said_to_move():
+    loads = ramp(15, 30, 15, 5.0)
+    for seed in range(0, 60, 3):  # warnings are errors
+        zero_load(record_of(*(noisy(loads, seed + i) for i in range(3))))
+
+
+# --- Units, frames, errors ----------------------------------------------------------------------------------------
+
+
+def test_units_make_no_difference():
+    rod = Rod(0.2, 2.4e-3)
+    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    cell, si = LoadCell.from_zero_load(measured), LoadCell.from_zero_load(to_si(measured, rod))
+    np.testing.assert_allclose(si.dimensionless(rod).bias, cell.bias, rtol=1e-9)
+    np.testing.assert_allclose(si.dimensionless(rod).noise, cell.noise, rtol=1e-9)
+    found = zero_load(to_si(measured, rod))
+    assert found.unit.values.tolist() == ["N m", "N", "N"]
+    xr.testing.assert_identical(found.unloaded, zero_load(measured).unloaded)
+
+
+def test_a_turning_cell_has_its_bias_in_its_own_frame():
+    turning = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(0.1, -0.3, 0.7), frame="turning")
+    measured = turning.measure(in_frame(scan(paper_profile("II", q=0.5)).record, "turning"), seed=1)
+    cell = LoadCell.from_zero_load(measured)
+    assert cell.frame == "turning"
+    assert (np.abs(np.subtract(cell.bias, turning.bias)) < 5.0 * np.array(cell.bias_uncertainty)).all()
+    corrected = cell.corrected(measured)
+    assert abs(float(corrected.force_y[:10].mean())) < 0.1
+
+
+def test_forces_share_their_noise_unless_they_differ():
+    loads = ramp(30, 60, 30, 5.0)
+    alike, found = LoadCell.from_zero_load(record_of(noisy(loads, 1))), zero_load(record_of(noisy(loads, 1)))
+    assert alike.force_noise == pytest.approx(np.sqrt((found.noise[1:] ** 2).mean()))
+    apart = LoadCell.from_zero_load(record_of(noisy(loads, 1, deviation=np.array([1.0, 0.2, 3.0]))))
+    assert 2.0 < apart.force_noise < 4.0
+
+
+def test_samples_of_sweeps_may_be_mixed():
+    measured = RIG.measure(scan(paper_profile("II", q=0.5)).record, seed=1)
+    count = measured.sizes["sample"] // 2
+    order = np.arange(2 * count).reshape(2, count).T.ravel()
+    found, mixed = zero_load(measured), zero_load(measured.isel(sample=order))
+    np.testing.assert_array_equal(mixed.unloaded, found.unloaded.values[order])
+    np.testing.assert_array_equal(order[mixed.snap_off], found.snap_off)
+
+
+@pytest.mark.parametrize("false_alarm", [0.0, -1.0, 0.5, np.nan])
+def test_an_impossible_false_alarm_rate_is_refused(false_alarm):
+    with pytest.raises(ParameterError, match=r"false_alarm is .*: give a probability between 0 and 0.5"):
+        zero_load(record_of(np.zeros((20, 3))), false_alarm=false_alarm)
+
+
+def test_a_table_that_is_no_record_is_refused():
+    with pytest.raises(RecordError):
+        zero_load(xr.Dataset())

@@ -1,0 +1,125 @@
+"""The shape of the rod: closed form against integration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tactile_bayes.contours import paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.centreline import rod_shape
+from tactile_bayes.mechanics.elastica import wrench_from_contact
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.sweep import scan
+
+POINTS = 41
+ARCLENGTHS = np.linspace(0.0, 1.0, POINTS)
+
+
+def integrated(drive_angle, holding_moment, force_x, force_y, arclength):
+    """The rod up to the contact by integration, in the world's frame, then straight on."""
+    force, beta = np.hypot(force_x, force_y), np.arctan2(-force_x, force_y)
+
+    def rates(s, state):
+        _, _, phi, curvature = state
+        load = force * np.cos(phi - beta) if s <= arclength else 0.0
+        return [np.cos(phi), np.sin(phi), curvature, load]
+
+    start = [0.0, 0.0, drive_angle, -holding_moment]
+    bent = ARCLENGTHS[arclength >= ARCLENGTHS]
+    end = min(arclength, 1.0)
+    path = solve_ivp(rates, (0.0, end), start, method="DOP853", rtol=1e-13, atol=1e-13, dense_output=True)
+    x, y, phi, curvature = path.y[:, -1]
+    assert abs(curvature) < 1e-9 or arclength > 1.0
+    rest = ARCLENGTHS[bent.size :] - end
+    inner = path.sol(bent)
+    return np.append(inner[0], x + rest * np.cos(phi)), np.append(inner[1], y + rest * np.sin(phi))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("contact", "phase"),
+    [
+        ((0.2, 0.6, 0.1), TIP),
+        ((0.2, 0.6, 0.2), TANGENTIAL),
+        ((0.05, 0.3, 0.05), TANGENTIAL),
+        ((0.5, 0.86, 0.3), TIP),
+        ((-0.05, 0.4, 0.3), TANGENTIAL),
+        ((0.3, 0.55, 0.45, 0.3), TANGENTIAL),
+    ],
+)
+def test_rod_is_what_integration_gives(contact, phase, side):
+    x, y, alpha, *friction = contact
+    w = wrench_from_contact(side * x, y, side * alpha, *friction, side=side)
+    assert w.phase == phase
+    wrench = [float(a) for a in w[:4]]
+    np.testing.assert_allclose(
+        rod_shape(*wrench, points=POINTS), integrated(*wrench, float(w.contact_arclength)), atol=1e-9, rtol=0
+    )
+
+
+@pytest.mark.parametrize("name", ["I", "II", "III", "IV"])
+def test_rods_of_sweeps_are_what_integration_gives(name):
+    record = scan(paper_profile(name, q=0.3), drive_step=np.radians(7.0)).record
+    record = record.isel(sample=np.flatnonzero(record["truth_contact_phase"].values != "none"))
+    names = ("drive_angle", "holding_moment", "force_x", "force_y", "truth_contact_arclength")
+    columns = [record[column].values for column in names]
+    assert (columns[1] > 0).any()
+    assert (columns[1] < 0).any()
+    x, y = rod_shape(*columns[:4], points=POINTS)
+    expected = np.array([integrated(*state) for state in zip(*columns, strict=True)])
+    np.testing.assert_allclose(x, expected[:, 0], atol=1e-9, rtol=0)
+    np.testing.assert_allclose(y, expected[:, 1], atol=1e-9, rtol=0)
+
+
+def test_tip_contact_ends_at_the_contact():
+    w = wrench_from_contact(0.2, 0.6, 0.1)
+    x, y = rod_shape(*w[:4])
+    np.testing.assert_allclose([x[0], y[0], x[-1], y[-1]], [0.0, 0.0, 0.2, 0.6], atol=1e-13)
+
+
+def test_wrench_of_a_contact_beyond_the_tip_is_followed_to_the_tip():
+    w = wrench_from_contact(0.2, 0.6, 0.1)
+    wrench = float(w.drive_angle), 0.9 * float(w.holding_moment), 0.5 * float(w.force_x), 0.5 * float(w.force_y)
+    np.testing.assert_allclose(rod_shape(*wrench, points=POINTS), integrated(*wrench, 1.5), atol=1e-9)
+
+
+def test_light_load_bends_little():
+    angle = 1.0
+    load = np.geomspace(1e-30, 1e-6, 9)
+    x, y = rod_shape(angle, load, load * np.cos(angle + np.pi / 2), load * np.sin(angle + np.pi / 2))
+    s = np.linspace(0.0, 1.0, x.shape[-1])
+    # With force f across the rod at its tip, Euler and Bernoulli: deflection f (s²/2 − s³/6).
+    sag = load[:, None] * (s**2 / 2 - s**3 / 6)
+    np.testing.assert_allclose(x, s * np.cos(angle) + sag * np.sin(angle), atol=1e-11)
+    np.testing.assert_allclose(y, s * np.sin(angle) - sag * np.cos(angle), atol=1e-11)
+
+
+def test_unloaded_rods_are_straight():
+    angle = np.array([0.3, 0.4, 0.5, 0.6])
+    x, y = rod_shape(angle, [0.0, np.nan, np.nan, 0.0], [0.0, np.nan, 0.1, np.nan], [0.0, np.nan, 0.1, 0.2], points=3)
+    np.testing.assert_allclose(x, np.cos(angle)[:, None] * [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(y, np.sin(angle)[:, None] * [0.0, 0.5, 1.0])
+
+
+def test_force_through_the_pivot_alone_leaves_the_rod_straight():
+    x, y = rod_shape(1.0, 0.0, 0.0, 1.0, points=2)
+    np.testing.assert_allclose([x[1], y[1]], [np.cos(1.0), np.sin(1.0)])
+
+
+def test_wrench_that_no_contact_makes_is_nan():
+    x, y = rod_shape([1.0, 1.0], [0.0, 10.0], 0.0, [0.0, 1.0])
+    assert np.isfinite(x[0]).all()
+    assert np.isnan(x[1]).all()
+    assert np.isnan(y[1]).all()
+
+
+def test_states_broadcast():
+    x, y = rod_shape(np.full((3, 1), 1.0), np.zeros(2), 0.0, 0.0, points=7)
+    assert x.shape == y.shape == (3, 2, 7)
+
+
+def test_one_point_is_refused():
+    with pytest.raises(ParameterError, match="at least 2 points"):
+        rod_shape(1.0, 0.0, 0.0, 0.0, points=1)

@@ -1,0 +1,242 @@
+"""Designs: what is expected of the next record, by two routes, and which is the best."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import InferenceError, ParameterError, ReachError, StudyError
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.planning.candidate import Candidate, Question, _band_widths, expected_of
+from tactile_bayes.planning.design import design
+from tactile_bayes.planning.information import information
+from tactile_bayes.planning.knowledge import Knowledge, known_from_posterior, known_from_prior
+from tactile_bayes.planning.plan import Plan
+from tactile_bayes.sweep import scan
+
+PRIORS = {"a": stats.lognorm(0.3, scale=0.6), "q": stats.uniform(0.4, 0.2), "x_c": stats.norm(0.0, 0.05)}
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+QUICK = SamplerSettings(ensembles=2, walkers=26, max_r_hat=1.05, min_ess=200.0, max_steps=400)
+STEP = float(np.radians(4.0))
+
+
+def designed(known="parabola", **options):
+    asked = {"bases": [(0.0, 0.0), (0.2, 0.0)], "drive_steps": [2.5 * STEP], "draws": 3, "seed": 1}
+    own = {"priors": PRIORS, "nuisances": []} if isinstance(known, str) else {}
+    return design(known, **(asked | own | options))
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    record = scan(Parabola(0.5, q=0.5), drive_step=STEP).record
+    measured = CELL.measure(record, seed=1)
+    return infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=QUICK)
+
+
+def known(**options):
+    asked = {
+        "draws": 3,
+        "rng": np.random.default_rng(1),
+        "load_cell": None,
+        "rod": None,
+        "friction": 0.0,
+        "nuisances": (),
+        "priors": PRIORS,
+        "base": (0.0, 0.0),
+    }
+    return known_from_prior("parabola", **(asked | options))
+
+
+def test_with_one_truth_it_is_the_information_of_its_record():
+    """The same bounds as of a plan, whose loads are exact; these are interpolated, and their differences rougher."""
+    told = known()
+    point = np.array([0.5, 0.5, 0.0, 1.0])
+    one = Knowledge(told.family, point[None], 1e-9 * np.eye(4), (), None, told.load_cell, 0.0, (), dict(PRIORS))
+    x = np.linspace(-0.5, 0.5, 11)
+    found = expected_of((Question(one, (Candidate((0.0, 0.0), STEP),), x, 0.95, 0, 1), 0))
+    angles = np.arange(np.radians(-30.0), np.radians(210.0), STEP)
+    plan = Plan(Parabola(0.5, q=0.5), load_cell=told.load_cell, drive_angles=angles, nuisances=[])
+    bounds = information(plan)
+    slopes = np.stack([x**2, np.ones_like(x), -x * 2.0 * 0.5], axis=1)  # of a (x − x_c)² + q
+    # Bounds are those without priors, of four parameters of which the noise is independent.
+    deviation = bounds.bound.values[:3]
+    correlation = bounds.correlation.values[:3, :3]
+    covariance = correlation * np.outer(deviation, deviation)
+    width = 2.0 * stats.norm.ppf(0.975) * np.sqrt(np.einsum("xi,ij,xj->x", slopes, covariance, slopes))
+    assert found.width[0] == pytest.approx(width.mean(), rel=1e-3)
+    assert found.reached == 1.0
+
+
+def test_a_noisier_load_cell_than_stated_leaves_a_wider_band():
+    """In proportion, where priors say little."""
+    told = known()
+    widths = []
+    for scale in (1.0, 2.0):
+        points = np.array([[0.5, 0.5, 0.0, scale]])
+        one = replace(told, points=points, precision=1e-9 * np.eye(4))
+        question = Question(one, (Candidate((0.0, 0.0), STEP),), np.linspace(-0.5, 0.5, 5), 0.9, 0, 1)
+        widths.append(expected_of((question, 0)))
+    assert widths[1].width[0] == pytest.approx(2.0 * widths[0].width[0], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_laplace_and_nested_monte_carlo_agree(posterior):
+    """Within 4 standard errors of the nested means, and these within a fifth of the expected width."""
+    found = designed(posterior, draws=12, nested=True)
+    for name in ("width", "information"):
+        off = np.abs(found[f"nested_{name}"].values - found[name].values)
+        error = np.hypot(found[f"nested_{name}_error"].values, found[f"{name}_error"].values)
+        assert np.all(off < 4.0 * error + 0.03 * np.abs(found[name].values)), name
+    assert np.all(found.nested_width_error.values < 0.2 * found.width.values)
+    assert np.all(found.nested_draws.values > 20.0)
+
+
+def test_a_record_more_makes_the_band_narrower_and_finer_steps_narrower_still(posterior):
+    found = designed(posterior, bases=[(0.0, 0.0)], drive_steps=[STEP, 0.25 * STEP])
+    coarse, fine = found.width.values
+    present = float(found.present_width)
+    # A record like the first halves the variance; four times as many samples leave a fifth of it.
+    assert coarse == pytest.approx(present / np.sqrt(2.0), rel=0.15)
+    assert fine == pytest.approx(present / np.sqrt(5.0), rel=0.15)
+    assert np.all(found.information.values > 0.0)
+
+
+def test_from_the_same_pivot_the_gap_stays_and_from_beside_it_closes(posterior):
+    found = designed(posterior, bases=[(0.0, 0.0), (0.3, 0.0)])
+    sweeps = scan(Parabola(0.5, q=0.5)).events
+    width = sweeps["forward"].snap_off.contact_x - sweeps["backward"].snap_off.contact_x
+    assert found.gap.values[0] == pytest.approx(width, abs=0.02)
+    assert found.gap.values[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_mirrored_candidates_are_as_good(posterior):
+    """Of an object that is nearly symmetric."""
+    found = designed(posterior, bases=[(-0.2, 0.0), (0.2, 0.0)], draws=6)
+    left, right = found.width.values
+    assert left == pytest.approx(right, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("criterion", "name", "best"),
+    [("band", "width", np.argmin), ("gap", "gap", np.argmin), ("information", "information", np.argmax)],
+)
+def test_the_best_is_the_best(posterior, criterion, name, best):
+    found = designed(posterior, bases=[(0.0, 0.0), (0.1, 0.0), (0.3, 0.0)], criterion=criterion)
+    assert int(found.best) == best(found[name].values)
+
+
+def test_what_cannot_be_reached_tells_nothing(posterior):
+    """The band stays as it is."""
+    found = designed(posterior, bases=[(0.0, 0.0), (0.0, -2.0)])
+    assert found.reached.values.tolist() == [1.0, 0.0]
+    assert found.width.values[1] == pytest.approx(float(found.present_width), rel=1e-9)
+    assert found.information.values[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_candidates_that_are_all_out_of_reach_are_refused(posterior):
+    told = r"at x = 0 and y from -3 to -2, does the rod, 1 L long, reach .*: give pivots nearer to it"
+    with pytest.raises(ReachError, match=told):
+        designed(posterior, bases=[(0.0, -2.0), (0.0, -3.0)])
+
+
+@pytest.mark.slow
+def test_the_same_numbers_whatever_the_workers():
+    assert designed(workers=1).identical(designed(workers=2))
+
+
+def test_it_goes_on_where_it_was_stopped(tmp_path):
+    class StoppedError(Exception):
+        pass
+
+    def stop(progress):
+        raise StoppedError
+
+    asked = {"bases": [(0.0, 0.0), (0.0, -2.0)], "draws": 2}
+    with pytest.raises(StoppedError):
+        designed(out=tmp_path, progress=stop, **asked)
+    steps = []
+    found = designed(out=tmp_path, progress=steps.append, **asked)
+    assert [(step.done, step.made) for step in steps] == [(2, 1)]
+    assert found.identical(designed(**asked))
+    by_gap = designed(out=tmp_path, criterion="gap", **asked)  # of the same numbers
+    assert by_gap.width.identical(found.width)
+    with pytest.raises(StudyError, match=r"candidates of another experiment: what is known .*seed is 1 there and 2"):
+        designed(out=tmp_path, **asked, seed=2)
+
+
+def test_the_seed_decides():
+    one = designed(draws=2, bases=[(0.0, 0.0)])
+    assert one.identical(designed(draws=2, bases=[(0.0, 0.0)]))
+    assert not one.width.identical(designed(draws=2, bases=[(0.0, 0.0)], seed=2).width)
+
+
+def test_in_metres_and_newtons_it_is_the_same():
+    rod = Rod(length=0.2, flexural_rigidity=2e-3)
+    cell = LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
+    priors = {
+        "a": stats.lognorm(0.3, scale=0.6 / 0.2),
+        "q": stats.uniform(0.4 * 0.2, 0.2 * 0.2),
+        "x_c": stats.norm(0.0, 0.05 * 0.2),
+    }
+    si = designed(rod=rod, load_cell=cell, priors=priors, bases=[(0.0, 0.0), (0.04, 0.0)])
+    plain = designed()
+    np.testing.assert_allclose(si.width.values / 0.2, plain.width.values, rtol=1e-3)
+    np.testing.assert_allclose(si.information.values, plain.information.values, rtol=1e-3)
+    assert si.width.attrs["units"] == "m"
+
+
+def test_a_posterior_is_known_by_its_own_rig(posterior):
+    told = known_from_posterior(posterior, draws=5, rng=np.random.default_rng(1))
+    assert told.bases == ((0.0, 0.0),)
+    assert told.load_cell.force_noise == CELL.force_noise
+    deviation = np.sqrt(np.diag(np.linalg.inv(told.precision)))
+    samples = posterior["posterior"].to_dataset()
+    np.testing.assert_allclose(
+        deviation, [float(samples[name].std()) for name in ("a", "q", "x_c", "noise_scale")], rtol=1e-3
+    )
+
+
+def test_weighted_bands():
+    """Of many draws of a normal distribution, weighted to be another: its quantiles, to 4 standard errors."""
+    rng = np.random.default_rng(1)
+    draws = rng.normal(0.0, 2.0, (200_000, 1))
+    weights = np.exp(stats.norm.logpdf(draws[:, 0]) - stats.norm.logpdf(draws[:, 0], scale=2.0))
+    width = _band_widths(draws, weights / weights.sum(), 0.9)
+    assert width[0] == pytest.approx(2.0 * stats.norm.ppf(0.95), abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"criterion": "best"}, "criterion is 'best': choose 'band', 'gap' or 'information'"),
+        ({"draws": 1}, "draws is 1: give a whole number from 2 up"),
+        ({"seed": -1}, "seed is -1: give a whole number from 0 up"),
+        ({"probability": 1.0}, "probability is 1.0: give a number between 0 and 1"),
+        ({"drive_steps": [0.0]}, "drive_steps is .*: give positive angles in radians"),
+        ({"drive_steps": []}, "drive_steps is .*: give positive angles in radians"),
+        ({"bases": [(0.0, 0.0), (0.0, 0.0)]}, "bases is .*: one of them is given twice"),
+        ({"bases": [0.0, 1.0]}, "bases is .*: give a list of pivots"),
+        ({"span": (1.0, 0.0)}, "span is .*: give two values of x"),
+        ({"priors": {"b": stats.norm()}}, "there is a prior of b, which is no parameter: there are a, q, x_c"),
+    ],
+)
+def test_what_is_impossible_is_refused(wrong, message):
+    with pytest.raises(ParameterError, match=message):
+        designed(**wrong)
+
+
+def test_what_is_no_knowledge_is_refused(posterior):
+    with pytest.raises(ParameterError, match="a design is for a family with parameters"):
+        designed("shape-free", priors={})
+    with pytest.raises(ParameterError, match="load_cell and a posterior, which has its own"):
+        designed(posterior, load_cell=CELL)
+    with pytest.raises(InferenceError, match="no posterior of a contour"):
+        designed(xr.DataTree())

@@ -1,0 +1,702 @@
+"""Figures: what they take, return, draw and leave alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+
+mpl.use("Agg")
+
+from matplotlib import colors
+from matplotlib import pyplot as plt
+
+from tactile_bayes import plotting
+from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
+from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.plotting import posteriors, touch_map
+from tactile_bayes.plotting.maps import set_below
+from tactile_bayes.plotting.tightening import _fit_map, _panels
+from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
+from tactile_bayes.sweep import scan
+from tactile_bayes.uncertainty.predictive import predictive_interval
+
+ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)
+STEP = np.radians(4.0)
+PHASES = ("tip", "tangential")
+
+
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return scan(paper_profile("II", q=0.5), drive_step=STEP)
+
+
+@pytest.fixture(scope="module")
+def si():
+    return scan(Parabola(5.0, q=0.05), drive_step=STEP, rod=ROD)
+
+
+@pytest.fixture(scope="module")
+def noisy(plain):
+    return LoadCell(force_noise=0.05, moment_noise=0.02).measure(plain.record, seed=1)
+
+
+@pytest.fixture(scope="module")
+def contacts(plain):
+    """Contacts as Step 2 gives them, one of them with a status that is not to be drawn."""
+    record = plain.record
+    phase = record["truth_contact_phase"].values
+    status = np.where(phase == "none", "no contact", "ok").astype(object)
+    status[np.flatnonzero(phase == "tip")[0]] = "beyond the tip"
+    columns = {name: record[f"truth_{name}"] for name in ("contact_x", "contact_y", "contact_phase")}
+    return xr.Dataset(columns).assign(status=("sample", status))
+
+
+@pytest.fixture(scope="module")
+def band():
+    x = np.linspace(-1.0, 1.0, 201)
+    y, width = 0.5 * x**2 + 0.5, 0.01 + 0.03 * np.exp(-100.0 * x**2)
+    columns = {"lower": ("x", y - width), "upper": ("x", y + width), "median": ("x", y)}
+    return xr.Dataset(columns, coords={"x": x}, attrs={"probability": 0.95})
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    rng = np.random.default_rng(1)
+    draws = ("chain", "draw")
+    columns = {
+        "a": (draws, rng.normal(0.5, 0.002, (4, 3000))),
+        "x_c": (draws, rng.normal(0.0, 0.001, (4, 3000))),
+        "flexural_rigidity": (draws, rng.normal(1.2e-5, 6e-7, (4, 3000)), {"units": "N m²"}),
+        "log_radius": ((*draws, "knot"), rng.normal(size=(4, 3000, 2))),
+    }
+    return xr.DataTree.from_dict({"posterior": xr.Dataset(columns)})
+
+
+def panels(rows, columns=1):
+    """Axes of a figure that pyplot does not know."""
+    figure = mpl.figure.Figure()
+    return figure.subplots(rows, columns, squeeze=False)
+
+
+def labels(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def lines_of(ax, phase):
+    """Lines with data in the colour of a phase."""
+    colour = colors.to_hex(plotting.PALETTE[phase])
+    return [line for line in ax.lines if colors.to_hex(line.get_color()) == colour and len(line.get_xdata())]
+
+
+@pytest.mark.slow
+def test_importing_the_module_does_not_load_matplotlib():
+    code = "import sys, tactile_bayes.plotting; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_every_function_draws_where_it_is_told_and_nowhere_else(plain, noisy, contacts, band, posterior):
+    three = panels(3)[:, 0]
+    assert list(plotting.observables(plain.record, events=plain.events, axes=three)) == list(three)
+    predicted = xr.Dataset({f"{name}_{end}": noisy[name] for name in CHANNELS for end in ("lower", "upper")})
+    three = panels(3)[:, 0]
+    assert list(plotting.predictive(noisy, predicted, axes=list(three))) == list(three)
+    ax = panels(1).item()
+    assert plotting.rods(plain, ax=ax) is ax
+    ax = panels(1).item()
+    assert plotting.touched(plain, ax=ax) is ax
+    ax = panels(1).item()
+    assert plotting.contour([-1.0, 1.0], truth=plain.contour, contacts=contacts, band=band, base=(0, 0), ax=ax) is ax
+    grid = panels(5, 2)
+    assert (plotting.trace(posterior, axes=grid) == grid).all()
+    grid = panels(5, 5)
+    assert (plotting.pairs(posterior, axes=grid) == grid).all()
+    assert plt.get_fignums() == []
+
+
+@pytest.mark.slow
+def test_every_function_makes_one_figure_of_its_own(plain, posterior):
+    plotting.observables(plain.record)
+    plotting.rods(plain)
+    plotting.touched(plain)
+    plotting.contour([-1.0, 1.0], truth=plain.contour)
+    plotting.trace(posterior)
+    plotting.pairs(posterior)
+    assert len(plt.get_fignums()) == 6
+    for number in plt.get_fignums():
+        plt.figure(number).canvas.draw()
+
+
+@pytest.mark.parametrize("unit", ["plain", "si"])
+def test_observables_are_labelled_with_units(unit, request):
+    result = request.getfixturevalue(unit)
+    axes = plotting.observables(result.record, events=result.events)
+    expected = {"plain": ("$EI$/$L$", "$EI$/$L^2$", "$EI$/$L^2$"), "si": ("µN m", "mN", "mN")}[unit]
+    for ax, name in zip(axes, expected, strict=True):
+        assert ax.get_ylabel().endswith(f"[{name}]")
+    assert axes[-1].get_xlabel() == r"drive angle $\varphi_0$ [°]"
+    axes[0].figure.canvas.draw()
+    ticks = {text.get_text() for text in axes[0].get_yticklabels()}
+    assert ("−250" if unit == "si" else "−2.5") in ticks
+
+
+def test_lines_of_a_scan_run_from_event_to_event(plain):
+    axes = plotting.observables(plain.record, events=plain.events)
+    for ax, name in zip(axes, CHANNELS, strict=True):
+        forward = plain.events["forward"]
+        tip, tangential = ([line for line in lines_of(ax, p) if line.get_linestyle() == "-"] for p in PHASES)
+        (change,) = forward.transitions
+        for line, first, last in ((tip[0], forward.first_contact, change), (tangential[0], change, forward.snap_off)):
+            x, y = line.get_data()
+            np.testing.assert_allclose(x[[0, -1]], np.degrees([first.drive_angle, last.drive_angle]), rtol=1e-12)
+            np.testing.assert_allclose(y[[0, -1]], [getattr(first, name), getattr(last, name)], atol=1e-12)
+    assert labels(axes[0])[:4] == ["forward", "backward", "tip contact", "tangential contact"]
+    assert set(labels(axes[0])[4:]) == {"first contact", "phase change", "snap-off"}
+
+
+def test_forces_of_a_load_cell_that_turns_are_axial_and_transversal(plain):
+    """Also those of the events, which a scan has in the frame that is fixed."""
+    axes = plotting.observables(in_frame(plain.record, "turning"), events=plain.events)
+    first_lines = [ax.get_ylabel().splitlines()[0] for ax in axes]
+    assert first_lines[0] == plotting.observables(plain.record)[0].get_ylabel().splitlines()[0]
+    assert first_lines[1].startswith("axial force ")
+    assert first_lines[2].startswith("transversal force ")
+    forward = plain.events["forward"]
+    (change,) = forward.transitions
+    for ax, component in zip(axes[1:], (0, 1), strict=True):
+        (tip,) = (line for line in lines_of(ax, "tip") if line.get_linestyle() == "-")
+        expected = turned(change.force_x, change.force_y, change.drive_angle)[component]
+        assert tip.get_ydata()[-1] == pytest.approx(expected, abs=1e-12)
+        markers = [line for line in lines_of(ax, "change") if line.get_marker() == "X"]
+        snap = forward.snap_off
+        expected = turned(snap.force_x, snap.force_y, snap.drive_angle)[component]
+        assert markers[0].get_ydata()[0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_missing_force_is_labelled_in_its_frame(noisy):
+    record = in_frame(noisy, "turning").drop_vars("truth_force_x")
+    record["force_x"] = record["force_x"] * np.nan
+    axes = plotting.observables(record)
+    assert axes[1].texts[0].get_text() == "not measured"
+    assert axes[1].get_ylabel().startswith("axial force ")
+
+
+def test_noise_is_drawn_as_points_over_the_truth(noisy, plain):
+    axes = plotting.observables(noisy, events=plain.events)
+    for ax, name in zip(axes, CHANNELS, strict=True):
+        points = lines_of(ax, "sample")
+        assert [line.get_marker() for line in points] == ["o", "^"]
+        for line, number in zip(points, (0, 1), strict=True):
+            assert line.get_linestyle() == "None"
+            np.testing.assert_array_equal(line.get_ydata(), noisy[name].values[noisy["sweep"].values == number])
+        assert lines_of(ax, "tip")
+    assert "true tip contact" in labels(axes[0])
+
+
+def test_record_of_a_rig_has_points_only():
+    columns = {"sweep": 0, "direction": "backward", "drive_angle": [1.3, 1.2, 1.1], "holding_moment": [0.0, -0.4, -0.5]}
+    record = make_record(columns, missing=("force_x", "force_y"))
+    axes = plotting.observables(record)
+    assert labels(axes[0]) == ["measured backward"]
+    for ax in axes[1:]:
+        assert [text.get_text() for text in ax.texts] == ["not measured"]
+        assert ax.get_ylabel()
+
+
+def test_records_without_holding_moment_keep_their_legend(noisy):
+    record = noisy.copy()
+    record["holding_moment"] = record["holding_moment"] * np.nan
+    axes = plotting.observables(record)
+    assert axes[0].texts[0].get_text() == "not measured"
+    assert "measured forward" in labels(axes[0])
+
+
+def test_single_sweep_has_a_single_style(si):
+    record = si.record.isel(sample=si.record["direction"].values == "forward")
+    assert labels(plotting.observables(record, events=si.events)[0])[0] == "forward"
+    assert "backward" not in labels(plotting.observables(record)[0])
+
+
+def test_wrong_number_of_panels_is_refused(plain):
+    with pytest.raises(ParameterError, match="give three"):
+        plotting.observables(plain.record, axes=panels(2)[:, 0])
+
+
+def test_predicted_interval_is_filled_where_there_is_one(noisy):
+    predicted = xr.Dataset({"force_x_lower": noisy["force_x"] - 0.1, "force_x_upper": noisy["force_x"] + 0.1})
+    axes = plotting.predictive(noisy, predicted)
+    assert [len(ax.collections) for ax in axes] == [0, 2, 0]
+    assert "predicted" in labels(axes[0])
+    with pytest.raises(ParameterError, match="every sample"):
+        plotting.predictive(noisy, predicted.isel(sample=slice(3)))
+
+
+def test_residuals_are_within_one_where_readings_are_in_their_interval(noisy):
+    ends = {"lower": -0.03, "upper": 0.05}
+    predicted = xr.Dataset({f"force_x_{end}": noisy["truth_force_x"] + off for end, off in ends.items()})
+    channels, below = panels(3)[:, 0], panels(3)[:, 0]
+    assert list(plotting.predictive(noisy, predicted, axes=channels, residuals=below)) == list(channels)
+    drawn = [line for line in below[1].lines if str(line.get_label()).startswith("residual")]
+    assert [line.get_label() for line in drawn] == ["residual forward", "residual backward"]
+    for number, line in enumerate(drawn):
+        sweep = noisy.isel(sample=noisy["sweep"].values == number).sortby("drive_angle")
+        np.testing.assert_allclose(line.get_xdata(), np.degrees(sweep["drive_angle"]))
+        off = (sweep["force_x"] - sweep["truth_force_x"]).values
+        np.testing.assert_allclose(line.get_ydata(), (off - 0.01) / 0.04, atol=1e-9)
+        np.testing.assert_array_equal(np.abs(line.get_ydata()) <= 1.0, (off >= -0.03) & (off <= 0.05))
+    assert not below[0].lines
+    assert not below[2].lines
+    assert {"residual forward", "residual backward", "predicted"} < set(labels(channels[0]))
+
+
+def test_a_figure_of_predictions_has_residuals_below_each_channel(noisy):
+    predicted = xr.Dataset({f"{name}_{end}": noisy[name] for name in CHANNELS for end in ("lower", "upper")})
+    axes = plotting.predictive(noisy, predicted)
+    everything = axes[0].figure.axes
+    assert list(axes) == everything[::2]
+    assert [ax.get_ylabel().splitlines()[0] for ax in everything[1::2]] == ["residual"] * 3
+    assert everything[-1].get_xlabel() == r"drive angle $\varphi_0$ [°]"
+    assert not any(ax.get_xlabel() for ax in axes)
+    with pytest.raises(ParameterError, match="axes are given for the residuals only"):
+        plotting.predictive(noisy, predicted, residuals=panels(3)[:, 0])
+
+
+@pytest.mark.parametrize("half", [0.2, 1.0])
+def test_a_panel_below_a_map_is_as_wide_as_that(band, half):
+    figure = mpl.figure.Figure(figsize=(7.0, 6.0), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    inside = band.sel(x=slice(-half, half))
+    plotting.contour(inside.x.values, band=inside, base=(0, 0), ax=upper)
+    plotting.band_detail(inside, ax=lower)
+    set_below(upper, lower)
+    figure.draw_without_rendering()
+    for x in (-half, 0.0, half):
+        at = [ax.transData.transform((x, 0.0))[0] for ax in (upper, lower)]
+        assert at[0] == pytest.approx(at[1], abs=0.01)
+
+
+def test_a_low_map_takes_no_more_height_than_it_needs():
+    sizes = []
+    for top in (0.1, 0.3, 3.0):
+        above, detail, *_ = _panels(None)
+        above.plot([-1.0, 1.0], [0.0, top])
+        _fit_map(above)
+        above.figure.draw_without_rendering()
+        sizes.append(above.figure.get_size_inches()[1])
+        boxes = [ax.get_tightbbox() for ax in (above, detail)]
+        assert 0.0 < boxes[0].y0 - boxes[1].y1 < 0.4 * above.figure.dpi
+    assert sizes[0] < sizes[1] < sizes[2] == 7.6
+
+
+def test_an_interval_goes_with_records_of_its_frame_only(noisy):
+    draws = xr.Dataset({"force_x": (("chain", "draw", "sample"), np.zeros((1, 2, noisy.sizes["sample"])))})
+    tree = xr.DataTree.from_dict({"posterior_predictive": draws})
+    assert "load_cell_frame" not in predictive_interval(tree).attrs
+    tree.attrs["load_cell_frame"] = "turning"
+    interval = predictive_interval(tree)
+    assert interval.attrs["load_cell_frame"] == "turning"
+    assert len(plotting.predictive(in_frame(noisy, "turning"), interval)[1].collections) == 2
+    with pytest.raises(ParameterError, match=r"predicted in the turning frame, .* give in_frame\(record, 'turning'\)"):
+        plotting.predictive(noisy, interval)
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+@pytest.mark.parametrize("unit", ["plain", "si"])
+def test_rods_are_coloured_by_phase_and_end_at_their_contacts(unit, direction, request):
+    result = request.getfixturevalue(unit)
+    ax = plotting.rods(result, direction=direction, count=9)
+    length = 0.1 if unit == "si" else 1.0
+    drawn = {phase: [line for line in lines_of(ax, phase) if len(line.get_xdata()) > 50] for phase in PHASES}
+    assert len(drawn["tip"]) + len(drawn["tangential"]) == 9
+    for line in drawn["tip"]:
+        x, y = line.get_data()
+        np.testing.assert_allclose(y[-1], result.contour.height(x[-1]), atol=1e-9 * length)
+    for line in [*drawn["tip"], *drawn["tangential"]]:
+        x, y = line.get_data()
+        # The rod's clearance is nowhere negative.
+        assert (y <= result.contour.height(x) + 1e-9 * length).all()
+        assert np.hypot(np.diff(x), np.diff(y)).sum() == pytest.approx(length, rel=1e-3)
+    assert ax.get_aspect() == 1.0
+    assert ax.get_xlabel() == ("$x$ [mm]" if unit == "si" else "$x$ [$L$]")
+    assert {"phase change", "snap-off", "first contact", "pivot", "contour"} <= set(labels(ax))
+
+
+def test_rods_of_a_noisy_record_are_the_true_ones(plain, noisy):
+    """A scan whose record has been through a load cell."""
+    ax = plotting.rods(replace(plain, record=noisy), count=5)
+    expected = plotting.rods(plain, count=5)
+    np.testing.assert_array_equal(lines_of(ax, "tip")[0].get_data(), lines_of(expected, "tip")[0].get_data())
+
+
+def test_rods_of_an_off_centre_pivot_start_there():
+    result = scan(Circle(1.0, q=0.4), base=(0.2, -0.1), direction="backward", drive_step=STEP)
+    ax = plotting.rods(result, direction="backward", count=3)
+    rods = [line for phase in PHASES for line in lines_of(ax, phase) if len(line.get_xdata()) > 50]
+    assert len(rods) == 3
+    for line in rods:
+        np.testing.assert_allclose(line.get_xydata()[0], (0.2, -0.1), atol=1e-12)
+
+
+def test_rods_of_one_of_several_bases_are_those_of_a_scan_from_it_alone(plain):
+    several = scan(plain.contour, base=[(0.0, 0.0), (0.25, -0.05)], drive_step=3.0 * STEP)
+    alone = scan(plain.contour, base=(0.25, -0.05), drive_step=3.0 * STEP)
+    for sweep, direction in ((2, "forward"), (3, "backward")):
+        found = plotting.rods(several, sweep=sweep, count=5).lines
+        expected = plotting.rods(alone, direction=direction, count=5).lines
+        assert len(found) == len(expected)
+        for line, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())
+
+
+def test_rods_are_the_forward_ones_unless_told_otherwise(plain):
+    lines = [plotting.rods(plain, **which).lines[0] for which in ({}, {"direction": "forward"}, {"sweep": 0})]
+    for line in lines[1:]:
+        np.testing.assert_array_equal(line.get_xydata(), lines[0].get_xydata())
+    assert not np.array_equal(plotting.rods(plain, sweep=1).lines[0].get_xydata(), lines[0].get_xydata())
+
+
+def test_rods_refuse_what_is_not_there(plain):
+    result = scan(plain.contour, direction="backward", drive_step=STEP)
+    with pytest.raises(ParameterError, match="no forward sweep: choose from backward"):
+        plotting.rods(result)
+    with pytest.raises(ParameterError, match="at least one rod"):
+        plotting.rods(plain, count=0)
+    for sweep in (2, -1, 0.5):
+        with pytest.raises(ParameterError, match=rf"no sweep {sweep}: choose from\n0: forward from \(0, 0\)\n1: backw"):
+            plotting.rods(plain, sweep=sweep)
+    with pytest.raises(ParameterError, match="direction='forward' and sweep=1 are given: one of them is enough"):
+        plotting.rods(plain, direction="forward", sweep=1)
+    several = scan(plain.contour, base=[(0, 0), (0.25, 0)], drive_step=STEP)
+    with pytest.raises(ParameterError, match=r"2 backward sweeps: choose .*sweep=1, from\n(.*\n)*3: .* \(0\.25, 0\)$"):
+        plotting.rods(several, direction="backward")
+    with pytest.raises(ParameterError, match="2 forward sweeps"):
+        plotting.rods(several)
+
+
+THREE = [(0.0, 0.0), (-0.25, 0.0), (0.25, 0.0)]
+
+
+def arcs(ax, scanned):
+    """What `touched` has drawn for each sweep."""
+    return [line for line in ax.lines if line.get_solid_capstyle() == "butt" and len(line.get_xdata())][
+        : len(scanned.sweeps)
+    ]
+
+
+def drawn_gaps(ax):
+    return [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in ax.patches]
+
+
+@pytest.mark.parametrize("unit", ["plain", "si", "several", "friction", "thick"])
+def test_touched_arcs_run_along_the_contour_from_first_contact_to_snap_off(unit, request):
+    made = {
+        "several": lambda: scan(paper_profile("IV", q=0.5), base=THREE, drive_step=STEP),
+        "friction": lambda: scan(Circle(1.0, q=0.4), base=[(0, 0), (0.3, 0)], friction=0.4, drive_step=STEP),
+        "thick": lambda: scan(Parabola(5.0, q=0.05), rod=replace(ROD, diameter=0.002), drive_step=STEP),
+    }
+    result = made[unit]() if unit in made else request.getfixturevalue(unit)
+    drawn = arcs(plotting.touched(result), result)
+    assert len(drawn) == len(result.sweeps)
+    size = 0.1 if unit in ("si", "thick") else 1.0
+    for line, sweep in zip(drawn, result.sweeps, strict=True):
+        x, y = line.get_data()
+        ends = sorted((event.contact_x, event.contact_y) for event in (sweep.first_contact, sweep.snap_off))
+        np.testing.assert_array_equal(line.get_xydata()[[0, -1]], ends)
+        assert line.get_marker() == "None"
+        assert (np.diff(x) > 0.0).all()
+        np.testing.assert_allclose(y, result.contour.height(x), rtol=0, atol=1e-12 * size)
+
+
+@pytest.mark.parametrize(
+    ("name", "q"),
+    [("I", 0.4), ("IV", 0.4), *(pytest.param(name, 0.5, marks=pytest.mark.slow) for name in ("II", "III"))],
+)
+def test_the_gap_of_one_base_is_drawn_and_gone_with_three(name, q):
+    contour = paper_profile(name, q=q)
+    one = scan(contour, drive_step=STEP)
+    left, right = (one.events[direction].snap_off.contact_x for direction in ("backward", "forward"))
+    ax = plotting.touched(one)
+    assert drawn_gaps(ax) == [(left, pytest.approx(right, abs=1e-15))]
+    assert [text.get_text() for text in ax.texts] == [f"gap\n{right - left:.3g} $L$"]
+    ax = plotting.touched(scan(contour, base=THREE, drive_step=STEP))
+    assert drawn_gaps(ax) == []
+    assert [text.get_text() for text in ax.texts] == ["no gap"]
+
+
+def test_every_gap_is_what_no_sweep_touched():
+    """Bases so far apart that each leaves its own gap, and one more lies between two of them."""
+    result = scan(Parabola(0.3, 0.6), base=[(1.2, 0.0), (0.0, 0.0), (-1.2, 0.0), (-2.2, 1.4)], drive_step=STEP)
+    gaps = drawn_gaps(plotting.touched(result))
+    ends = np.array([[sweep.first_contact.contact_x, sweep.snap_off.contact_x] for sweep in result.sweeps])
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    x = np.linspace(low.min(), high.max(), 100_001)
+    free = ~((x[:, None] >= low) & (x[:, None] <= high)).any(axis=1)
+    inside = np.array([(x > left) & (x < right) for left, right in gaps])
+    np.testing.assert_array_equal(inside.any(axis=0), free)
+    assert len(gaps) == np.count_nonzero(np.diff(free.astype(int)) == 1) > 3
+    for left, right in gaps:
+        assert left in high
+        assert np.abs(low - right).min() < 1e-15
+
+
+def test_bases_have_colours_of_their_own_and_pivots_the_same(plain):
+    result = scan(plain.contour, base=[*THREE, (0.0, 0.0)], drive_step=STEP)
+    ax = plotting.touched(result)
+    drawn = arcs(ax, result)
+    colour_of = {sweep.base: line.get_color() for line, sweep in zip(drawn, result.sweeps, strict=True)}
+    assert len(set(colour_of.values())) == 3
+    assert [line.get_color() for line in drawn] == [colour_of[sweep.base] for sweep in result.sweeps]
+    pivots = {
+        tuple(line.get_xydata()[0]): line.get_markeredgecolor() for line in ax.lines if len(line.get_xdata()) == 1
+    }
+    assert pivots == colour_of
+    assert labels(ax) == ["contour", "base (0, 0) $L$", "base (−0.25, 0) $L$", "base (0.25, 0) $L$"]
+    # Arcs that cover one another stay visible: those of a base are drawn lower than those of the base before.
+    heights = [line.get_transform().transform((0.0, 0.5))[1] for line in drawn]
+    assert heights[0] == heights[1] == heights[6] == heights[7] > heights[2] == heights[3] > heights[4]
+    across = [line.get_transform().transform((0.0, 0.5))[0] for line in drawn]
+    assert len(set(across)) == 1
+
+
+def test_the_seventh_base_has_the_first_colour_and_another_line(plain):
+    result = scan(plain.contour, base=[(0.05 * k, 0.0) for k in range(7)], direction="forward", drive_step=STEP)
+    ax = plotting.touched(result)
+    looks = [(line.get_color(), line.get_linestyle()) for line in arcs(ax, result)]
+    assert len(set(looks)) == 7
+    assert looks[0][0] == looks[6][0]
+    assert [style for _, style in looks[:6]] == ["-"] * 6
+    shown = [(handle.get_color(), handle.get_linestyle()) for handle in ax.get_legend().legend_handles]
+    assert set(looks) <= set(shown)
+
+
+@pytest.mark.parametrize(
+    ("draw", "error", "message"),
+    [
+        (
+            lambda scanned: plotting.touched(scanned.record),
+            ParameterError,
+            r"touched draws what scan\(...\) returns, and",
+        ),
+        (lambda scanned: plotting.observables(scanned), RecordError, "not a Scan: take its record"),
+        (
+            lambda scanned: plotting.observables(xr.DataTree()),
+            RecordError,
+            "not a DataTree: build one with make_record",
+        ),
+        (lambda scanned: plotting.predictive(xr.Dataset(), xr.Dataset()), RecordError, "the record states no units"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_words(plain, draw, error, message):
+    with pytest.raises(error, match=message):
+        draw(plain)
+
+
+def test_touched_is_labelled_in_the_units_of_the_record(si):
+    ax = plotting.touched(si)
+    width = si.events["forward"].snap_off.contact_x - si.events["backward"].snap_off.contact_x
+    assert [text.get_text() for text in ax.texts] == [f"gap\n{1e3 * width:.3g} mm"]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
+    moved = scan(si.contour, base=[(-0.0125, 0.0), (0.02, -0.005)], rod=ROD, drive_step=STEP)
+    assert labels(plotting.touched(moved)) == ["contour", "base (−12.5, 0) mm", "base (20, −5) mm"]
+
+
+def test_one_sweep_alone_leaves_nothing_between():
+    result = scan(Circle(1.0, 0.4), direction="forward", drive_step=STEP)
+    ax = plotting.touched(result)
+    assert (drawn_gaps(ax), len(ax.texts)) == ([], 0)
+    two = scan(Circle(1.0, 0.4), base=[(-0.2, 0), (0.3, 0)], direction="forward", drive_step=STEP)
+    assert [text.get_text() for text in plotting.touched(two).texts] == ["no gap"]
+
+
+def test_sweeps_that_meet_in_an_edge_leave_no_gap():
+    roof = Joined(Parabola(0.2, q=0.3, x_c=1.0), Parabola(0.2, q=0.3, x_c=-1.0), x=0.0)
+    result = scan(roof, base=(0.05, 0.1), drive_step=STEP)
+    assert {round(sweep.snap_off.contact_x, 7) for sweep in result.sweeps} == {0.0}
+    ax = plotting.touched(result)
+    assert (drawn_gaps(ax), [text.get_text() for text in ax.texts]) == ([], ["no gap"])
+
+
+def test_a_sweep_that_touches_an_edge_only_is_a_point():
+    wedge = Joined(Parabola(0.05, q=-11.25, x_c=15.0), Parabola(0.05, q=-5.618, x_c=-10.6), x=0.0)
+    result = scan(wedge, base=(-0.5, -0.4), direction="forward", drive_step=STEP)
+    (sweep,) = result.sweeps
+    assert sweep.first_contact.contact_x == pytest.approx(sweep.snap_off.contact_x, abs=1e-7)
+    ax = plotting.touched(result)
+    (arc,) = arcs(ax, result)
+    assert arc.get_marker() == "o"
+    np.testing.assert_allclose(arc.get_xydata(), np.zeros((len(arc.get_xdata()), 2)), atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("ends", "gaps"),
+    [
+        ([(0.0, 1.0)], []),
+        ([(1.2, 2.0), (0.0, 1.0)], [(1.0, 1.2)]),
+        ([(0.0, 1.0), (1.0 + 1e-8, 2.0)], []),  # the contacts' own accuracy at a fold
+        ([(0.0, 1.0), (1.0 + 1e-6, 2.0)], [(1.0, 1.0 + 1e-6)]),
+        ([(0.0, 1.0), (0.2, 0.3), (0.6, 1.5)], []),  # an arc within another
+        ([(0.0, 1.0), (0.2, 0.3), (1.1, 1.1), (1.5, 2.0)], [(1.0, 1.1), (1.1, 1.5)]),  # and an edge alone
+    ],
+)
+@pytest.mark.parametrize("size", [1.0, 0.05])
+def test_gaps_are_between_all_arcs(ends, gaps, size):
+    found = touch_map._gaps([(size * np.array(end), np.zeros(2)) for end in ends], same=1e-7 * size)
+    np.testing.assert_allclose(np.reshape(found, (-1, 2)), size * np.reshape(gaps, (-1, 2)), rtol=1e-15)
+
+
+@pytest.mark.parametrize(("width", "written"), [(7.0, 3), (1.5, 1), (0.3, 0)])
+def test_widths_are_written_where_there_is_room(width, written):
+    """The widest first; none runs into another or out of the Axes, and the gaps are drawn all the same."""
+    result = scan(Parabola(0.3, 0.6), base=[(-1.2, 0.0), (0.0, 0.0), (1.2, 0.0)], drive_step=STEP)
+    widths = ["gap\n0.184 $L$", "gap\n0.0971 $L$", "gap\n0.0971 $L$"]
+    ax = mpl.figure.Figure(figsize=(width, width)).add_axes((0.0, 0.0, 1.0, 1.0), xlim=(-2.0, 2.0))
+    plotting.touched(result, ax=ax)
+    assert [text.get_text() for text in ax.texts] == widths[:written]
+    assert len(ax.patches) == 3
+
+
+def test_the_object_fills_a_map_whose_limits_are_set(plain):
+    ax = panels(1).item()
+    ax.set(xlim=(-0.9, 0.9), ylim=(-0.2, 0.8))
+    plotting.touched(plain, ax=ax)
+    assert (ax.get_xlim(), ax.get_ylim()) == ((-0.9, 0.9), (-0.2, 0.8))
+    (contour,) = (line for line in ax.lines if line.get_label() == "contour")
+    x, y = contour.get_xydata()[np.isfinite(contour.get_xdata())].T
+    assert y.max() == pytest.approx(0.8, abs=0.01)
+    (filled,) = ax.collections
+    box = filled.get_datalim(ax.transData)
+    np.testing.assert_allclose(box.extents, [x.min(), plain.contour.q, x.max(), 0.8], atol=1e-5)
+
+
+def test_contour_draws_the_contacts_that_are_ok_and_in_range(contacts, band, plain):
+    ax = plotting.contour((0.0, 0.8), truth=plain.contour, contacts=contacts, band=band, gap=(-0.05, 0.05), base=(0, 0))
+    drawn = np.concatenate([line.get_xdata() for p in PHASES for line in lines_of(ax, p) if line.get_alpha()])
+    x = contacts["contact_x"].values
+    expected = x[(contacts["status"].values == "ok") & (x >= 0.0) & (x <= 0.8)]
+    np.testing.assert_array_equal(np.sort(drawn), np.sort(expected))
+    assert expected.size > 5
+    assert [text.get_text() for text in ax.texts] == ["gap"]
+    assert set(labels(ax)) == {
+        "95 % band",
+        "median",
+        "true contour",
+        "tip contact",
+        "tangential contact",
+        "pivot",
+    }
+    assert ax.get_aspect() == 1.0
+    low, high = ax.get_xlim()
+    assert low == pytest.approx(-0.024)
+    assert high == pytest.approx(0.824)
+
+
+def test_contacts_without_phase_or_status_are_drawn_all(contacts):
+    ax = plotting.contour((-1.0, 1.0), contacts=contacts[["contact_x", "contact_y"]])
+    assert labels(ax) == ["contact"]
+
+
+def test_contour_says_whether_there_is_a_gap_or_an_overlap():
+    assert plotting.contour((-1.0, 1.0), gap=(0.1, -0.1)).texts[0].get_text() == "overlap"
+
+
+def test_contour_takes_units_from_what_it_is_given(contacts, band):
+    for name in ("contact_x", "contact_y"):
+        contacts = contacts.assign({name: (0.1 * contacts[name]).assign_attrs(units="m")})
+    assert plotting.contour((-0.1, 0.1), contacts=contacts).get_xlabel() == "$x$ [mm]"
+    in_metres = band.assign(lower=band["lower"].assign_attrs(units="m"))
+    assert plotting.contour((-1.0, 1.0), band=in_metres).get_ylabel() == "$y$ [m]"
+    assert plotting.contour((-1.0, 1.0), band=band).get_ylabel() == "$y$ [$L$]"
+
+
+def test_true_contour_ends_where_it_ends():
+    ax = plotting.contour((-2.0, 2.0), truth=Circle(1.0, q=0.3))
+    x, y = ax.lines[0].get_data()
+    assert (x.min(), x.max()) == (-1.0, 1.0)
+    assert np.isfinite(y).all()
+
+
+@pytest.mark.parametrize("x", [0.5, [0.5, 0.5], [0.0, np.nan]])
+def test_contour_refuses_what_is_no_range(x):
+    with pytest.raises(ParameterError, match="span the range"):
+        plotting.contour(x)
+
+
+def test_trace_thins_and_shows_every_chain(posterior):
+    grid = plotting.trace(posterior)
+    assert grid.shape == (5, 2)
+    for left, right in grid:
+        assert len(left.lines) == len(right.patches) == 4
+        assert all(1000 <= len(line.get_xdata()) <= 2000 for line in left.lines)
+    assert [ax.get_xlabel() for ax in grid[:, 1]] == [
+        "$a$",
+        r"$x_{\mathrm{c}}$",
+        "flexural rigidity [$10^{-6}$ N m²]",
+        "log radius[0]",
+        "log radius[1]",
+    ]
+
+
+def test_densities_of_a_trace_are_densities(posterior):
+    (_, right), *_ = plotting.trace(posterior, names=["a"])
+    for patch in right.patches:
+        values, edges, _ = patch.get_data()
+        assert (values * np.diff(edges)).sum() == pytest.approx(1.0)
+
+
+def test_pairs_shows_truth_and_regions(posterior):
+    grid = plotting.pairs(posterior["posterior"].to_dataset(), names=["a", "x_c"], truth={"a": 0.6})
+    assert grid.shape == (2, 2)
+    assert not grid[0, 1].axison
+    assert [line.get_xdata()[0] for line in grid[0, 0].lines] == [0.6]
+    assert grid[1, 0].get_xlim()[1] > 0.6
+    assert grid[1, 0].get_xlabel() == "$a$"
+
+
+def test_regions_of_highest_density_hold_what_they_say():
+    """Analytic: a Gaussian's region of probability p ends where its density is 1 − p of the greatest."""
+    x = np.linspace(-6.0, 6.0, 401)
+    density = np.exp(-0.5 * (x[:, None] ** 2 + x**2))
+    np.testing.assert_allclose(posteriors._highest_density(density, (0.95, 0.5)), [0.05, 0.5], rtol=1e-2)
+
+
+def test_levels_differ_when_all_draws_are_in_one_cell():
+    low, high = posteriors._highest_density(np.diag([0.0, 1.0]), (0.95, 0.5))
+    assert low < high
+
+
+def test_odd_posteriors_are_drawn():
+    rng = np.random.default_rng(2)
+    draws = rng.exponential(size=(2, 40))
+    draws[0, 0] = np.nan
+    columns = {"fixed": (("chain", "draw"), np.full((2, 40), 2.0)), "q": (("chain", "draw"), draws)}
+    for function in (plotting.trace, plotting.pairs):
+        function(xr.Dataset(columns))[0, 0].figure.canvas.draw()
+
+
+def test_unknown_names_are_refused(posterior):
+    for function in (plotting.trace, plotting.pairs):
+        with pytest.raises(ParameterError, match="no b: it has a, x_c"):
+            function(posterior, names=["b"])
+        with pytest.raises(ParameterError, match="is wanted"):
+            function(posterior, names=["a"], axes=panels(2, 2))
+    with pytest.raises(ParameterError, match="truth names b"):
+        plotting.pairs(posterior, truth={"b": 0.5})
+
+
+def test_a_gap_is_taken_as_it_comes():
+    bounds = xr.Dataset(
+        {"left": ("bound", [-0.12, -0.1, -0.08]), "right": ("bound", [0.08, 0.1, 0.12])},
+        coords={"bound": ["lower", "median", "upper"]},
+    )
+    patch = plotting.contour((-1.0, 1.0), gap=bounds).patches[0]
+    assert (patch.get_x(), patch.get_width()) == (-0.1, pytest.approx(0.2))

@@ -1,0 +1,86 @@
+"""The two looks, and pictures of the main figures."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+mpl.use("Agg")
+
+from matplotlib.figure import Figure
+
+from helpers.pictures import difference
+from tactile_bayes import plotting
+from tactile_bayes.contours import paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.plotting import style
+from tactile_bayes.plotting.style import STYLES
+from tactile_bayes.sweep import scan
+
+pytestmark = pytest.mark.usefixtures("settings_left_alone")
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return scan(paper_profile("II", q=0.5), drive_step=np.radians(4.0))
+
+
+@pytest.mark.parametrize("name", list(STYLES))
+def test_settings_hold_inside_and_are_put_back(name):
+    before = dict(mpl.rcParams)
+    with style(name):
+        assert {key: mpl.rcParams[key] for key in STYLES[name]} == dict(STYLES[name])
+    assert dict(mpl.rcParams) == before
+
+
+def test_settings_are_put_back_after_an_error():
+    before = dict(mpl.rcParams)
+    with pytest.raises(ZeroDivisionError), style("print"):
+        1 / 0  # noqa: B018
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("name", ["poster", "", None])
+def test_another_style_is_refused(name):
+    with pytest.raises(ParameterError, match="choose 'print' or 'screen'"), style(name):
+        pass
+
+
+def test_fonts_are_embedded_as_truetype_and_text_stays_text():
+    for settings in STYLES.values():
+        assert settings["pdf.fonttype"] == settings["ps.fonttype"] == 42
+        assert settings["svg.fonttype"] == "none"
+
+
+def test_letters_have_eight_points_in_print_and_ten_on_screen(swept):
+    for name, size in (("print", 8.0), ("screen", 10.0)):
+        with style(name):
+            ax = plotting.rods(swept, ax=Figure().subplots())
+        assert ax.xaxis.label.get_size() == size
+
+
+def test_paper_figures_do_not_load_matplotlib():
+    code = (
+        "import sys, tactile_bayes.paper_figures, tactile_bayes.plotting.style; sys.exit('matplotlib' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("name", ["rods", "touched", "observables", "contour"])
+def test_it_looks_as_it_did(name, swept, tmp_path):
+    figure = Figure(figsize=(4.0, 3.0))
+    with style("print"):
+        if name == "rods":
+            plotting.rods(swept, count=6, ax=figure.subplots())
+        elif name == "touched":
+            plotting.touched(swept, ax=figure.subplots())
+        elif name == "observables":
+            plotting.observables(swept.record, events=swept.events, axes=figure.subplots(3))
+        else:
+            shown = {"truth": swept.contour, "gap": (-0.06, 0.06), "base": (0.0, 0.0)}
+            plotting.contour([-0.8, 0.8], ax=figure.subplots(), **shown)
+        assert difference(figure, name, tmp_path) is None

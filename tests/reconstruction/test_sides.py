@@ -1,0 +1,153 @@
+"""Sides of contact: as directions say, unless the moment contradicts them, whatever the zeros."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.simulation import simulate
+from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.diagnostics.verdicts import doubtful_sides
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import contact_sides, doubtful_sweeps, reconstruct, with_sides
+from tactile_bayes.record import make_record
+from tactile_bayes.runs.reconstruction import reconstruction_in_words
+from tactile_bayes.sweep import scan
+
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+
+
+def simulated(family, count, spread=0.3, seed=7):
+    """Records of the default prior, biases having three times its standard deviation."""
+    priors = {f"{name}_bias": stats.norm(0.0, spread) for name in ("moment", "force_x", "force_y")}
+    experiment = experiment_of(
+        seed=1,
+        family=family,
+        load_cell=CELL,
+        rod=None,
+        base=(0.0, 0.0),
+        direction="both",
+        drive_angles=None,
+        priors=priors,
+        nuisances=("rigidity_scale", "drive_angle_offset", "bias"),
+        friction=0.0,
+        events=True,
+        settings=None,
+        probability=0.9,
+        world=None,
+    )
+    for number in range(count):
+        yield simulate(experiment, np.random.default_rng([seed, number])).measured
+
+
+@pytest.mark.parametrize(
+    ("family", "count"),
+    [
+        ("parabola", 20),
+        *(pytest.param(name, 250, marks=pytest.mark.slow) for name in ("parabola", "circle", "ellipse")),
+    ],
+)
+def test_biases_do_not_turn_a_side(family, count):
+    """A doubt of two standard errors comes up in one of 44 sweeps at most, a wrong side never: it takes six."""
+    doubtful = 0
+    for measured in simulated(family, count):
+        forward = measured.direction.values == "forward"
+        np.testing.assert_array_equal(contact_sides(measured, CELL) > 0.0, forward)
+        doubtful += bool(doubtful_sweeps(measured, CELL))
+    assert doubtful <= 0.05 * count
+
+
+@pytest.mark.parametrize("bias", [-0.3, 0.0, 0.3])
+def test_a_label_that_the_moment_contradicts_is_not_believed(bias):
+    record = scan(paper_profile("II", q=0.5), direction="forward").record
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, seed=1)
+    wrong = measured.assign(direction=("sample", np.full(measured.sizes["sample"], "backward")))
+    assert np.all(contact_sides(wrong, CELL) == 1.0)
+    assert not doubtful_sweeps(wrong, CELL)
+
+
+def test_a_drive_that_turns_back_in_contact_stays_on_its_side():
+    """Also where the way back begins with load, and ends without."""
+    record = scan(paper_profile("II", q=0.5), direction="forward", drive_step=0.02).record
+    there = record.isel(sample=slice(0, 100))
+    back = there.isel(sample=slice(None, None, -1))
+    loads = ["holding_moment", "force_x", "force_y"]
+    both = {name: np.concatenate([there[name].values, back[name].values]) for name in [*loads, "drive_angle"]}
+    count = there.sizes["sample"]
+    columns = {
+        "sweep": np.repeat([0, 1], count),
+        "direction": np.repeat(["forward", "backward"], count),
+        "base_x": np.zeros(2 * count),
+        "base_y": np.zeros(2 * count),
+        **both,
+    }
+    measured = CELL.measure(make_record(columns), seed=1)
+    assert np.all(contact_sides(measured, CELL) == 1.0)
+
+
+def in_contact_throughout(moment):
+    """A short forward sweep that is loaded from beginning to end, its readings shifted as if the zero were off."""
+    record = scan(Parabola(0.5, 0.5), direction="forward", drive_step=0.01).record
+    loaded = np.flatnonzero(record.holding_moment.values > 0.15)[:40]
+    part = record.isel(sample=loaded)
+    shift = moment - float(part.holding_moment.mean())
+    return LoadCell(force_noise=0.05, moment_noise=0.02, bias=(shift, 0.0, 0.0)).measure(part, seed=1)
+
+
+def test_without_a_zero_the_prior_of_a_bias_decides():
+    """0.1 EI/L is a standard deviation: beyond six of them the label is contradicted, from two on doubted."""
+    for moment, turned, doubted in (
+        (0.3, False, False),
+        (-0.1, False, False),
+        (-0.35, False, True),
+        (-0.8, True, False),
+    ):
+        measured = in_contact_throughout(moment)
+        assert np.all(contact_sides(measured, CELL) == (-1.0 if turned else 1.0))
+        assert bool(doubtful_sweeps(measured, CELL)) == doubted
+
+
+def test_step_2_takes_the_side_that_fits_and_says_so():
+    """The moment speaks against the direction; forces and drive angles fit contacts on its side alone."""
+    measured = in_contact_throughout(-0.3)
+    contacts = reconstruct(measured, method="constrained", load_cell=CELL)
+    assert json.loads(contacts.attrs["doubtful_sides"]) == {"0": "forward"}
+    assert "sweep 0 as a forward one" in reconstruction_in_words(contacts)[0]
+    assert "doubtful_sides" not in reconstruct(in_contact_throughout(0.3), load_cell=CELL).attrs
+
+
+def test_in_doubt_evidence_decides_which_side_it_was():
+    """A sweep whose moment speaks against its direction by a zero that is off: its angles and forces know better."""
+    record = scan(Parabola(0.5, 0.5), direction="forward", drive_step=0.03).record
+    start = int(np.argmax(record.holding_moment.values > 0.1))
+    part = record.isel(sample=slice(start, None))
+    whole = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(-0.9, 0.0, 0.0)).measure(part, seed=1)
+    loaded = whole.isel(sample=np.flatnonzero(part.holding_moment.values > 0.0))
+    moment = float(loaded.holding_moment.mean())
+    shifted = loaded.assign(holding_moment=loaded.holding_moment - moment - 0.3)
+    assert doubtful_sweeps(shifted, CELL) == (0,)
+    found = infer_contour(
+        shifted,
+        load_cell=CELL,
+        nuisances=["bias"],
+        priors={"moment_bias": stats.norm(0.0, 1.0)},
+        seed=1,
+        settings=SamplerSettings(ensembles=2, max_steps=50),
+    )
+    assert json.loads(found.attrs["doubtful_sides"]) == {"0": "forward"}
+    assert found.attrs["sides_probability"] > 0.99
+    assert "as a forward one" in doubtful_sides(found.attrs)[0]
+    assert found["posterior"]["a"].median() == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_side_that_is_none_is_refused():
+    record = scan(Parabola(0.5, 0.5), direction="forward").record
+    with pytest.raises(ParameterError, match="there is no side 'left' of sweep 0"):
+        with_sides(record, {0: "left"})

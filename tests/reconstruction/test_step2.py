@@ -1,0 +1,299 @@
+"""Step 2, sample by sample: what comes back without noise, and what becomes of samples that are no contacts."""
+
+from __future__ import annotations
+
+import re
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from scipy.stats import binomtest
+
+from tactile_bayes.contours import Circle, Parabola, paper_profile
+from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.reconstruction import FALSE_ALARM, STATUSES, loaded_samples, reconstruct
+from tactile_bayes.record import in_frame, make_record
+from tactile_bayes.sweep import scan
+
+NUMBERS = ("contact_x", "contact_y", "contact_arclength", "slope_angle")
+CONTOUR = Parabola(0.5, 0.5)
+WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=0.7e-3)
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return scan(CONTOUR, drive_step=0.1).record
+
+
+def refused(error, message):
+    return pytest.raises(error, match=re.escape(message))
+
+
+def assert_contour_comes_back(record, contacts, contour, length=1.0):
+    touching = record.truth_contact_phase.values != "none"
+    assert touching.any()
+    assert not touching.all()
+    assert (contacts.status.values == np.where(touching, "ok", "no contact")).all()
+    assert (contacts.contact_phase.values == record.truth_contact_phase.values).all()
+    for name in NUMBERS:
+        scale = 1.0 if name == "slope_angle" else length
+        found, true = contacts[name].values[touching], record[f"truth_{name}"].values[touching]
+        np.testing.assert_allclose(found / scale, true / scale, rtol=0.0, atol=1e-10)
+        assert np.isnan(contacts[name].values[~touching]).all()
+    heights = contour.height(contacts.contact_x.values[touching])
+    np.testing.assert_allclose(contacts.contact_y.values[touching] / length, heights / length, rtol=0.0, atol=1e-10)
+
+
+def assert_statuses_tell_the_truth(contacts):
+    finite = np.all([np.isfinite(contacts[name].values) for name in NUMBERS], axis=0)
+    empty = np.all([np.isnan(contacts[name].values) for name in NUMBERS], axis=0)
+    status, phase = contacts.status.values, contacts.contact_phase.values
+    assert set(status) <= set(STATUSES)
+    assert (finite | empty).all()
+    assert (finite == np.isin(status, ("ok", "nonlinear", "beyond the tip"))).all()
+    assert ((phase == "none") == empty).all()
+
+
+# --- Without noise ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("base", "friction"), [((0.0, 0.0), 0.0), ((0.15, -0.05), 0.3)])
+@pytest.mark.parametrize("q", [0.5, *(pytest.param(q, marks=pytest.mark.slow) for q in (0.1, 0.8))])
+@pytest.mark.parametrize("profile", ["I", "II", "III", "IV"])
+def test_a_record_without_noise_gives_the_contour_back(profile, q, base, friction):
+    contour = paper_profile(profile, q)
+    record = scan(contour, base=base, friction=friction, drive_step=np.radians(3)).record
+    assert set(record.direction.values) == {"forward", "backward"}
+    assert_contour_comes_back(record, reconstruct(record, friction=friction), contour)
+
+
+@pytest.mark.parametrize(
+    ("contour", "base", "rod", "friction"),
+    [
+        (Parabola(2.5, 0.1, 0.01), (0.02, -0.01), WIRE, 0.2),
+        (Circle(0.2, 0.1), (0.0, 0.0), Rod(0.2, 2.4e-3, diameter=4e-3), 0.0),
+        (Parabola(0.5, 0.5), (0.0, 0.0), Rod(diameter=0.03), 0.0),
+    ],
+)
+def test_units_and_thickness_of_the_rod_come_out_right(contour, base, rod, friction):
+    record = scan(contour, base=base, rod=rod, friction=friction, drive_step=np.radians(3)).record
+    contacts = reconstruct(record, friction=friction)
+    assert_contour_comes_back(record, contacts, contour, rod.length)
+    metre = "m" if record.attrs["units"] == "SI" else "1"
+    assert [contacts[name].attrs["units"] for name in NUMBERS] == [metre, metre, metre, "rad"]
+    assert contacts.attrs["units"] == record.attrs["units"]
+
+
+def test_what_identifies_a_sample_is_kept(swept):
+    contacts = reconstruct(swept)
+    for name in ("sweep", "direction", "base_x", "base_y", "drive_angle"):
+        assert (contacts[name].values == swept[name].values).all()
+
+
+@pytest.mark.parametrize("rod", [None, WIRE])
+def test_forces_may_have_been_measured_in_the_turning_frame(rod):
+    record = scan(Parabola(2.5, 0.1) if rod else CONTOUR, rod=rod, drive_step=0.1).record
+    contacts, turning = reconstruct(record), reconstruct(in_frame(record, "turning"))
+    assert (turning.status == contacts.status).all()
+    for name in NUMBERS:
+        np.testing.assert_allclose(turning[name], contacts[name], rtol=1e-10, atol=1e-12)
+
+
+def test_sweeps_may_be_interleaved(swept):
+    """Two sweeps of as many samples, one after the other or taking turns."""
+    rows = np.concatenate([np.flatnonzero(swept.sweep == number)[:40] for number in (0, 1)])
+    one_by_one = swept.isel(sample=rows)
+    turns = np.arange(80).reshape(2, 40).T.ravel()
+    taking_turns = reconstruct(one_by_one.isel(sample=turns))
+    assert taking_turns.identical(reconstruct(one_by_one).isel(sample=turns))
+
+
+def test_friction_that_is_left_out_turns_the_slope_by_its_angle():
+    record = scan(Parabola(0.5, 0.3), friction=0.3, drive_step=0.1).record
+    on = record.truth_contact_phase.values != "none"
+    turn = (reconstruct(record).slope_angle - record.truth_slope_angle).values[on]
+    side = np.where(record.direction.values[on] == "forward", 1.0, -1.0)
+    np.testing.assert_allclose(turn, side * np.arctan(0.3), atol=1e-10)
+
+
+# --- What becomes of a sample -------------------------------------------------------------------------------------
+
+
+def one_sample(moment, force_x, force_y, *, angle=1.2, direction="forward"):
+    columns = {"sweep": [0], "direction": [direction], "drive_angle": [angle], "holding_moment": [moment]}
+    return make_record({**columns, "force_x": [force_x], "force_y": [force_y]})
+
+
+@pytest.mark.parametrize(
+    ("loads", "status"),
+    [
+        ((0.1, 0.0, 0.5), "ok"),
+        ((0.0, 0.0, 0.0), "no contact"),
+        ((5.0, 0.0, 1.0), "no zero of curvature"),  # m0² > 2f (1 + sin ψ0): the rod is bent all along
+        ((0.5, 0.0, 0.0), "no zero of curvature"),  # a moment and no force
+        ((0.0, 0.0, 0.5), "no zero of curvature"),  # a force through the pivot of a straight rod
+        ((-0.2, 0.0, 0.5), "no zero of curvature"),  # a moment of the other side
+        ((1e-3, 0.0, 1e-3), "beyond the tip"),  # m0/f, the lever of the force, is a rod length
+    ],
+)
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+def test_each_status_is_reached(swept, loads, status, direction):
+    """One sample among good ones, whose moments say on which side the object lies."""
+    good = swept.isel(sample=swept.direction.values == direction)
+    good = good.drop_vars([name for name in good.data_vars if name.startswith("truth_")])
+    good["sweep"][:] = 0
+    mirror = direction == "backward"
+    moment, force_x, force_y = loads
+    table = {name: good[name].values for name in good.data_vars}
+    angle = np.pi - 1.2 if mirror else 1.2
+    place = int(np.searchsorted(-table["drive_angle"] if mirror else table["drive_angle"], -angle if mirror else angle))
+    sign = -1.0 if mirror else 1.0
+    row = {"sweep": 0, "direction": direction, "base_x": 0.0, "base_y": 0.0, "drive_angle": angle}
+    row |= {"holding_moment": sign * moment, "force_x": sign * force_x, "force_y": force_y}
+    mixed = make_record({name: np.insert(values, place, row[name]) for name, values in table.items()})
+
+    contacts = reconstruct(mixed)
+    assert contacts.status.values[place] == status
+    assert_statuses_tell_the_truth(contacts)
+    others = contacts.drop_isel(sample=place)
+    for name in NUMBERS:
+        np.testing.assert_array_equal(others[name].values, reconstruct(good)[name].values)
+
+
+def test_a_contact_beyond_the_tip_keeps_its_numbers():
+    contacts = reconstruct(one_sample(1e-3, 0.0, 1e-3))
+    assert contacts.status.item() == "beyond the tip"
+    assert contacts.contact_arclength.item() > 1.0
+    assert contacts.contact_x.item() == pytest.approx(1.0)  # the lever m0/f of a vertical force
+
+
+def test_a_load_beyond_all_numbers_has_no_zero_of_curvature():
+    """In SI units it is a number, in those of the rod it is none."""
+    columns = {"sweep": 0, "direction": "forward", "drive_angle": [1.2, 1.2], "holding_moment": [1e300, 1e-5]}
+    contacts = reconstruct(make_record({**columns, "force_x": 0.0, "force_y": 1e-3}, rod=Rod(0.1, 1e-12)))
+    assert contacts.status.values[0] == "no zero of curvature"
+    assert_statuses_tell_the_truth(contacts)
+
+
+magnitudes = st.floats(-100, 100).map(lambda power: 10.0**power) | st.just(0.0)
+signed = st.tuples(magnitudes, st.sampled_from([-1.0, 1.0])).map(lambda pair: pair[0] * pair[1])
+usual = st.floats(-3.0, 3.0, width=32)
+
+
+@given(
+    loads=st.lists(st.tuples(*(3 * [usual | signed])), min_size=1, max_size=8),
+    angle=st.floats(-6.0, 6.0),
+    direction=st.sampled_from(["forward", "backward"]),
+    noise=st.sampled_from([None, 0.02, 1e-300]),
+    friction=st.sampled_from([0.0, 0.5]),
+)
+@example(loads=[(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], angle=0.0, direction="backward", noise=1e-300, friction=0.0)
+@settings(max_examples=40, deadline=None)
+def test_no_sample_raises_and_none_is_silently_empty(loads, angle, direction, noise, friction):
+    moment, force_x, force_y = np.array(loads).T
+    columns = {"sweep": 0, "direction": direction, "drive_angle": np.full(len(loads), angle)}
+    record = make_record({**columns, "holding_moment": moment, "force_x": force_x, "force_y": force_y})
+    cell = None if noise is None else LoadCell(force_noise=noise, moment_noise=noise)
+    assert_statuses_tell_the_truth(reconstruct(record, load_cell=cell, friction=friction))
+
+
+# --- With noise ---------------------------------------------------------------------------------------------------
+
+
+def test_small_noise_makes_proportionate_errors(swept):
+    """With the same random numbers a hundredth of the noise makes a hundredth of the error."""
+    firm = np.abs(swept.holding_moment.values) > 0.2
+    errors = []
+    for noise in (1e-5, 1e-7):
+        contacts = reconstruct(LoadCell(force_noise=noise, moment_noise=noise).measure(swept, seed=1))
+        assert np.isin(
+            contacts.status.values[firm], ("ok", "nonlinear", "beyond the tip")
+        ).all()  # where the tip touches, s1 = 1 ± ε
+        errors.append((contacts.contact_y - swept.truth_contact_y).values[firm] / noise)
+    largest = np.max(np.abs(errors[1]))
+    assert 1.0 < largest < 100.0
+    np.testing.assert_allclose(errors[0], errors[1], atol=0.02 * largest)
+
+
+def test_a_noisy_record_scatters_about_the_contour():
+    contour = Parabola(2.5, 0.1)
+    record = scan(contour, rod=WIRE).record
+    cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+    contacts = reconstruct(cell.measure(record, seed=1))
+    assert_statuses_tell_the_truth(contacts)
+    firm = np.abs(record.holding_moment.values) > 20 * cell.moment_noise
+    assert np.isin(contacts.status.values[firm], ("ok", "nonlinear", "beyond the tip")).all()
+    miss = (contacts.contact_y - contour.height(contacts.contact_x)).values[firm]
+    assert np.median(np.abs(miss)) < 0.02 * WIRE.length
+
+
+def test_the_data_sheet_in_the_record_is_the_default(swept):
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(swept, seed=1)
+    by_default = reconstruct(measured)
+    assert by_default.identical(reconstruct(measured, load_cell=LoadCell(force_noise=0.05, moment_noise=0.02)))
+    assert (reconstruct(measured, load_cell=LoadCell()).status.values != "no contact").all()
+
+
+@pytest.mark.parametrize("missing", [(), ("holding_moment",), ("force_x", "force_y")], ids=["all", "forces", "moment"])
+def test_unloaded_samples_are_taken_for_loaded_as_rarely_as_stated(missing):
+    """Of 50 000 samples; the test itself fails for one seed in a million."""
+    columns = {"sweep": 0, "direction": "forward", "drive_angle": np.full(50_000, 1.2)}
+    columns |= {name: 0.0 for name in ("holding_moment", "force_x", "force_y") if name not in missing}
+    unloaded = make_record(columns, missing=missing)
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(unloaded, seed=1)
+    alarms = int(loaded_samples(measured).sum())
+    assert binomtest(alarms, 50_000, FALSE_ALARM).pvalue > 1e-6
+    if not missing:
+        assert np.count_nonzero(reconstruct(measured).status.values != "no contact") == alarms
+
+
+# --- What is refused ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["holding_moment", "force_x", "force_y"])
+def test_a_missing_channel_is_refused(swept, name):
+    record = swept.copy(deep=True)
+    record[name].values[:] = np.nan
+    message = (
+        f"a contact point takes all of holding_moment, force_x, force_y, and {name} was not measured: infer_contour"
+    )
+    with refused(RecordError, message):
+        reconstruct(record)
+
+
+def test_an_unknown_method_is_refused(swept):
+    with refused(ParameterError, "method is 'exact': choose 'raw'"):
+        reconstruct(swept, method="exact")
+
+
+def test_what_is_no_record_is_refused(swept):
+    with refused(RecordError, "there is no column 'force_y'"):
+        reconstruct(swept.drop_vars("force_y"))
+
+
+@pytest.mark.parametrize("friction", [1.0, -0.1, float("nan")])
+def test_impossible_friction_is_refused(swept, friction):
+    with refused(ParameterError, f"friction is {friction!r}: give Coulomb's coefficient, from 0 to 0.84"):
+        reconstruct(swept, friction=friction)
+
+
+# --- Another rod --------------------------------------------------------------------------------------------------
+
+
+def test_a_rod_that_is_given_holds_against_the_one_stated():
+    contour = Parabola(2.5, 0.1)
+    record = scan(contour, rod=WIRE, drive_step=0.1).record
+    wrong = record.assign_attrs(rod_length=0.3, rod_flexural_rigidity=1e-3, rod_diameter=0.0)
+    assert_contour_comes_back(record, reconstruct(wrong, rod=WIRE), contour, WIRE.length)
+    assert wrong.attrs["rod_length"] == 0.3
+    with pytest.raises(AssertionError):
+        assert_contour_comes_back(record, reconstruct(wrong), contour, WIRE.length)
+
+
+def test_a_rod_in_si_does_not_fit_a_dimensionless_record(swept):
+    message = f"the record is dimensionless, so {WIRE} does not fit it: leave the rod out, or use to_si"
+    with refused(ParameterError, message):
+        reconstruct(swept, rod=WIRE)

@@ -1,0 +1,513 @@
+"""Step 2 with standard deviations: against Monte Carlo, the law of the misfit, and what becomes of doubtful samples."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.stats import kstest
+
+from helpers.load_cells import GAIN, SHARED
+from tactile_bayes.contours import Parabola, paper_profile
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import CHANNELS, in_frame, make_record
+from tactile_bayes.sweep import scan
+
+METHODS = pytest.mark.parametrize("method", ["raw", "constrained"])
+PLACE = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
+SPREADS = (*(f"{name}_sd" for name in PLACE), "tangent_sd", "normal_sd")
+NUMBERS = (*PLACE, *SPREADS, "contact_xy_correlation")
+FAMILIAR = LoadCell(force_noise=0.05, moment_noise=0.02)
+WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=4e-3)
+
+COPIES = 4000
+SMALL = 1e-4
+"""Factor on forces and moments of ordinary noise, so that first order is all there is."""
+
+
+def cell(**options) -> LoadCell:
+    return LoadCell(**{"force_noise": 5.0 * SMALL, "moment_noise": 2.0 * SMALL, **options})
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return scan(paper_profile("II", q=0.5), drive_step=0.05).record
+
+
+@pytest.fixture(scope="module")
+def scenes(swept):
+    """Ideal records, with the friction in them."""
+    return {
+        "plain": (swept, 0.0),
+        "turning": (in_frame(swept, "turning"), 0.0),
+        "friction": (scan(paper_profile("II", q=0.5), drive_step=0.05, friction=0.3).record, 0.3),
+        "SI": (scan(Parabola(2.5, 0.1), drive_step=0.05, rod=WIRE).record, 0.0),
+    }
+
+
+def refused(message):
+    return pytest.raises(ParameterError, match=re.escape(message))
+
+
+def contacts_of(record, phase, direction="forward"):
+    return np.flatnonzero((record.truth_contact_phase == phase) & (record.direction == direction))
+
+
+def pick(record, phase, direction="forward"):
+    """A contact in the middle of a phase: far from the edge, where noise is small."""
+    there = contacts_of(record, phase, direction)
+    return int(there[len(there) // 2])
+
+
+# --- Standard deviations against Monte Carlo ----------------------------------------------------------------------
+
+SI_NOISE = {"force_noise": 5.0 * SMALL * WIRE.force_unit, "moment_noise": 2.0 * SMALL * WIRE.moment_unit}
+SENSORS = {
+    "white": ("plain", cell()),
+    "correlated": ("plain", cell(correlation=SHARED)),
+    "cross-talk and bias": ("plain", cell(gain=GAIN, bias=(0.1, -0.2, 0.3))),
+    "cross-talk, correlated": ("plain", cell(gain=GAIN, correlation=SHARED)),
+    "relative": ("plain", cell(relative_noise=5.0 * SMALL)),
+    "relative, cross-talk": ("plain", cell(relative_noise=5.0 * SMALL, gain=GAIN, bias=(0.1, -0.2, 0.3))),
+    "encoder": ("plain", cell(drive_angle_noise=3.0 * SMALL, drive_angle_offset=0.01)),
+    "encoder's steps": ("plain", cell(drive_angle_noise=3.0 * SMALL, drive_angle_resolution=6.0 * SMALL)),
+    "turning": ("turning", cell(correlation=SHARED)),
+    "encoder, turning": ("turning", cell(drive_angle_noise=3.0 * SMALL, gain=GAIN)),
+    "steps": ("plain", cell(force_resolution=5.0 * SMALL, moment_resolution=2.0 * SMALL)),
+    "outliers": ("plain", cell(degrees_of_freedom=12.0)),
+    "friction": ("friction", cell()),
+    "SI, thick rod, encoder": ("SI", LoadCell(**SI_NOISE, drive_angle_noise=2.0 * SMALL, bias=(1e-5, 1e-4, 0.0))),
+}
+
+
+def assert_spread_is_as_stated(contacts: xr.Dataset, copies=COPIES):
+    """Whatever is stated, first order: no more than 4.5 standard errors off, which of 1000 tests fails one.
+
+    The standard error of a standard deviation is 1/√(2n) of it, for normal numbers; outliers add some.
+    """
+    error = 4.5 / np.sqrt(2.0 * copies)
+    x, y = (contacts[name].values - contacts[name].values.mean() for name in ("contact_x", "contact_y"))
+    alpha = contacts.slope_angle.values.mean()
+    found = {f"{name}_sd": contacts[name].values.std() for name in PLACE}
+    found["tangent_sd"] = (np.cos(alpha) * x + np.sin(alpha) * y).std()
+    found["normal_sd"] = (np.cos(alpha) * y - np.sin(alpha) * x).std()
+    for name, value in found.items():
+        stated = float(contacts[name].median())
+        if name == "contact_arclength_sd" and stated < 1e-12:
+            assert value < 1e-14
+        else:
+            assert abs(value / stated - 1.0) < error, (name, value, stated)
+    correlation = float(contacts.contact_xy_correlation.median())
+    # Fisher's transformation: artanh of a correlation has the standard error 1/√n.
+    if abs(correlation) < 1.0 - 1e-6:
+        off = np.arctanh(np.corrcoef(x, y)[0, 1]) - np.arctanh(correlation)
+        assert abs(off) < 4.5 / np.sqrt(copies)
+
+
+ONCE = {("raw", "tip", "forward"), ("constrained", "tangential", "backward")}
+TWICE = ("white", "encoder, turning")
+FULL = [
+    pytest.param(
+        method,
+        sensor,
+        phase,
+        direction,
+        marks=[]
+        if (method, phase, direction) in ONCE
+        or (sensor in TWICE and (phase, direction) in (("tip", "forward"), ("tangential", "backward")))
+        else [pytest.mark.slow],
+    )
+    for method in ("raw", "constrained")
+    for sensor in SENSORS
+    for phase in ("tip", "tangential")
+    for direction in ("forward", "backward")
+]
+
+
+@pytest.mark.parametrize(("method", "sensor", "phase", "direction"), FULL)
+def test_contacts_scatter_as_stated(scenes, method, sensor, phase, direction):
+    name, load_cell = SENSORS[sensor]
+    record, friction = scenes[name]
+    copies = record.isel(sample=np.full(COPIES, pick(record, phase, direction)))
+    seed = [sum(map(ord, sensor + phase + direction))]
+    measured = load_cell.measure(copies, seed=np.random.default_rng(seed))
+    contacts = reconstruct(measured, method=method, friction=friction)
+    assert set(contacts.status.values) <= {"ok", "beyond the tip"}
+    if method == "constrained":
+        assert (contacts.contact_phase == phase).all()
+    assert_spread_is_as_stated(contacts)
+    truth = record.isel(sample=pick(record, phase, direction))
+    for number in PLACE:
+        # Second order shifts the mean by less than the noise's square.
+        error = contacts[f"{number}_sd"].values[0] * 5.0 / np.sqrt(COPIES)
+        assert contacts[number].values.mean() == pytest.approx(float(truth[f"truth_{number}"]), abs=error + 1e-5)
+
+
+SHARING = {
+    "unknown bias": cell(bias_uncertainty=(1e-3, 5e-4, 2e-3)),
+    "random walk": cell(drive_angle_noise=SMALL, drift=RandomWalk(moment=1e-4, force=2e-4)),
+    "drift that forgets": cell(drift=OrnsteinUhlenbeck(moment=1e-3, force=5e-4, time=5.0)),
+}
+
+
+@pytest.mark.parametrize(
+    ("method", "kind"),
+    [
+        *(("raw", kind) for kind in SHARING),
+        ("constrained", "random walk"),
+        *(pytest.param("constrained", kind, marks=pytest.mark.slow) for kind in ("unknown bias", "drift that forgets")),
+    ],
+)
+def test_errors_that_samples_share_are_in_each(swept, method, kind):
+    """One sample late in each of 2000 records, against what is stated of a sample at that place in one record."""
+    late, records = 80, 2000
+    load_cell = SHARING[kind]
+    for phase in ("tip", "tangential"):
+        one = swept.isel(sample=np.full(late + 1, pick(swept, phase)))
+        loads = np.stack([one[name].values for name in CHANNELS], axis=-1)
+        readings = load_cell.simulate(np.broadcast_to(loads, (records, late + 1, 3)), seed=1)[:, -1]
+        angles = one.drive_angle.values[0] + load_cell.drive_angle_noise * np.random.default_rng(2).normal(size=records)
+        stated = reconstruct(one, method=method, load_cell=load_cell).isel(sample=-1)
+        table = {"sweep": 0, "direction": "forward", "drive_angle": angles}
+        record = make_record(table | dict(zip(CHANNELS, readings.T, strict=True)))
+        contacts = reconstruct(record, method="raw", load_cell=LoadCell())
+        if method == "constrained":
+            sheet = load_cell.covariance(np.zeros((late + 1, 3)))[-1]
+            spread = np.sqrt(np.diag(sheet))
+            white = LoadCell(
+                moment_noise=spread[0],
+                force_noise=spread[1],
+                bias_uncertainty=(0.0, 0.0, float(np.sqrt(max(spread[2] ** 2 - spread[1] ** 2, 0.0)))),
+                drive_angle_noise=load_cell.drive_angle_noise,
+            )
+            contacts = reconstruct(record, method=method, load_cell=white)
+        for name in (*SPREADS[:3], *(() if method == "constrained" and phase == "tip" else SPREADS[3:4])):
+            found = contacts[name.removesuffix("_sd")].values.std()
+            assert abs(found / float(stated[name]) - 1.0) < 4.5 / np.sqrt(2.0 * records), (phase, name)
+
+
+# --- The misfit ---------------------------------------------------------------------------------------------------
+
+
+def noisy_records(record, load_cell, count, first=0):
+    return [load_cell.measure(record, seed=first + seed) for seed in range(count)]
+
+
+def in_contact(record, *, weak=0.3):
+    return record.isel(sample=np.flatnonzero(np.abs(record.holding_moment.values) > weak))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensor", ["white", "correlated", "encoder", "encoder, turning", "friction"])
+def test_the_misfit_is_chi_square_clear_of_the_edge(scenes, sensor):
+    """Kolmogorov and Smirnov's test at one in ten thousand, at a thirtieth of ordinary noise."""
+    name, load_cell = SENSORS[sensor]
+    record, friction = scenes[name]
+    contacts = [
+        reconstruct(measured, method="constrained", friction=friction)
+        for measured in noisy_records(in_contact(record), load_cell, 20)
+    ]
+    misfit, distance = (np.concatenate([c[name].values for c in contacts]) for name in ("misfit", "edge_distance"))
+    assert np.count_nonzero(distance > 3.0) > 800
+    assert kstest(misfit[distance > 3.0], "chi2", (1,)).pvalue > 1e-4
+
+
+@pytest.mark.slow
+def test_the_probability_of_the_misfit_is_uniform_where_the_model_holds(swept):
+    """At ordinary noise, of 100 records; at one in ten thousand."""
+    ideal = in_contact(swept).isel(sample=slice(None, None, 3))
+    attrs = [reconstruct(m, method="constrained").attrs for m in noisy_records(ideal, FAMILIAR, 100)]
+    assert kstest([a["misfit_probability"] for a in attrs], "uniform").pvalue > 1e-4
+
+
+def test_the_attributes_sum_up_the_misfits(swept):
+    contacts = reconstruct(FAMILIAR.measure(swept, seed=1), method="constrained")
+    clear = contacts.edge_distance.values > 3.0
+    assert contacts.attrs["misfit_samples"] == clear.sum()
+    assert contacts.attrs["misfit_sum"] == pytest.approx(contacts.misfit.values[clear].sum(), rel=1e-12)
+    shared = LoadCell(force_noise=0.05, moment_noise=0.02, bias_uncertainty=(0.01, 0.0, 0.0))
+    contacts = reconstruct(shared.measure(swept, seed=1), method="constrained")
+    assert np.isnan(contacts.attrs["misfit_probability"])
+    raw = reconstruct(FAMILIAR.measure(swept, seed=1))
+    assert not {"misfit", "edge_distance"} & set(raw.data_vars)
+    assert "misfit_sum" not in raw.attrs
+
+
+def test_the_misfit_tells_of_friction_that_is_ignored():
+    record = scan(paper_profile("II", q=0.3), friction=0.3, drive_step=0.05).record
+    measured = FAMILIAR.measure(record, seed=1)
+    assert reconstruct(measured, method="constrained").attrs["misfit_probability"] < 1e-12
+    assert reconstruct(measured, method="constrained", friction=0.3).attrs["misfit_probability"] > 1e-4
+
+
+def test_the_misfit_tells_of_a_rod_that_is_stiffer_than_stated():
+    record = scan(Parabola(1.5, 0.06), rod=WIRE, drive_step=0.05).record
+    load_cell = LoadCell(force_noise=0.05 * WIRE.force_unit, moment_noise=0.02 * WIRE.moment_unit)
+    measured = load_cell.measure(record, seed=1)
+    wrong = Rod(WIRE.length, 0.8 * WIRE.flexural_rigidity, diameter=WIRE.diameter)
+    assert reconstruct(measured, method="constrained", rod=wrong).attrs["misfit_probability"] < 1e-12
+    assert reconstruct(measured, method="constrained").attrs["misfit_probability"] > 1e-4
+
+
+# --- Constrained against raw --------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("phase", ["tip", "tangential"])
+@pytest.mark.parametrize(("profile", "q"), [("II", 0.6), ("II", 0.5), ("III", 0.5)])
+def test_the_constrained_contact_is_nearer_to_the_true_one(profile, q, phase):
+    """Along the contour and across it, root mean square of some hundred samples in ten records."""
+    record = in_contact(scan(paper_profile(profile, q=q), drive_step=0.05).record)
+    there = record.truth_contact_phase.values == phase
+    alpha = record.truth_slope_angle.values[there]
+    errors = {}
+    for method in ("raw", "constrained"):
+        along, across = [], []
+        for measured in noisy_records(record, FAMILIAR, 10):
+            contacts = reconstruct(measured, method=method)
+            x, y = ((contacts[n] - record[f"truth_{n}"]).values[there] for n in ("contact_x", "contact_y"))
+            along.append(x * np.cos(alpha) + y * np.sin(alpha))
+            across.append(y * np.cos(alpha) - x * np.sin(alpha))
+        errors[method] = [np.sqrt(np.nanmean(np.square(e))) for e in (along, across)]
+    for raw, constrained in zip(*errors.values(), strict=True):
+        assert constrained < raw
+
+
+def test_a_tip_contact_is_at_the_tip(swept):
+    contacts = reconstruct(FAMILIAR.measure(swept, seed=1), method="constrained")
+    tip = contacts.contact_phase.values == "tip"
+    assert tip.sum() > 10
+    assert (contacts.contact_arclength.values[tip] == 1.0).all()
+    assert (contacts.contact_arclength_sd.values[tip] == 0.0).all()
+    assert (contacts.contact_arclength.values[contacts.contact_phase.values == "tangential"] <= 1.0).all()
+
+
+def test_the_constrained_estimate_states_less_spread(swept):
+    """Far from the edge, and of what is far from the edge with both methods."""
+    measured = cell().measure(in_contact(swept), seed=1)
+    raw, constrained = (reconstruct(measured, method=method) for method in ("raw", "constrained"))
+    clear = constrained.edge_distance.values > 10.0
+    for name in SPREADS:
+        assert (constrained[name].values[clear] <= raw[name].values[clear] * (1.0 + 1e-3)).all(), name
+
+
+# --- What becomes of a sample -------------------------------------------------------------------------------------
+
+
+@METHODS
+def test_a_channel_at_the_end_of_its_range_is_cut_off(swept, method):
+    limit = 0.6 * float(np.abs(swept.force_y).max())
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, force_range=limit)
+    measured = load_cell.measure(swept, seed=1)
+    over = np.abs(measured.force_y.values) >= limit * (1.0 - 1e-12)
+    contacts = reconstruct(measured, method=method)
+    assert 3 < over.sum() < 40
+    assert (contacts.status.values[over] == "cut off").all()
+    assert not (contacts.status.values[~over] == "cut off").any()
+    assert (contacts.contact_phase.values[over] == "none").all()
+    for name in NUMBERS:
+        assert np.isnan(contacts[name].values[over]).all()
+
+
+def lone(moment, force_x, force_y, angle=1.2):
+    columns = {"sweep": 0, "direction": "forward", "drive_angle": [angle], "holding_moment": [moment]}
+    return make_record({**columns, "force_x": [force_x], "force_y": [force_y]})
+
+
+@METHODS
+def test_a_weak_load_is_nonlinear(method):
+    """Twice the noise of the forces, and of the moment."""
+    contacts = reconstruct(lone(0.04, 0.0, 0.1), method=method, load_cell=LoadCell(force_noise=0.05, moment_noise=0.02))
+    assert contacts.status.item() in ("no contact", "nonlinear")
+    strong = reconstruct(lone(0.4, 0.0, 1.0), method=method, load_cell=LoadCell(force_noise=5e-3, moment_noise=2e-3))
+    assert strong.status.item() == ("ok" if method == "raw" else "does not fit")  # the four numbers are arbitrary
+
+
+@pytest.mark.slow
+def test_samples_near_the_edge_are_at_the_edge(swept):
+    """About the change from tip to tangential contact, and nowhere else."""
+    record = in_contact(swept)
+    words = np.stack([reconstruct(m, method="constrained").status.values for m in noisy_records(record, FAMILIAR, 20)])
+    share = (words == "at the edge").mean(axis=0)
+    assert share.max() > 0.5
+    ideal = reconstruct(record, method="constrained", load_cell=FAMILIAR)
+    assert (share[ideal.edge_distance.values > 6.0] == 0.0).all()
+    assert (share > 0.0).sum() < 0.3 * share.size
+
+
+@METHODS
+def test_unloaded_samples_are_no_contact(swept, method):
+    contacts = reconstruct(FAMILIAR.measure(swept, seed=1), method=method)
+    free = swept.truth_contact_phase.values == "none"
+    none = contacts.status.values == "no contact"
+    assert none[free].mean() > 0.95
+    for name in NUMBERS:
+        assert np.isnan(contacts[name].values[none]).all()
+
+
+def test_without_a_noise_level_there_are_no_standard_deviations(swept):
+    contacts = reconstruct(swept)
+    for name in (*SPREADS, "contact_xy_correlation"):
+        assert np.isnan(contacts[name].values).all()
+    assert set(contacts.status.values) == {"ok", "no contact"}
+
+
+@pytest.mark.parametrize("load_cell", [None, LoadCell(force_noise=0.05), LoadCell(moment_noise=0.02)])
+def test_the_constrained_method_needs_noise_on_every_channel(swept, load_cell):
+    with refused("the load cell has none on at least one: give LoadCell(force_noise=..., moment_noise=...)"):
+        reconstruct(swept, method="constrained", load_cell=load_cell)
+
+
+@pytest.mark.parametrize("nu", [1.0, 2.0])
+def test_outliers_without_variance_have_no_weights(swept, nu):
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, degrees_of_freedom=nu)
+    measured = load_cell.measure(swept, seed=1)
+    with refused("use method='raw', or more degrees of freedom"):
+        reconstruct(measured, method="constrained")
+
+
+# --- Units, mirrors, order ----------------------------------------------------------------------------------------
+
+
+SETTLED = {"raw": 1e-9, "constrained": 1e-6}
+"""Relative agreement of the same sample told in other words: a search ends where its next gain is below 1e-12."""
+
+
+def assert_same(one, other, tolerance=1e-9, scale=None, signs=None):
+    np.testing.assert_array_equal(one.status.values, other.status.values)
+    np.testing.assert_array_equal(one.contact_phase.values, other.contact_phase.values)
+    for name in [*NUMBERS, *(n for n in ("misfit", "edge_distance") if n in one)]:
+        factor = (scale or {}).get(name, 1.0) * (signs or {}).get(name, 1.0)
+        np.testing.assert_allclose(one[name], factor * other[name], rtol=tolerance, atol=tolerance, err_msg=name)
+
+
+@METHODS
+def test_units_do_not_matter(method):
+    rod = Rod(length=0.2, flexural_rigidity=2.4e-3)
+    record = scan(paper_profile("II", q=0.5), drive_step=0.1).record
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=0.003, correlation=SHARED)
+    measured = load_cell.measure(record, seed=1)
+    table = {name: measured[name].values for name in ("sweep", "direction", "drive_angle")}
+    table |= {name: measured[name].values * rod.force_unit for name in ("force_x", "force_y")}
+    in_si = make_record(table | {"holding_moment": measured.holding_moment.values * rod.moment_unit}, rod=rod)
+    si_cell = LoadCell(
+        force_noise=0.05 * rod.force_unit,
+        moment_noise=0.02 * rod.moment_unit,
+        drive_angle_noise=0.003,
+        correlation=SHARED,
+    )
+    lengths = ("contact_x", "contact_y", "contact_arclength", "tangent_sd", "normal_sd")
+    scale = dict.fromkeys((*lengths, *(f"{n}_sd" for n in lengths[:3])), rod.length)
+    here, there = reconstruct(measured, method=method), reconstruct(in_si, method=method, load_cell=si_cell)
+    assert_same(there, here, SETTLED[method], scale)
+    assert there.contact_x_sd.attrs["units"] == "m"
+    assert there.slope_angle_sd.attrs["units"] == "rad"
+
+
+@METHODS
+@pytest.mark.parametrize("frame", ["fixed", "turning"])
+def test_a_mirrored_record_has_mirrored_contacts(method, frame):
+    record = scan(paper_profile("II", q=0.5), direction="forward", drive_step=0.05).record
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, drive_angle_noise=0.003, correlation=(0.5, -0.3, 0.2))
+    measured = load_cell.measure(in_frame(record, frame), seed=1)
+    table = {"sweep": measured.sweep.values, "direction": "backward"}
+    table["drive_angle"] = np.pi - measured.drive_angle.values
+    # Seen in the turning frame, what points along the rod is mirrored onto itself, and what points across it is not.
+    signs = {"holding_moment": -1.0, "force_x": -1.0 if frame == "fixed" else 1.0}
+    signs["force_y"] = 1.0 if frame == "fixed" else -1.0
+    table |= {name: sign * measured[name].values for name, sign in signs.items()}
+    other = make_record(table, attrs={"load_cell_frame": frame})
+    m, x, y = signs.values()
+    mirrored = LoadCell(
+        force_noise=0.05,
+        moment_noise=0.02,
+        drive_angle_noise=0.003,
+        correlation=(0.5 * m * x, -0.3 * m * y, 0.2 * x * y),
+    )
+    forward = reconstruct(measured, method=method)
+    backward = reconstruct(other, method=method, load_cell=mirrored)
+    turned = dict.fromkeys(("contact_x", "slope_angle", "contact_xy_correlation"), -1.0)
+    assert_same(backward, forward, SETTLED[method], signs=turned)
+
+
+@METHODS
+def test_the_order_of_samples_does_not_matter_for_white_noise(swept, method):
+    measured = FAMILIAR.measure(swept.assign(sweep=swept.sweep), seed=1)
+    order = np.random.default_rng(1).permutation(measured.sizes["sample"])
+    shuffled = reconstruct(measured.isel(sample=order), method=method)
+    assert_same(shuffled, reconstruct(measured, method=method).isel(sample=order))
+
+
+@METHODS
+@pytest.mark.parametrize(
+    "bad",
+    [
+        (5.0, 0.0, 1.0),
+        (30.0, 30.0, 30.0),
+        *(pytest.param(bad, marks=pytest.mark.slow) for bad in ((-3.0, 2.0, -1.0), (0.5, 0.0, 1e-6))),
+    ],
+)
+def test_one_bad_sample_leaves_the_others_as_they_are(swept, method, bad):
+    measured = FAMILIAR.measure(swept, seed=1)
+    place = pick(swept, "tip")
+    spoiled = measured.copy(deep=True)
+    for name, value in zip(CHANNELS, bad, strict=True):
+        # The side of contact is that of the whole sweep: it is not to change.
+        spoiled[name].values[place] = abs(value) if name == "holding_moment" else value
+    contacts = reconstruct(spoiled, method=method)
+    good = reconstruct(measured, method=method)
+    assert_same(contacts.drop_isel(sample=place), good.drop_isel(sample=place), 1e-12)
+
+
+def test_the_radius_of_the_rod_moves_points_and_their_spread():
+    """A slope that is uncertain moves the object's surface about the rod's axis."""
+    thin, thick = Rod(0.2, 2.4e-3), Rod(0.2, 2.4e-3, diameter=0.02)
+    record = scan(Parabola(2.5, 0.1), rod=thin, drive_step=0.1).record
+    load_cell = LoadCell(force_noise=3e-3, moment_noise=0.25e-3)
+    measured = load_cell.measure(record, seed=1)
+    for method in ("raw", "constrained"):
+        axis, surface = (reconstruct(measured, method=method, rod=rod) for rod in (thin, thick))
+        alpha = axis.slope_angle
+        np.testing.assert_allclose(surface.contact_x, axis.contact_x - 0.01 * np.sin(alpha), atol=1e-12)
+        np.testing.assert_allclose(surface.contact_y, axis.contact_y + 0.01 * np.cos(alpha), atol=1e-12)
+        np.testing.assert_allclose(surface.normal_sd, axis.normal_sd, rtol=1e-6, atol=1e-12)
+        np.testing.assert_allclose(surface.slope_angle_sd, axis.slope_angle_sd, rtol=1e-9)
+        assert not np.allclose(surface.tangent_sd.dropna("sample"), axis.tangent_sd.dropna("sample"), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("frame", "drive_angle_noise"),
+    [
+        ("fixed", 0.0),
+        pytest.param("fixed", 0.01, marks=pytest.mark.slow),
+        pytest.param("turning", 0.01, marks=pytest.mark.slow),
+    ],
+)
+def test_the_force_along_the_rod_agrees_with_the_moment(frame, drive_angle_noise):
+    """Standard normal: mean of 30 within 4.5 standard errors, and spread within 4, of which χ² has 2e-4 each."""
+    count = 30
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, frame=frame, drive_angle_noise=drive_angle_noise)
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(8.0)).record
+    scores = [
+        reconstruct(load_cell.measure(record, seed=k), method="constrained", load_cell=load_cell).attrs["axial_score"]
+        for k in range(count)
+    ]
+    assert abs(np.mean(scores)) < 4.5 / np.sqrt(count)
+    assert abs(np.std(scores) - 1.0) < 4.0 / np.sqrt(2.0 * count)
+
+
+def test_friction_makes_it_disagree_unless_it_is_known():
+    load_cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    record = scan(Parabola(0.5, 0.5), drive_step=np.radians(4.0), friction=0.1).record
+    measured = load_cell.measure(record, seed=1)
+    unknown, known = (
+        reconstruct(measured, method="constrained", load_cell=load_cell, friction=mu).attrs["axial_score"]
+        for mu in (0.0, 0.1)
+    )
+    assert unknown < -20.0
+    assert abs(known) < 4.0

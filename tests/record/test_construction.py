@@ -1,0 +1,117 @@
+"""Records made of columns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.record_tables import WIRE, columns, refused
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import MEASURED, make_record, present_channels, rod_of, validate
+
+
+def test_a_record_without_a_rod_is_dimensionless():
+    record = make_record(columns())
+    assert record.attrs == {
+        "units": "dimensionless",
+        "rod_length": 1.0,
+        "rod_flexural_rigidity": 1.0,
+        "rod_diameter": 0.0,
+    }
+    assert tuple(record.data_vars) == MEASURED
+    assert record["force_x"].attrs == {"units": "1", "long_name": "horizontal support reaction"}
+    assert make_record(columns(), rod=Rod()).identical(record)
+
+
+def test_a_record_with_a_rod_is_si():
+    record = make_record(columns(), rod=WIRE)
+    assert record.attrs["units"] == "SI"
+    assert rod_of(record) == WIRE
+    assert [record[name].attrs["units"] for name in MEASURED] == ["1", "1", "m", "m", "rad", "N m", "N", "N"]
+
+
+def test_bases_are_zero_by_default_and_single_values_fill_a_column():
+    record = make_record(columns(base_x=None, base_y=None, operator="somebody", temperature=21.5))
+    assert not record["base_x"].values.any()
+    assert not record["base_y"].values.any()
+    assert set(record["operator"].values) == {"somebody"}
+    assert set(record["temperature"].values) == {21.5}
+
+
+def test_further_columns_are_kept_as_they_are():
+    record = make_record(
+        columns(
+            count=np.arange(6, dtype=np.int16),
+            loaded=[False, True, True, False, True, True],
+            note=["", "a", "b,c", '"', "ß", "1"],
+            truth_contact_x=[np.nan, 0.1, 0.2, np.nan, 0.3, 0.4],
+            time=xr.DataArray(np.arange(6.0), dims="sample", attrs={"units": "s", "long_name": "time"}),
+        )
+    )
+    assert record["count"].dtype == np.int64
+    assert record["loaded"].values.tolist() == [0, 1, 1, 0, 1, 1]
+    assert record["note"].values.tolist() == ["", "a", "b,c", '"', "ß", "1"]
+    assert record["truth_contact_x"].attrs == {"units": "1", "long_name": "true horizontal position of the contact"}
+    assert record["time"].attrs == {"units": "s", "long_name": "time"}
+    assert record["count"].attrs["units"] == "unknown"
+
+
+def test_the_record_does_not_share_memory_with_the_arrays_it_is_made_of():
+    moment = np.array(columns()["holding_moment"])
+    record = make_record(columns(holding_moment=moment))
+    moment[:] = 7
+    assert record["holding_moment"].values.max() == 0.2
+
+
+def test_numbers_may_come_as_text_and_whole_numbers_as_floats():
+    record = make_record(columns(sweep=np.array([0, 0, 0, 1, 1, 1.0]), force_x=["0", " 1e-3 ", "-.5", "0", "0", "0"]))
+    assert record["sweep"].dtype == np.int64
+    assert record["force_x"].values.tolist() == [0, 1e-3, -0.5, 0, 0, 0]
+
+
+def test_masked_values_are_missing():
+    masked = np.ma.masked_all(6)
+    assert present_channels(make_record(columns(force_x=masked))) == ("holding_moment", "force_y")
+
+
+@pytest.mark.parametrize("empty", [np.full(6, np.nan), [None] * 6, [""] * 6])
+def test_a_channel_may_be_missing_as_a_whole(empty):
+    assert present_channels(make_record(columns(force_x=empty))) == ("holding_moment", "force_y")
+
+
+@pytest.mark.parametrize("missing", [("force_x",), ["force_x"], "force_x"])
+def test_a_channel_may_be_declared_missing(missing):
+    record = make_record(columns(force_x=None), missing=missing)
+    assert present_channels(record) == ("holding_moment", "force_y")
+    assert validate(record).identical(record)
+
+
+def test_attributes_are_kept_as_plain_strings_and_numbers():
+    attrs = {"load_cell_force_noise": np.float64(0.5), "rig": "bench 2", "run": np.int64(3)}
+    record = make_record(columns(), attrs=attrs)
+    assert {name: record.attrs[name] for name in attrs} == {"load_cell_force_noise": 0.5, "rig": "bench 2", "run": 3}
+    assert type(record.attrs["run"]) is int
+
+
+def test_attributes_may_state_units_and_rod():
+    si = make_record(columns(), rod=WIRE)
+    assert make_record(columns(), attrs=si.attrs).identical(si)
+
+
+def test_declaring_missing_what_is_no_channel_is_refused():
+    with pytest.raises(
+        ParameterError, match="'force_z' is no channel; the channels are holding_moment, force_x, force_y"
+    ):
+        make_record(columns(), missing=("force_z",))
+
+
+def test_declaring_missing_what_has_values_is_refused():
+    with refused("column 'force_x' has values, but is declared missing: leave it out of missing="):
+        make_record(columns(), missing=("force_x",))
+
+
+def test_columns_of_different_lengths_are_refused():
+    with refused("column 'force_y' has shape (5,), where others have (6,): give one value per sample"):
+        make_record(columns(force_y=np.zeros(5)))

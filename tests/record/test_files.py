@@ -1,0 +1,512 @@
+"""The files of a record: CSV and NetCDF."""
+
+from __future__ import annotations
+
+import os
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis.extra import numpy as hnp
+
+from helpers.record_tables import WIRE, columns, refused
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import (
+    CHANNELS,
+    FRAMES,
+    column_of,
+    make_record,
+    parsing,
+    present_channels,
+    read_record,
+    record_hash,
+    rod_of,
+    write_record,
+)
+
+HEADER = "sweep,direction,drive_angle,holding_moment,force_x,force_y"
+ROW = "0,forward,1.25,0.5,0.125,0.25"
+
+
+def write_text(path, *lines):
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+words = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=12)
+names = st.text(st.characters(exclude_categories=("Cs", "Cc")), min_size=1, max_size=8).filter(
+    lambda name: name.strip() == name and name.isprintable() and "/" not in name and name != "."
+)
+
+
+@st.composite
+def records(draw):
+    """Records with extreme numbers, odd words and names, missing channels, in SI or without dimension."""
+    table = columns(
+        base_x=np.full(6, draw(finite)),
+        drive_angle=np.array(columns()["drive_angle"]) * draw(st.floats(0.1, 1.0)),
+        truth_contact_x=draw(hnp.arrays(float, 6, elements=st.floats(allow_infinity=True, allow_nan=False))),
+        truth_contact_y=np.where(np.arange(6) % 2, np.nan, 0.1),
+        note=draw(st.lists(words, min_size=6, max_size=6)),
+        count=draw(hnp.arrays(np.int64, 6)),
+        whole=np.arange(6.0),
+    )
+    missing = draw(st.sets(st.sampled_from(CHANNELS), max_size=2))
+    for name in CHANNELS:
+        table[name] = np.full(6, np.nan) if name in missing else draw(hnp.arrays(float, 6, elements=finite))
+    for name, (unit, long_name) in draw(st.dictionaries(names, st.tuples(words, words), max_size=3)).items():
+        if name not in table and column_of(name) is None:
+            table[name] = xr.DataArray(np.arange(6.0), dims="sample", attrs={"units": unit, "long_name": long_name})
+    attrs = draw(st.dictionaries(names, words | st.floats(allow_nan=False) | st.integers(-(2**63), 2**63 - 1)))
+    attrs = {name: value for name, value in attrs.items() if name != "units" and not name.startswith(("rod_", "load_"))}
+    rod, frame = draw(st.sampled_from([None, WIRE, Rod(0.1, 1e-300)])), draw(st.sampled_from([None, *FRAMES]))
+    return make_record(table, rod=rod, attrs=attrs, load_cell_frame=frame)
+
+
+def awkward_record():
+    """One of the worst that `records` may draw."""
+    tiny, huge = 5e-324, 1.7976931348623157e308
+    time = xr.DataArray(np.arange(6.0), dims="sample", attrs={"units": '] "s', "long_name": "12"})
+    table = columns(
+        holding_moment=[tiny, -tiny, huge, -huge, -0.0, 0.1 + 0.2],
+        force_x=[np.nan] * 6,
+        truth_contact_x=[np.nan, np.inf, -np.inf, -0.0, tiny, 1 / 3],
+        count=np.array([-(2**63), 2**63 - 1, 0, 1, -1, 2]),
+        note=["", " a ", "1,5", '"', "\r\n", "ß€😀"],
+        digits=["1", "02", "nan", "", "-inf", "1e3"],
+        note_length=np.arange(6.0),
+        note1=["a", "bc", "", "d", "e", "f"],
+        note2=["a"] * 6,
+        sample=["a", "a", "", "b", "c", "d"],
+        **{"1": ["x"] * 6},
+        **{'key: "x" [m], #': time},
+    )
+    attrs = {"a: b": "1.0", "empty": "", "padded": " a,", "lines": "a\r\nb\u2028c", "run": 2**63 - 1, "limit": np.inf}
+    return make_record(table, rod=WIRE, attrs=attrs)
+
+
+def assert_nothing_is_lost(record, path):
+    write_record(record, path)
+    back = read_record(path)
+    assert back.identical(record)
+    assert {name: back[name].dtype.kind for name in back} == {name: record[name].dtype.kind for name in record}
+    assert {name: type(value) for name, value in back.attrs.items()} == {
+        name: type(value) for name, value in record.attrs.items()
+    }
+    for name in record:  # bits, so that the sign of zero counts
+        if record[name].dtype.kind == "f":
+            present = ~np.isnan(record[name].values)
+            assert back[name].values[present].tobytes() == record[name].values[present].tobytes()
+    assert record_hash(back) == record_hash(record)
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@example(record=awkward_record())
+@given(record=records())
+def test_a_csv_file_loses_nothing(tmp_path, record):
+    assert_nothing_is_lost(record, tmp_path / "record.csv")
+
+
+# A NetCDF file takes 10 ms per column to write, and as long to read: few examples, but each with much in it.
+@settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@example(record=awkward_record())
+@given(record=records())
+def test_a_netcdf_file_loses_nothing(tmp_path, record):
+    assert_nothing_is_lost(record, tmp_path / "record.nc")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr(parsing, "FREE", 100)
+    record = make_record(columns(note=np.array(["", "a,b", "", "x" * 100, "", "a,b"], dtype=object)))
+    assert [record[name].dtype.kind for name in ("note", "direction")] == ["O", "U"]
+    write_record(record, tmp_path / f"record{suffix}")
+    assert read_record(tmp_path / f"record{suffix}").identical(record)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (
+            "load_cell_bias_fx: 12.5 [mN]",
+            "line 1, attribute 'load_cell_bias_fx' is '12.5 [mN]', but a load cell has no entry 'bias_fx': did you "
+            "mean 'bias_force_x'?",
+        ),
+        ("load_cell_noise_force: 0.003 [N]", "has no entry 'noise_force': did you mean 'force_noise'?"),
+        ("load_cell_noise_force: 0,003 [N]", "has no entry 'noise_force': did you mean 'force_noise'?"),
+        ("load_cell_noise_force: 3 mN", "has no entry 'noise_force': did you mean 'force_noise'?"),
+        ("load_cell_bias_fx: 0.0125", "line 1, attribute 'load_cell_bias_fx' is 0.0125, but a load cell has no entry"),
+        (
+            "load_cell_bias_fx: 0,0125",
+            "line 1, attribute 'load_cell_bias_fx' is '0,0125', but a load cell has no entry",
+        ),
+        ("load_cell_serial: 4711", "needs a name that does not begin with 'load_cell_'"),
+        (
+            "load_cell_force_noise: -1",
+            "line 1, attribute 'load_cell_force_noise' is -1.0: give zero or a positive number",
+        ),
+    ],
+)
+def test_a_load_cell_has_no_entries_but_its_own(tmp_path, line, message):
+    path = write_text(tmp_path / "lab.csv", f"# {line}", HEADER, ROW)
+    with refused(message) as caught:
+        read_record(path, rod=WIRE)
+    assert str(caught.value).startswith(f"{path}: line 1, ")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("ATI Nano17", "ATI Nano17"),
+        ("2024-05-01", "2024-05-01"),
+        ('"4711"', "4711"),
+        ("2nd one", "2nd one"),
+        ("1, 2 and 3", "1, 2 and 3"),
+    ],
+)
+def test_remarks_on_a_load_cell_are_kept(tmp_path, text, value):
+    path = write_text(tmp_path / "lab.csv", f"# load_cell_model: {text}", HEADER, ROW)
+    record = read_record(path)
+    assert record.attrs["load_cell_model"] == value
+    write_record(record, path)
+    assert read_record(path).identical(record)
+
+
+@pytest.mark.parametrize("end", [",", ",,", ", "])
+def test_separators_at_the_end_of_every_line_make_no_columns(tmp_path, end):
+    plain = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW, ROW))
+    path = write_text(tmp_path / "rig.csv", HEADER + end, ROW + end, ROW + end)
+    assert read_record(path).identical(plain)
+    cells = end.replace(",", ",7", 1)
+    write_text(path, HEADER + end, ROW + end, ROW + cells)
+    with refused("line 1: column 7 has no name: name it, or remove it (in line 3 it has '7"):
+        read_record(path)
+    write_text(path, HEADER + end, ROW)
+    with refused("columns (sweep, direction, drive_angle, holding_moment, force_x, force_y, (column 7)"):
+        read_record(path)
+
+
+def test_names_that_are_only_values_make_no_line_of_names(tmp_path):
+    """What is given for all samples stands in lines of samples too."""
+    path = write_text(tmp_path / "rig.csv", "Angle,Sense", "1.25,forward")
+    with refused("there is no column 'holding_moment' (columns: Angle, Sense)"):
+        read_record(path, columns={"drive_angle": "1.25-Angle", "sweep": "0", "direction": "forward"})
+    with refused("there is no column 'drive_angle', but a column 'Angle': did you mean 'drive_angle'?"):
+        read_record(path, columns={"sweep": "0", "direction": "forward"})
+
+
+@pytest.mark.parametrize("name", ["t", "index"])
+def test_the_one_dimension_of_a_netcdf_file_may_have_any_name(tmp_path, name):
+    record = make_record(columns(), rod=WIRE)
+    record.rename_dims(sample=name).to_netcdf(tmp_path / "rig.nc", engine="h5netcdf")
+    assert read_record(tmp_path / "rig.nc").identical(record)
+    timed = record.rename_dims(sample=name).assign_coords({name: np.arange(6.0)})
+    timed.to_netcdf(tmp_path / "rig.nc", engine="h5netcdf")
+    assert read_record(tmp_path / "rig.nc")[name].values.tolist() == list(range(6))
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_coordinates_are_written_as_columns(tmp_path, suffix):
+    record = make_record(columns(time=np.arange(6.0)))
+    write_record(record.set_coords("time"), tmp_path / f"record{suffix}")
+    assert read_record(tmp_path / f"record{suffix}").identical(record)
+
+
+def test_netcdf_holds_text_as_characters_and_no_objects(tmp_path):
+    write_record(make_record(columns()), tmp_path / "record.nc")
+    with xr.open_dataset(tmp_path / "record.nc", engine="h5netcdf", decode_cf=False) as stored:
+        assert stored["direction"].dtype == "S1"
+        assert all(variable.dtype != object for variable in stored.variables.values())
+
+
+def test_a_csv_file_is_read_with_the_units_in_its_header(tmp_path):
+    path = write_text(
+        tmp_path / "lab.csv",
+        "# tactile_bayes record, format 1",
+        "# units: SI",
+        "# rod_length: 0.2 [m],,,,",
+        "# rod_flexural_rigidity: 2.4e-3 [N·m^2]",
+        "# anything else that people write",
+        "# load_cell_force_noise: 0.01 [N]",
+        "# operator: somebody [trained]",
+        "# column temperature: number [degC] air",
+        "",
+        f"{HEADER}, temperature,count,ratio,note",
+        f"{ROW},20,1,1.0,a",
+        "",
+        f"{ROW},,2,2.0,3",
+    )
+    record = read_record(path)
+    assert rod_of(record) == Rod(0.2, 2.4e-3)
+    assert record.attrs["load_cell_force_noise"] == 0.01
+    assert record.attrs["operator"] == "somebody [trained]"
+    assert record["temperature"].attrs == {"units": "degC", "long_name": "air"}
+    np.testing.assert_array_equal(record["temperature"], [20, np.nan])
+    assert [record[name].dtype.kind for name in ("count", "ratio", "note")] == ["i", "f", "U"]
+
+
+def test_a_file_without_header_is_assumed_to_be_dimensionless(tmp_path):
+    path = write_text(tmp_path / "plain.csv", HEADER, ROW)
+    record = read_record(path)
+    assert (record.attrs["units"], record.attrs["units_source"]) == ("dimensionless", "assumed")
+    assert "units_source" not in read_record(path, rod=Rod()).attrs
+
+
+def test_a_file_without_header_is_si_with_a_rod(tmp_path):
+    record = read_record(write_text(tmp_path / "plain.csv", HEADER, ROW), rod=WIRE)
+    assert record.attrs["units"] == "SI"
+    assert rod_of(record) == WIRE
+    assert "units_source" not in record.attrs
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
+    path = tmp_path / f"record{suffix}"
+    write_record(make_record(columns(), rod=WIRE), path)
+    assert rod_of(read_record(path, rod=WIRE)) == WIRE
+    with refused(f"{path}: the SI record states {WIRE}, but {Rod(0.1, 1e-5)} was given"):
+        read_record(path, rod=Rod(0.1, 1e-5))
+    write_record(make_record(columns()), path)
+    with refused(f"but {WIRE} was given: read it without a rod, and convert it with to_si(record, rod)"):
+        read_record(path, rod=WIRE)
+
+
+def test_si_without_a_rod_is_refused_or_completed(tmp_path):
+    path = write_text(tmp_path / "lab.csv", "# units: SI", "# rod_length: 0.2 [m]", HEADER, ROW)
+    with refused(
+        f"{path}: the record is SI, but rod_flexural_rigidity of its rod is not stated: give rod=Rod(length=..., "
+        "flexural_rigidity=...), on the command line --length and --flexural-rigidity"
+    ):
+        read_record(path)
+    assert rod_of(read_record(path, rod=WIRE)) == WIRE
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
+    path = tmp_path / f"record{suffix}"
+    if suffix == ".csv":
+        write_text(path, "sweep,direction,drive_angle,holding_moment", "0,forward,1.25,0.5")
+    else:
+        make_record(columns()).drop_vars(["force_x", "force_y"]).to_netcdf(path, engine="h5netcdf")
+    with refused("missing=('force_x',)"):
+        read_record(path, missing=("force_y",))
+    assert present_channels(read_record(path, missing=("force_x", "force_y"))) == ("holding_moment",)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([HEADER, ROW, "", ROW.replace("0.125", "oops")], "line 4, column 'force_x': 'oops' is not a number"),
+        (["# note", HEADER, ROW, ROW.replace("0.125", "")], "line 4, column 'force_x': the value is missing (nan)"),
+        ([HEADER + ",note", ROW + ',"two\nlines"', ROW.replace("0.5", "x") + ","], "line 4, column 'holding_moment'"),
+        ([HEADER, ROW, ROW.replace("forward", "Forward")], "line 3, column 'direction': 'Forward' is no direction"),
+        ([HEADER, ROW.replace("1.25", "71.6")], "line 2, column 'drive_angle': 71.6 is more than a turn"),
+        ([HEADER, ROW, ROW.replace("1.25", "1.0")], "from 1.25 rad (line 2) to 1.0 rad (line 3)"),
+        ([HEADER, "0,forward,1,25,0,5,0,125"], "line 2: there are 8 cells in 6 columns"),
+        ([HEADER.replace(",", ";"), ROW], "line 2: there are 1 cells in 6 columns"),
+        (
+            [HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"],
+            "'0,5' is not a number: correct it, or remove the row; ",
+        ),
+        (
+            [HEADER.replace(",", " "), ROW.replace(",", " ")],
+            "there is no column 'sweep' (columns: sweep direction drive",
+        ),
+        (
+            [HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"],
+            "line 2, column 'holding_moment': '1.000,5' is not a",
+        ),
+        (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it (in line 2 it has '0')"),
+        (
+            ["Rig 4", HEADER, ROW],
+            "line 1: this line was taken for the column names (Rig 4), but they are in line 2: put #",
+        ),
+        (
+            ["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")],
+            "(Rig 4), but they are in line 3: put",
+        ),
+        (
+            ["# note", "Rig 4,,,,,", HEADER, ROW],
+            "line 2: this line was taken for the column names (Rig 4), but they are",
+        ),
+        (
+            ["Rig 4", "Angle,Fx", "1.0,2.0"],
+            "line 1: this line was taken for the column names (Rig 4), but there are more cells in lines below: if the "
+            "names are further down, put # before the lines above them",
+        ),
+        ([HEADER + ",force_x", ROW + ",1"], "line 1: there are two columns 'force_x'"),
+        (["# tactile_bayes record, format 2", HEADER, ROW], "line 1: the file has format 2"),
+        (["# units: SI", "# units: SI", HEADER, ROW], "line 2: 'units' is stated a second time"),
+        (
+            ["# units: SI", "# rod_length: 200 [mN]", HEADER, ROW],
+            "line 2: rod_length is in [mN], but takes m, cm, mm or",
+        ),
+        (["# units: SI", "# rod_length: long", HEADER, ROW], "line 2: rod_length is 'long': give a number [m]"),
+        (
+            ["# units: dimensionless", "# load_cell_force_noise: 0.1 [N]", HEADER, ROW],
+            "line 2: load_cell_force_noise is in [N], but takes 1: convert it",
+        ),
+        (["# column time: clock [s]", HEADER, ROW], "line 1: 'clock' is no kind of column"),
+        (["# column n: integer [1]", HEADER + ",n", ROW + ",1.5"], "line 3, column 'n': '1.5' is no integer"),
+        (
+            ["# column drive_angle: number [mm]", HEADER, ROW],
+            "line 1, column 'drive_angle' is in [mm], but takes rad, mrad, deg or °: correct the unit, or convert",
+        ),
+        (
+            ["# units: dimensionless", "# column force_x: number [mN]", HEADER, ROW],
+            "line 2, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]: convert it, "
+            "or state units 'SI' and the rod",
+        ),
+        (["# units: SI"], "there is no line of column names: add one, sweep,direction,"),
+        ([HEADER], "there are no samples"),
+        (
+            [HEADER, ROW.replace("1.25", '"1,25"')],
+            "line 2, column 'drive_angle': '1,25' is not a number: correct it, or remove the row; where decimals have "
+            "commas, write ; between columns",
+        ),
+        (
+            [HEADER + ",a/b,a|b", ROW + ",1,2"],
+            "the name 'a/b' cannot be stored in every file, and as 'a|b' there is ano",
+        ),
+        (
+            [HEADER.replace("drive_angle", "x") + ",a/b,a|b", ROW + ",1,2"],
+            "there is no column 'drive_angle' (columns: ",
+        ),
+        ([HEADER, ROW + '"' + "x" * 200_000], "line 2: the line cannot be read"),
+    ],
+)
+def test_what_is_wrong_in_a_csv_file_is_refused_with_its_line(tmp_path, lines, message):
+    path = write_text(tmp_path / "bad.csv", *lines)
+    with refused(message) as caught:
+        read_record(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_files_that_are_something_else_are_refused(tmp_path):
+    (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
+    with refused("a.nc: the file cannot be read, it is damaged or cut short, or no NetCDF 4 file ("):
+        read_record(tmp_path / "a.nc")
+    for path in ("a.txt", "a"):
+        (tmp_path / path).write_text(f"{HEADER}\n{ROW}\n")
+        with refused("a record is a .csv or a .nc file, not"):
+            read_record(tmp_path / path)
+        with refused("a record is a .csv or a .nc file, not"):
+            write_record(make_record(columns()), tmp_path / path)
+    image = xr.Dataset({"image": ("pixel", [1.0]), "sweep": ("t", [0])})
+    image.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
+    with refused("variable 'image' has dimensions ('pixel',)"):
+        read_record(tmp_path / "b.nc")
+    for path in ("absent.csv", "absent.nc", "absent"):
+        with pytest.raises(FileNotFoundError):
+            read_record(tmp_path / path)
+    for path in ("folder", "folder.csv"):
+        (tmp_path / path).mkdir()
+        with refused(f"{tmp_path / path} is a folder: give the record itself, a .csv or a .nc file"):
+            read_record(tmp_path / path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            f"{HEADER}\n{ROW}".encode("utf-16"),
+            "the file is UTF-16 text, as its first bytes say: save it as CSV in UTF-8",
+        ),
+        (b"\xfe\xff" + HEADER.encode("utf-16-be"), "the file is UTF-16 text"),
+        (HEADER.encode("utf-32"), "the file is UTF-32 text"),
+        (HEADER.encode("utf-16-le"), "the file is no UTF-8 text, but looks like UTF-16: save it as CSV in UTF-8"),
+        (b"\x89HDF\r\n\x1a\n", "this is no CSV file, but a NetCDF (HDF5) file: rename it to end in .nc"),
+        (b"CDF\x01\x00", "this is no CSV file, but a NetCDF file of the classic kind: convert it to NetCDF-4"),
+        (b"PK\x03\x04\x14", "this is no CSV file, but a workbook of a spreadsheet, or another zip archive: save it as"),
+    ],
+)
+def test_a_file_that_is_no_csv_file_says_what_it_is(tmp_path, content, message):
+    (tmp_path / "a.csv").write_bytes(content)
+    with refused(f"a.csv: {message}"):
+        read_record(tmp_path / "a.csv")
+
+
+def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
+    path = tmp_path / "excel.csv"
+    path.write_bytes(b"\xef\xbb\xbf" + f"{HEADER}\r\n{ROW}\r\n".encode())
+    assert read_record(path)["force_y"].values.tolist() == [0.25]
+
+
+def test_an_invalid_record_is_not_written(tmp_path):
+    with refused("there is no column 'force_x'"):
+        write_record(make_record(columns()).drop_vars("force_x"), tmp_path / "a.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_writing_that_fails_leaves_the_old_file(tmp_path, suffix, monkeypatch):
+    path = tmp_path / f"record{suffix}"
+    write_record(make_record(columns()), path)
+    old = path.read_bytes()
+
+    def full_disk(descriptor):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(OSError, match="no space left"):
+        write_record(make_record(columns(), rod=WIRE), path)
+    assert path.read_bytes() == old
+    assert list(tmp_path.iterdir()) == [path]
+
+
+NINES = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([HEADER, ROW.replace("0,", f"{NINES},", 1)], "line 2, column 'sweep': '999"),
+        ([f"# rod_length: 1 [{'Gm9 ' * 40}]", HEADER, ROW], "line 1: rod_length is in [Gm9"),
+        ([f"{HEADER},note", f"{ROW},a\0b"], "line 2: there is a NUL character (0x00), which is no text: remove it"),
+        (["# note: a\0b", HEADER, ROW], "line 1: there is a NUL character (0x00), which is no text: remove it"),
+        (
+            [f"{HEADER},note", f"{ROW},a", f"{ROW},{'x' * 131_073}"],
+            "line 3: the line cannot be read (field larger than",
+        ),
+        (
+            ['# note: "a\\u0000"', HEADER, ROW],
+            "line 1, attribute 'note' has a NUL character (0x00) in it, which no file",
+        ),
+        (
+            ['# note: "\\ud800"', HEADER, ROW],
+            "line 1, attribute 'note' has half of a surrogate pair in it, which no file",
+        ),
+        (
+            ['# column note: text [m] "\\ud800"', f"{HEADER},note", f"{ROW},a"],
+            "line 1, column 'note' has an attribute 'long_name' that has half of a surrogate pair in it: remove it",
+        ),
+        (["# CLASS: 1", HEADER, ROW], "the name 'CLASS' cannot be stored in every file"),
+        ([f"{HEADER},{'x' * 201}", f"{ROW},a"], "cannot be stored in every file"),
+        ([f"# tactile_bayes record, format {NINES}", HEADER, ROW], "line 1: the file has format 999"),
+    ],
+    ids=lambda value: None if isinstance(value, str) else "",
+)
+def test_what_no_file_could_store_is_refused_as_it_is_read(tmp_path, lines, message):
+    path = write_text(tmp_path / "rig.csv", *lines)
+    with refused(message) as caught:
+        read_record(path)
+    assert len(str(caught.value)) < 2000
+
+
+@pytest.mark.parametrize("text", ["a\0b", "\ud800", "x" * 131_073])
+def test_text_that_no_file_could_store_is_not_written(tmp_path, text):
+    with refused("sample 1, column 'note': the text has "):
+        make_record(columns(note=["", text, "", "", "", ""]))
+
+
+def test_numbers_of_any_length_in_remarks_are_text(tmp_path):
+    path = write_text(
+        tmp_path / "rig.csv", f"# run: {NINES}", f"# zeros: {'0' * 5000}7", f"{HEADER},tag", f"{ROW},{NINES}"
+    )
+    record = read_record(path)
+    assert record.attrs["run"] == NINES
+    assert record.attrs["zeros"] == 7
+    assert record["tag"].values.tolist() == [np.inf]

@@ -1,0 +1,389 @@
+"""Columns of a rig: names, units, signs and zeros of its own."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.record_tables import WIRE, columns, refused
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import make_record, read_record, rod_of, write_record
+from tactile_bayes.record.origin import Origin, origins_of
+from tactile_bayes.record.table import Source
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "origin"),
+    [
+        ("Fx", ["Fx"], Origin("Fx")),
+        ("Fx[mN]", ["Fx"], Origin("Fx", "mN")),
+        ("-Fx [mN]", ["Fx"], Origin("Fx", "mN", -1)),
+        ("- Fx[mN]", ["Fx"], Origin("Fx", "mN", -1)),
+        ("+Fx", ["Fx"], Origin("Fx")),
+        ("90-Fx[mN]", ["Fx"], Origin("Fx", "mN", -1, 90.0)),
+        ("-90+Fx[mN]", ["Fx"], Origin("Fx", "mN", 1, -90.0)),
+        ("Fx[mN]+1.5", ["Fx"], Origin("Fx", "mN", 1, 1.5)),
+        ("-Fx[mN]-1e-3", ["Fx"], Origin("Fx", "mN", -1, -1e-3)),
+        ("Fx", ["Fx [mN]"], Origin("Fx [mN]", "mN")),
+        ("Fx[mN]", ["Fx [mN]"], Origin("Fx [mN]", "mN")),
+        ("-Fx", ["Fx (mN)"], Origin("Fx (mN)", "mN", -1)),
+        ("Fx / mN", ["Fx / mN"], Origin("Fx / mN", "mN")),
+        ("Fx", ["Fx / mN"], Origin("Fx / mN", "mN")),
+        ("Fx (left)", ["Fx (left)", "Fx (right)"], Origin("Fx (left)")),
+        ("Fx (left)[mN]", ["Fx (left)"], Origin("Fx (left)", "mN")),
+        ("Fx [ch1][mN]", ["Fx [ch1]"], Origin("Fx [ch1]", "mN")),
+        ("Fx", ["Fx [mN]", "Fx"], Origin("Fx")),
+        ("Kraft längs [mN]", ["Kraft  längs"], Origin("Kraft  längs", "mN")),
+        # Names may look like arithmetic: what is in the file comes first.
+        ("F-1", ["F-1", "F"], Origin("F-1")),
+        ("F-1", ["F"], Origin("F", None, 1, -1.0)),
+        ("-F", ["-F", "F"], Origin("-F")),
+        ("90-F", ["90-F"], Origin("90-F")),
+        ("-F-1[N]", ["F-1"], Origin("F-1", "N", -1)),
+        ("5", ["5"], Origin("5")),
+    ],
+)
+def test_what_stands_for_a_column(text, names, origin):
+    assert origins_of({"force_x": text}, names, Source())["force_x"] == origin
+
+
+@pytest.mark.parametrize(
+    ("target", "text", "origin"),
+    [
+        ("sweep", "3", Origin(None, value=3)),
+        ("direction", "forward", Origin(None, value="forward")),
+        ("base_x", "-12[mm]", Origin(None, "mm", value=-12.0)),
+        ("base_y", "0", Origin(None, value=0.0)),
+        ("direction", "Sense", Origin("Sense")),
+    ],
+)
+def test_one_value_for_all_samples(target, text, origin):
+    assert origins_of({target: text}, ["Sense"], Source())[target] == origin
+
+
+@pytest.mark.parametrize(
+    ("target", "text", "message"),
+    [
+        ("force", "Fx", "columns: 'force' is no column of a record: did you mean 'force_"),
+        ("Q", "Fx", "columns: 'Q' is no column of a record: choose from sweep, direction, base_x"),
+        ("force_x", "0.5", "'0.5' is given for 'force_x', which is measured: name a column of the file, or declare"),
+        ("sweep", "-Fx", "'-Fx' is given for 'sweep', which has no unit, sign or zero: give a name alone"),
+        ("direction", "Fx[mm]", "'Fx[mm]' is given for 'direction', which has no unit, sign or zero"),
+        ("force_x", "Fx[kilopond]", "'kilopond' is no unit of it: it takes N, kN, mN, µN or gf"),
+    ],
+)
+def test_what_cannot_stand_for_a_column(target, text, message):
+    with pytest.raises(ParameterError, match=re.escape(message)):
+        origins_of({target: text}, ["Fx"], Source())
+
+
+# --- Files ----------------------------------------------------------------------------------------------------------
+
+RIG = {
+    "Zeit [s]": np.arange(6.0),
+    "Hub": [0, 0, 0, 1, 1, 1],
+    "Richtung": ["forward"] * 3 + ["backward"] * 3,
+    "Winkel [°]": 90 - np.degrees(columns()["drive_angle"]),
+    "Moment": -1e3 * np.array(columns()["holding_moment"]),
+    "Fx (mN)": 1e3 * np.array(columns()["force_x"]),
+    "Fy": 1e3 * np.array(columns()["force_y"]) - 12.5,
+}
+NAMED = {
+    "sweep": "Hub",
+    "direction": "Richtung",
+    "drive_angle": "90-Winkel",
+    "holding_moment": "-Moment[N mm]",
+    "force_x": "Fx (mN)",
+    "force_y": "Fy[mN]+12.5",
+    "base_y": "250[mm]",
+}
+
+
+def rig_file(path, table=RIG, *, delimiter=",", decimal=".", header=()):
+    """A table as a file of a rig."""
+    if path.suffix == ".nc":
+        xr.Dataset({name.replace("/", "over"): ("sample", values) for name, values in table.items()}).to_netcdf(
+            path, engine="h5netcdf"
+        )
+        return path
+    rows = [
+        delimiter.join(cell if isinstance(cell, str) else repr(cell).replace(".", decimal) for cell in row)
+        for row in zip(*(np.asarray(values).tolist() for values in table.values()), strict=True)
+    ]
+    path.write_text("\n".join([*header, delimiter.join(table), *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def assert_same_measurement(record, other):
+    for name in columns():
+        if name in ("sweep", "direction"):
+            assert record[name].values.tolist() == other[name].values.tolist()
+        else:
+            np.testing.assert_allclose(record[name].values, other[name].values, rtol=1e-14, atol=1e-16)
+            assert record[name].attrs["units"] == other[name].attrs["units"]
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("rig.csv", {}),
+        ("rig.csv", {"delimiter": ";", "decimal": ","}),
+        ("rig.csv", {"delimiter": ";"}),
+        ("rig.csv", {"delimiter": "\t", "decimal": ","}),
+        ("rig.nc", {}),
+    ],
+)
+def test_a_rig_is_read_by_its_own_names_units_signs_and_zeros(tmp_path, name, options):
+    record = read_record(rig_file(tmp_path / name, **options), columns=NAMED, rod=WIRE)
+    assert_same_measurement(record, make_record(columns(), rod=WIRE))
+    assert [name for name in record if name not in columns()] == ["Zeit [s]"]  # what stands for a column is not kept
+    assert record["Zeit [s]"].values.tolist() == list(range(6))
+    write_record(record, tmp_path / "again.csv")
+    assert read_record(tmp_path / "again.csv").identical(record)
+
+
+def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
+    path = rig_file(tmp_path / "rig.csv", delimiter=";", decimal=",")
+    path.write_bytes(b"\xef\xbb\xbfsep=;\r\n" + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert_same_measurement(read_record(path, columns=NAMED, rod=WIRE), make_record(columns(), rod=WIRE))
+
+
+def test_units_in_names_are_read_without_being_told(tmp_path):
+    table = {
+        "sweep": 0,
+        "direction": "forward",
+        "drive_angle [deg]": [60.0, 61.0],
+        "holding_moment [Nmm]": [0.0, 2.0],
+        "force_x (mN)": [0.0, -3.0],
+        "force_y/kN": [0.0, 4.0],
+        "base_x [cm]": [5.0, 5.0],
+    }
+    table = {name: np.broadcast_to(values, 2) for name, values in table.items()}
+    record = read_record(rig_file(tmp_path / "rig.csv", table), rod=WIRE)
+    read = {name: values.values.tolist() for name, values in record.items()}
+    assert read["drive_angle"] == [np.radians(60.0), np.radians(61.0)]
+    assert (read["holding_moment"], read["force_x"], read["force_y"]) == ([0, 2e-3], [0, -3e-3], [0, 4e3])
+    assert read["base_x"] == [0.05, 0.05]
+    assert len(record) == 8
+
+
+def test_units_in_the_header_are_converted_for_columns_and_attributes(tmp_path):
+    path = tmp_path / "rig.csv"
+    path.write_text(
+        "# rod_length: 200 [mm]\n# rod_flexural_rigidity: 2400 [N mm²]\n# rod_diameter: 700 [µm]\n"
+        "# load_cell_force_noise: 3 [mN]\n# column force_x: number [mN] Kraft\n# column truth_force_x: number [mN]\n"
+        "# column drive_angle: number [mrad]\n# column temperature: number [K]\n"
+        "sweep,direction,drive_angle,holding_moment,force_x,force_y,truth_force_x,temperature\n"
+        "0,forward,1250,0.5,125,0.25,130,293\n",
+        encoding="utf-8",
+    )
+    record = read_record(path)
+    assert (record.attrs["units"], rod_of(record)) == ("SI", Rod(0.2, 2.4e-3, 0.7e-3))
+    assert record.attrs["load_cell_force_noise"] == 3e-3
+    assert [record[name].item() for name in ("drive_angle", "force_x", "truth_force_x")] == [1.25, 0.125, 0.13]
+    assert record["force_x"].attrs == {"units": "N", "long_name": "Kraft"}
+    assert (record["temperature"].item(), record["temperature"].attrs["units"]) == (293, "K")
+    assert "units_source" not in record.attrs
+
+
+def test_units_of_netcdf_variables_are_converted(tmp_path):
+    table = make_record(columns(), rod=WIRE)
+    scaled = table.copy(deep=True)
+    scaled["force_x"].values *= 1e3
+    scaled["force_x"].attrs["units"] = "mN"
+    scaled["drive_angle"].values = np.degrees(scaled["drive_angle"].values)
+    scaled["drive_angle"].attrs["units"] = "degree"
+    scaled.to_netcdf(tmp_path / "rig.nc", engine="h5netcdf")
+    assert_same_measurement(read_record(tmp_path / "rig.nc"), table)
+
+
+def test_packed_integers_of_a_netcdf_file_are_unpacked(tmp_path):
+    table = xr.Dataset({name: ("sample", values) for name, values in columns().items()})
+    packed = {"force_x": {"dtype": "int16", "scale_factor": 0.1, "add_offset": 1.0, "_FillValue": -1}}
+    table.to_netcdf(tmp_path / "rig.nc", engine="h5netcdf", encoding=packed)
+    np.testing.assert_allclose(read_record(tmp_path / "rig.nc")["force_x"], columns()["force_x"], atol=1e-15)
+
+
+def test_dimensionless_records_take_degrees_and_no_other_unit(tmp_path):
+    path = rig_file(tmp_path / "rig.csv", {**columns(), "drive_angle": np.degrees(columns()["drive_angle"])})
+    record = read_record(path, columns={"drive_angle": "drive_angle[deg]"})
+    assert (record.attrs["units"], record.attrs["units_source"]) == ("dimensionless", "assumed")
+    np.testing.assert_allclose(record["drive_angle"], columns()["drive_angle"], rtol=1e-15)
+    with refused(
+        f"{path}: line 1, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]: convert"
+    ):
+        read_record(path, rod=Rod(), columns={"drive_angle": "drive_angle[deg]", "force_x": "force_x[mN]"})
+
+
+def test_a_unit_of_force_says_that_the_record_is_si(tmp_path):
+    path = rig_file(tmp_path / "rig.csv", columns())
+    with refused("the record is SI, but rod_length and rod_flexural_rigidity of its rod are not stated"):
+        read_record(path, columns={"force_x": "force_x[N]"})
+
+
+def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
+    path = rig_file(tmp_path / "rig.csv", columns())
+    plain = read_record(path)
+    turned = read_record(path, columns={"force_x": "-force_y", "force_y": "force_x"})
+    assert turned["force_x"].values.tolist() == (-plain["force_y"].values).tolist()
+    assert turned["force_y"].values.tolist() == plain["force_x"].values.tolist()
+    path = rig_file(tmp_path / "rig.csv", columns(force_x=None))
+    twice = read_record(path, columns={"force_x": "-force_y", "force_y": "force_y"})
+    assert twice["force_x"].values.tolist() == (-twice["force_y"].values).tolist()
+
+
+@pytest.mark.parametrize(
+    ("changes", "given", "message"),
+    [
+        ({}, {"force_x": "Fz[mN]"}, "there is no column 'Fz', which is given for 'force_x' (columns: Zeit [s], Hub, "),
+        ({}, {"force_y": "90-Fyy[mN]"}, "there is no column 'Fyy', which is given for 'force_y'"),
+        ({}, {"force_y": "Fyy"}, "did you mean 'Fy'?"),
+        ({}, {"base_y": "height"}, "(or one value for all samples, like 12[mm])"),
+        ({}, {"direction": "up"}, "(or one value for all samples, like forward)"),
+        (
+            {"force_y": np.zeros(6)},
+            {},
+            "line 1, column 'force_y' is in the file, but 'Fy[mN]+12.5' is given for it: leave out the one that is",
+        ),
+        (
+            {},
+            {"force_y": "Fy[mm]"},
+            "line 1, column 'force_y' ('Fy' in the file) is in [mm], but takes N, kN, mN, µN or gf: correct the unit",
+        ),
+        (
+            {},
+            {"holding_moment": "Moment[N]"},
+            "line 1, column 'holding_moment' ('Moment' in the file) is in [N], but takes N m, N mm, mN m, µN m or mN",
+        ),
+        ({}, {"base_y": "12[deg]"}, "column 'base_y' is in [deg], but takes m, cm, mm or µm"),
+        (
+            {},
+            {"force_x": "Fx (mN)[N]"},
+            "column 'Fx (mN)' has its unit in its name, but [N] is given for it: leave out",
+        ),
+        ({"Fy": ["1", "2", "x", "4", "5", "6"]}, {}, "line 4, column 'Fy': 'x' is not a number"),
+        (
+            {"Fy": ["1", "2", "", "4", "5", "6"]},
+            {},
+            "line 4, column 'force_y' ('Fy' in the file): the value is missing (nan)",
+        ),
+        (
+            {"Fz [ch1]": np.zeros(6)},
+            {"force_y": "Fz [ch1]"},
+            "line 1, column 'force_y' ('Fz [ch1]' in the file) is in [ch1], but takes N, kN, mN, µN or gf",
+        ),
+    ],
+)
+def test_what_does_not_fit_the_file_is_refused_with_its_place(tmp_path, changes, given, message):
+    path = rig_file(tmp_path / "rig.csv", {**RIG, **changes})
+    with refused(message) as caught:
+        read_record(path, columns={**NAMED, **given}, rod=WIRE)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [("Temp / °C", "Temp [°C]"), ("Dauer / s", "Dauer [s]"), ("Fx/Fy", "Fx|Fy"), ("v / m/s", "v [m|s]")],
+)
+def test_a_further_column_with_a_slash_is_kept_under_a_name_that_every_file_can_store(tmp_path, name, kept):
+    path = rig_file(tmp_path / "rig.csv", {**RIG, name: np.arange(6.0)})
+    record = read_record(path, columns=NAMED, rod=WIRE)
+    assert record[kept].values.tolist() == list(range(6))
+    assert record[kept].attrs == {"units": "unknown", "long_name": name}
+    for suffix in ("csv", "nc"):
+        write_record(record, tmp_path / f"again.{suffix}")
+        assert read_record(tmp_path / f"again.{suffix}").identical(record)
+
+
+def test_a_further_column_with_a_slash_keeps_its_description(tmp_path):
+    path = rig_file(
+        tmp_path / "rig.csv", {**RIG, "T / °C": np.arange(6.0)}, header=['# column "T / °C": number [°C] air']
+    )
+    assert read_record(path, columns=NAMED, rod=WIRE)["T [°C]"].attrs == {"units": "°C", "long_name": "air"}
+
+
+SLASHES = {"a / b": np.arange(6.0), "a [b]": np.arange(6.0)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "given", "message"),
+    [
+        ({}, {}, "the name 'a / b' cannot be stored in every file, and as 'a [b]' there is another column: rename one"),
+        ({}, {"force_x": "Fz"}, "there is no column 'Fz', which is given for 'force_x'"),
+        (
+            {"Fy": ["1", "2", "", "4", "5", "6"]},
+            {},
+            "line 4, column 'force_y' ('Fy' in the file): the value is missing",
+        ),
+        (
+            {"Moment": None},
+            {"holding_moment": None},
+            "there is no column 'holding_moment' (columns: Zeit [s], Hub, Richtung, Winkel [°], Fx (mN), Fy, a / b, "
+            "a [b]): add it, or say what stands for it, columns={'holding_moment': 'NAME[UNIT]'}, on the command line "
+            "--column 'holding_moment=NAME[UNIT]', or declare the channel missing",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_measured_column_comes_before_a_name_that_cannot_be_stored(
+    tmp_path, changes, given, message
+):
+    table = {name: values for name, values in {**RIG, **SLASHES, **changes}.items() if values is not None}
+    named = {target: text for target, text in {**NAMED, **given}.items() if text is not None}
+    with refused(message):
+        read_record(rig_file(tmp_path / "rig.csv", table), columns=named, rod=WIRE)
+
+
+def test_a_column_that_is_nearly_one_of_a_record_is_called_as_in_the_file(tmp_path):
+    path = rig_file(tmp_path / "rig.csv", columns(drive_angle=None, **{"drive/angle": np.ones(6)}))
+    with refused(
+        "there is no column 'drive_angle', but a column 'drive/angle': did you mean 'drive_angle'? Rename it, or say "
+        "what stands for it, columns={'drive_angle': 'drive/angle'}, on the command line --column "
+        "drive_angle=drive/angle"
+    ):
+        read_record(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("A", "columns={'drive_angle': 'A[deg]'} of read_record, on the command line --column 'drive_angle=A[deg]'"),
+        ("-A", "columns={'drive_angle': '-A[deg]'} of read_record"),
+        ("-A+90", "columns={'drive_angle': '90-A[deg]'} of read_record"),
+        ("A-0.5", "columns={'drive_angle': '-0.5+A[deg]'} of read_record"),
+    ],
+)
+def test_what_looks_like_degrees_may_be_said_to_be_in_the_words_of_the_file(tmp_path, given, message):
+    table = {**columns(sweep=None, direction=None, drive_angle=None), "A": np.degrees(columns()["drive_angle"])}
+    path = rig_file(tmp_path / "rig.csv", table)
+    with refused(message):
+        read_record(path, columns={"drive_angle": given}, split_sweeps=True)
+    remedy = re.search(r"'drive_angle': '(.*?)'", message)[1]
+    record = read_record(path, columns={"drive_angle": remedy}, split_sweeps=True)
+    offset, sign = {"A": (0, 1), "-A": (0, -1), "-A+90": (90, -1), "A-0.5": (-0.5, 1)}[given]
+    np.testing.assert_allclose(record["drive_angle"], np.radians(offset + sign * table["A"]), rtol=1e-12)
+
+
+def test_without_a_file_degrees_are_not_said_of_a_column_of_one():
+    with refused(
+        "57.29577951308232 is more than a turn (2π), so the angles look like degrees: convert the column"
+    ) as one:
+        make_record(columns(drive_angle=np.degrees(columns()["drive_angle"])))
+    assert "--column" not in str(one.value)
+    assert "columns=" not in str(one.value)
+
+
+@pytest.mark.parametrize(("wanted", "there"), [("FX / mN", "Fx / mN"), ("a", "A"), ("WINKEL", "Winkel")])
+def test_the_case_of_a_name_is_no_obstacle_to_finding_what_was_meant(wanted, there):
+    with refused(f"did you mean {there!r}?"):
+        origins_of({"force_x": wanted}, [there, "B"], Source())
+
+
+def test_a_unit_in_the_header_and_another_one_given_contradict_each_other(tmp_path):
+    path = rig_file(tmp_path / "rig.csv", header=["# column Fy: number [mN]"])
+    read_record(path, columns={**NAMED, "force_y": "Fy"}, rod=WIRE)
+    with refused("line 1, column 'force_y' ('Fy' in the file) is in [mN], but [N] is given for it: leave out the one"):
+        read_record(path, columns={**NAMED, "force_y": "Fy[N]"}, rod=WIRE)

@@ -1,0 +1,67 @@
+"""Records with and without dimension."""
+
+from __future__ import annotations
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis.extra import numpy as hnp
+
+from helpers.record_tables import WIRE, columns, edited, refused
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import CHANNELS, make_record, rod_of, to_dimensionless, to_si
+
+# Numbers whose quotients are far from underflow, where digits would be lost.
+moderate = st.floats(-1e6, 1e6).filter(lambda value: value == 0 or abs(value) > 1e-280)
+scales = st.floats(1e-3, 1e3)
+
+
+@settings(max_examples=15, deadline=None)
+@given(hnp.arrays(float, (6, 5), elements=moderate), scales, scales, scales)
+def test_units_convert_there_and_back(values, length, rigidity, diameter):
+    rod = Rod(length, rigidity, min(diameter, length))
+    assume(not rod.is_dimensionless)
+    names = (*CHANNELS, "truth_contact_x", "truth_force_y")
+    si = make_record(
+        columns(**dict(zip(names, values.T, strict=True)), base_x=np.full(6, values[0, 0])),
+        rod=rod,
+        attrs={"load_cell_force_noise": 0.5, "load_cell_moment_noise": 0.25, "rig": "bench"},
+    )
+    dimensionless = to_dimensionless(si)
+    # One division or multiplication each, correctly rounded.
+    assert np.array_equal(dimensionless["force_x"], si["force_x"] / rod.force_unit)
+    assert np.array_equal(dimensionless["truth_force_y"], si["truth_force_y"] / rod.force_unit)
+    assert np.array_equal(dimensionless["holding_moment"], si["holding_moment"] / rod.moment_unit)
+    assert np.array_equal(dimensionless["base_x"], si["base_x"] / rod.length)
+    assert np.array_equal(dimensionless["truth_contact_x"], si["truth_contact_x"] / rod.length)
+    assert np.array_equal(dimensionless["drive_angle"], si["drive_angle"])
+    assert rod_of(dimensionless) == Rod(diameter=rod.diameter / length)
+    assert dimensionless.attrs["load_cell_force_noise"] == 0.5 / rod.force_unit
+    assert dimensionless.attrs["load_cell_moment_noise"] == 0.25 / rod.moment_unit
+    assert to_dimensionless(dimensionless) is dimensionless
+
+    back = to_si(dimensionless, rod)
+    assert rod_of(back) == rod
+    for name in back.data_vars:
+        assert back[name].attrs == si[name].attrs
+        if back[name].dtype.kind == "f":
+            np.testing.assert_allclose(back[name], si[name], rtol=4 * np.finfo(float).eps, atol=0)
+    assert back.attrs["load_cell_force_noise"] == pytest.approx(0.5, rel=1e-15)
+
+
+def test_a_record_in_si_stays_so_with_its_own_rod_only():
+    si = make_record(columns(), rod=WIRE)
+    assert to_si(si, WIRE) is si
+    with refused("the record is SI already, with Rod(length=0.2,"):
+        to_si(si, Rod(0.1, 1e-5))
+
+
+def test_a_rod_of_another_diameter_is_refused():
+    with refused("the record was made with a rod of diameter 0.0 (in rod lengths)"):
+        to_si(make_record(columns()), WIRE)
+
+
+def test_a_conversion_that_overflows_is_refused():
+    with refused("sample 5, column 'force_y': the value is inf"):
+        to_dimensionless(make_record(edited("force_y", 5, 1e308), rod=WIRE))

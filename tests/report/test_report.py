@@ -1,0 +1,640 @@
+"""The report of a run: what it says, that its numbers are the posterior's, and that no text of a record escapes."""
+
+from __future__ import annotations
+
+import ast
+import base64
+import contextlib
+import dataclasses
+import hashlib
+import importlib
+import inspect
+import io
+import json
+import pkgutil
+import re
+import sys
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy import stats
+
+import tactile_bayes as tb
+from helpers.report_pages import (
+    COLUMN,
+    ENTRY,
+    FILE,
+    FOLDER,
+    LONG_NAME,
+    UNIT,
+    VALUE,
+    Page,
+    analysed_quickly,
+    coarse_record,
+    comparison,
+    hostile_run,
+)
+from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour import contours_of
+from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.nuisances import nuisances_of
+from tactile_bayes.inference.result import posterior_draws, read_result, record_of, write_result
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import CHANNELS, record_hash, rod_of
+from tactile_bayes.report import write_report
+from tactile_bayes.report.contour_figure import contour_figure
+from tactile_bayes.report.drawing import Plot, Scale
+from tactile_bayes.report.findings import findings_of
+from tactile_bayes.report.frames import motion_of
+from tactile_bayes.report.page import page_of
+from tactile_bayes.report.readings_figure import readings_figure
+from tactile_bayes.report.reproduction import hindrances
+from tactile_bayes.report.trust import contacts_words
+from tactile_bayes.runs.reconstruction import reconstruction_in_words
+from tactile_bayes.uncertainty.summary import gap_if_any, summary
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    path = folder / "measured.csv"
+    tb.write_record(coarse_record(), path)
+    command = ["tactile-bayes", "infer", "measured.csv", "--as-stated", "--out", "my run"]
+    analysed_quickly(tb.read_record(path), folder, nuisances=[], probability=0.9, record_file=path, command=command)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def text(folder):
+    return write_report(folder).read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def page(text):
+    return Page(text)
+
+
+@pytest.fixture(scope="module")
+def posterior(folder):
+    return read_result(folder / "posterior.nc")
+
+
+@pytest.fixture(scope="module")
+def findings(folder):
+    return findings_of(folder)
+
+
+@pytest.fixture(scope="module")
+def hostile(tmp_path_factory):
+    return hostile_run(tmp_path_factory.mktemp("hostile"))
+
+
+# --- Structure ----------------------------------------------------------------------------------------------------
+
+
+def test_the_page_is_well_formed_and_its_headings_are_in_order(page, text):
+    assert text.startswith("<!DOCTYPE html>")
+    assert page.open == []
+    assert page.all("html")[0]["lang"] == "en-GB"
+    levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch(r"h[1-6]", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+    assert page.texts["h2"] == [
+        "What was found",
+        "Can it be trusted?",
+        "What was measured",
+        "Details",
+        "Making it again",
+    ]
+
+
+def test_every_reference_within_the_page_has_its_target(page):
+    ids = [attrs["id"] for _, attrs in page.elements if "id" in attrs]
+    assert len(ids) == len(set(ids))
+    wanted = [attrs["href"].removeprefix("#") for attrs in page.all("a")]
+    for _, attrs in page.elements:
+        for name in ("for", "aria-labelledby", "aria-describedby"):
+            wanted += (attrs.get(name) or "").split()
+        for value in attrs.values():
+            wanted += re.findall(r"url\(#([^)]+)\)", value or "")
+    assert set(wanted) <= set(ids)
+    assert len(wanted) > 20
+
+
+def test_every_drawing_has_words_and_every_control_a_label(page):
+    drawings = page.all("svg")
+    assert [attrs["id"] for attrs in drawings] == [
+        "contour-map",
+        "band-detail",
+        "rod-map",
+        "readings-holding-moment",
+        "readings-force-x",
+        "readings-force-y",
+    ]
+    assert all(attrs["role"] == "img" for attrs in drawings)
+    assert all(words.strip() for words in page.texts["title"] + page.texts["desc"])
+    assert len(page.texts["desc"]) == len(drawings)
+    labelled = {attrs["for"] for attrs in page.all("label")}
+    assert {attrs["id"] for tag in ("input", "select") for attrs in page.all(tag)} == labelled
+
+
+def test_the_page_loads_nothing_and_runs_nothing_but_its_own_script(page, text):
+    policy = next(attrs["content"] for attrs in page.all("meta") if attrs.get("http-equiv"))
+    script = next(
+        words for attrs, words in zip(page.all("script"), page.texts["script"], strict=True) if "type" not in attrs
+    )
+    digests = [
+        base64.b64encode(hashlib.sha256(words.encode()).digest()).decode() for words in (script, page.texts["style"][0])
+    ]
+    assert policy == (
+        f"default-src 'none'; script-src 'sha256-{digests[0]}'; style-src 'sha256-{digests[1]}'; base-uri 'none'; "
+        "form-action 'none'"
+    )
+    assert "http://" not in text.replace("http-equiv", "")
+    assert "https://" not in text
+    assert "@import" not in text
+    assert "eval(" not in text
+    assert not re.search(r"url\((?!#)", text)
+    assert len(page.all("script")) == 2
+    assert {tag for tag, _ in page.elements} & {"img", "link", "iframe", "object", "embed", "base", "form"} == set()
+    for _, attrs in page.elements:
+        assert not any(name.startswith("on") or name in ("style", "src", "srcset", "action") for name in attrs)
+        assert (attrs.get("href") or "#").startswith("#")
+
+
+def test_the_page_is_small(text):
+    assert len(text.encode()) < 500_000
+
+
+# --- Numbers ------------------------------------------------------------------------------------------------------
+
+
+def number(cell):
+    return float(cell.replace("−", "-"))
+
+
+def assert_shows(cell, value):
+    """A number that is written with some decimals is this one, rounded."""
+    decimals = len(cell.partition(".")[2])
+    assert number(cell) == pytest.approx(value, abs=0.5001 * 10.0**-decimals)
+
+
+def test_the_parameters_are_those_of_the_posterior(page, posterior):
+    rows = {row[0]: row for row in page.table("Estimates are medians")[1:]}
+    numbers = summary(posterior, 0.9, gap_if_any(posterior, 0.9))
+    assert list(rows) == numbers["quantity"].values.tolist()
+    for name, row in rows.items():
+        of_name = numbers.sel(quantity=name)
+        for cell, column in zip(row[3:6], ("median", "lower", "upper"), strict=True):
+            assert_shows(cell, float(of_name[column]))
+        assert row[2] == ("" if of_name["unit"] == "1" else of_name["unit"].item())
+    assert page.table("Estimates are medians")[0][4] == "90\u00a0% from"
+
+
+def test_the_band_in_words_and_table_is_that_of_the_posterior(page, posterior):
+    x = [1e-3 * number(row[0]) for row in page.table("The band at some places [mm]")[1:]]
+    band = tb.contour_band(posterior, x, 0.9)
+    steep = np.max(np.abs(np.gradient(band["median"].values, x))) * 0.05e-3  # x is rounded, too
+    for row, lower, median, upper in zip(
+        page.table("The band at")[1:], band["lower"].values, band["median"].values, band["upper"].values, strict=True
+    ):
+        shown = 1e-3 * np.array([number(cell) for cell in row[1:]])
+        np.testing.assert_allclose(shown, [lower, median, upper], atol=steep + 0.5e-6)
+    said = page.data["band"]["said"]
+    assert len(said) == 201
+    assert re.fullmatch(r"x = \S+\u00a0mm: y from \S+ to \S+\u00a0mm with 90\u00a0%, median \S+\u00a0mm", said[0])
+
+
+def test_what_is_worked_out_again_is_what_the_run_has_written(folder, findings):
+    contacts = pd.read_csv(folder / "contacts.csv", index_col="sample")
+    np.testing.assert_allclose(findings.contacts["contact_y"], contacts["contact_y"], rtol=1e-13)
+    band = pd.read_csv(folder / "band.csv", index_col="x")
+    np.testing.assert_allclose(findings.band["upper"], band["upper"], rtol=1e-13)
+    lines = (folder / "summary.txt").read_text(encoding="utf-8").splitlines()
+    assert findings.verdicts == tuple(lines[: lines.index("")])
+    assert findings.probability == 0.9
+
+
+def test_the_gap_is_told_as_far_as_convexity_confines_it_with_uncertain_ends(page, findings):
+    edges = findings.edges
+    said = next(words for words in page.texts["p"] if "convexity alone" in words)
+    shown = re.findall(r"up to (\S+)\u00a0(µm|mm) wide", said)
+    certificate, band = (float(value) * {"µm": 1e-6, "mm": 1e-3}[unit] for value, unit in shown)
+    assert certificate == pytest.approx(float((edges["triangle_upper"] - edges["triangle_lower"]).max()), rel=0.05)
+    assert band == pytest.approx(float(edges["band_width"]), rel=0.05)
+    assert band < certificate
+
+
+@pytest.mark.parametrize("score", [-7.0, -5.9, -4.0, 4.0, 5.9, 7.0])
+def test_the_force_along_the_rod_is_judged_as_by_reconstruct(findings, score):
+    contacts = findings.contacts.assign_attrs(axial_score=score)
+    said = contacts_words(dataclasses.replace(findings, contacts=contacts))[-1]
+    elsewhere = " ".join(reconstruction_in_words(contacts))
+    for words in ("agrees with the moment", "too small", "too large", "as friction makes it", "check the zero"):
+        assert (words in said) == (words in elsewhere)
+    assert "the friction that was stated" in said
+    tree = findings.posterior.copy()
+    tree.attrs["nuisances"] = '["friction"]'
+    found = dataclasses.replace(findings, contacts=contacts, posterior=tree)
+    assert "the friction that was found" in contacts_words(found)[-1]
+
+
+def test_the_verdicts_come_first_and_say_whether_to_trust(page, folder, text):
+    first = (folder / "summary.txt").read_text(encoding="utf-8").splitlines()[0]
+    assert first.startswith("NOT CONVERGED")
+    shown = next(words for words in page.texts["p"] if "NOT CONVERGED" in words)
+    assert shown == f"Read this first. {first}"
+    assert next(attrs["class"] for attrs in page.all("p") if "verdict" in (attrs.get("class") or "")) == "verdict ill"
+    assert text.index(first.split(",")[0]) < text.index("<svg")
+
+
+@pytest.fixture(scope="module")
+def told(findings):
+    """What the page says of the same run: as it is, without a complaint, and where the record rejects the contour."""
+    rejecting = findings.check.assign_attrs(passed=False)
+    passing = findings.check.assign_attrs(passed=True)
+    kinds = {
+        "as it is": dataclasses.replace(findings, check=passing),
+        "well": dataclasses.replace(findings, check=passing, verdicts=("All is well: the ensembles agree.",)),
+        "rejected": dataclasses.replace(findings, check=rejecting, verdicts=("The family does not describe it.",)),
+    }
+    return {kind: page_of(found, "run") for kind, found in kinds.items()}
+
+
+def test_a_contour_is_known_to_within_its_band_only_where_all_is_well(told):
+    well, doubtful, rejected = (told[kind]["answer"] for kind in ("well", "as it is", "rejected"))
+    assert "the contour is known to within a 90\u00a0% band whose median width is" in well
+    for words in (doubtful, rejected):
+        assert "known to within" not in words
+        assert "the posterior has a 90\u00a0% band whose median width is" in words
+    assert "What it is worth depends on what is said above" in doubtful
+    assert "if the contour were of this family and the rig as assumed, and the record says that one of" in rejected
+
+
+def test_of_a_contour_that_is_rejected_nothing_is_said_but_with_an_if(told):
+    (gap, certificate), (only,) = told["well"]["gap"], told["rejected"]["gap"]
+    assert gap.startswith("The gap, which no sweep touches, is ")
+    assert "convexity alone" in certificate
+    assert only.startswith("On such a contour the gap, which no sweep touches, would be ")
+    assert re.findall(r"[\d.]+", only) == re.findall(r"[\d.]+", gap)
+    assert "which noise explains with probability" in told["well"]["contacts"][1]
+    explained = told["rejected"]["contacts"][1]
+    assert "which noise as large as it was found explains with probability" in explained
+    assert explained.endswith("what the contour does not explain, so that this speaks for nothing.")
+
+
+def test_the_place_along_x_looks_like_no_pivot(page):
+    marks = {attrs["id"]: tag for tag, attrs in page.elements if attrs.get("id") in ("band-mark", "contact")}
+    assert marks == {"band-mark": "g", "contact": "circle"}
+    pivots = [tag for tag, attrs in page.elements if attrs.get("class") == "pivot"]
+    assert set(pivots) == {"circle"}
+    assert "place along x, chosen below or beside" in page.texts["li"]
+    assert {"class": "js-only"} in page.all("li")  # as the mark is
+
+
+def test_where_it_came_from_is_said(page, folder, posterior):
+    digests = dict(page.table("SHA-256")[1:])
+    assert digests == {
+        "posterior.nc": hashlib.sha256((folder / "posterior.nc").read_bytes()).hexdigest(),
+        "record, as stored in it": record_hash(tb.read_record(folder / "measured.csv")),
+        "file measured.csv": hashlib.sha256((folder / "measured.csv").read_bytes()).hexdigest(),
+    }
+    assert posterior.attrs["data_sha256"] == digests["record, as stored in it"]
+    versions = dict(page.table("Software")[1:])
+    assert versions["numpy"] == np.__version__
+    assert versions["tactile-bayes"] == tb.__version__
+    assert "Python" in versions
+    assert page.texts["code"][0] == "tactile-bayes infer measured.csv --as-stated --out 'my run'"
+    assert "The contour from measured.csv" in page.texts["h1"][0]
+
+
+def test_the_lines_that_it_gives_make_the_same_draws(page, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert "tactile_bayes." not in page.texts["code"][1]  # its public face is enough
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        exec(compile(page.texts["code"][1], "lines", "exec"), {})
+    assert said.getvalue() == "True\n"
+
+
+def test_what_hinders_that_is_said(posterior):
+    record = record_of(posterior)
+    assert hindrances(posterior, record) == []
+    other = posterior.copy()
+    other.attrs["priors"] = json.dumps({"q": "norm(0.1, 0.01)"})
+    other.attrs["settings"] = json.dumps({"max_seconds": 5.0})
+    clock, priors = hindrances(other, record)
+    assert clock.startswith("The run could end by the clock")
+    assert priors == "Priors of your own have to be given again: priors={…} for q."
+
+
+# --- The moving rod -----------------------------------------------------------------------------------------------
+
+
+def test_the_rod_moves_as_a_scan_of_the_likeliest_contour_has_it(posterior):
+    motion = motion_of(posterior)
+    record, rod = record_of(posterior), rod_of(record_of(posterior))
+    for number_, direction in ((0, "forward"), (1, "backward")):
+        angles = record["drive_angle"].values[record["sweep"].values == number_]
+        ideal = tb.scan(motion.contour, direction=direction, drive_angles=angles, rod=rod).record
+        of_sweep = motion.sweep == number_
+        np.testing.assert_array_equal(motion.phase[of_sweep], ideal["truth_contact_phase"])
+        for k, name in enumerate(CHANNELS):
+            np.testing.assert_allclose(
+                motion.loads[of_sweep, k], ideal[name], atol=1e-6 * float(abs(ideal[name]).max())
+            )
+        np.testing.assert_allclose(motion.contact_x[of_sweep], ideal["truth_contact_x"], atol=1e-8)
+    gaps = np.hypot(motion.rod_x - motion.contact_x[:, None], motion.rod_y - motion.contact_y[:, None]).min(axis=1)
+    touching = motion.phase != "none"
+    assert np.all(gaps[touching] < 0.5 * rod.diameter + rod.length / 60)
+    lengths = np.hypot(np.diff(motion.rod_x, axis=1), np.diff(motion.rod_y, axis=1)).sum(axis=1)
+    np.testing.assert_allclose(lengths, rod.length, rtol=2e-3)
+
+
+def test_the_rig_of_the_likeliest_draw_moves_it(posterior):
+    """Against the loads by which the likelihood judges that draw, which are interpolated."""
+    rig = {
+        "rigidity_scale": 1.05,
+        "drive_angle_offset": 0.01,
+        "backlash": 0.006,
+        "suspension_compliance": 0.4,
+        "friction": 0.2,
+        "base_2_x": 0.002,
+        "moment_bias": 1e-4,
+    }
+    tree = with_rig(posterior, rig)
+    motion, record = motion_of(tree), record_of(tree)
+    expected = predicted(tree, rig)[motion.samples]
+    largest = np.abs(expected).max(axis=0)
+    np.testing.assert_allclose(motion.loads / largest, expected / largest, atol=1e-5)
+    misread = np.where(record["direction"].values == "forward", 0.013, 0.007)
+    driven = (record["drive_angle"].values - misread)[motion.samples]
+    turned = motion.drive_angle + rig["suspension_compliance"] * motion.loads[:, 0]
+    np.testing.assert_allclose(turned, driven, atol=1e-9)
+    np.testing.assert_allclose(motion.cell_angle, driven, atol=1e-9)
+    np.testing.assert_allclose(motion.rod_x[:, 0], np.where(motion.sweep == 1, 0.052, 0.0))
+    np.testing.assert_allclose(motion.pivots, [[0.0, 0.0], [0.052, 0.0]])
+
+
+def test_loads_are_shown_along_the_axes_of_a_cell_that_turns_with_the_drive(findings):
+    """The suspension gives way beyond the cell, so that the cell is not turned with the rod."""
+    rig = {"suspension_compliance": 3.0, "drive_angle_offset": 0.01}
+    tree = with_rig(findings.posterior, rig, load_cell_frame="turning")
+    turning, motion = dataclasses.replace(findings, posterior=tree, record=record_of(tree)), motion_of(tree)
+    expected = predicted(tree, rig)[motion.samples]
+    figure = readings_figure(turning, motion)
+    for k, name in enumerate(CHANNELS):
+        shown = [number(rows[2]) for rows in figure.data["said"][name]]
+        wanted = expected[:, k] * 10.0 ** -figure.shown[name].power
+        rounding, interpolation = 5e-4, 1e-5 * np.abs(wanted).max()
+        np.testing.assert_allclose(shown, wanted, rtol=rounding, atol=interpolation)
+    assert np.abs(motion.cell_angle - motion.drive_angle).max() > 0.05
+
+
+def test_pivots_are_marked_where_they_were_found(findings):
+    tree = with_rig(findings.posterior, {"base_2_x": 0.02})
+    shifted, motion = dataclasses.replace(findings, posterior=tree, record=record_of(tree)), motion_of(tree)
+    moving, overview = readings_figure(shifted, motion), contour_figure(shifted)
+    ends_of_rods = np.array(moving.data["rod"])[:, :2]
+    assert marked(moving.rods) == sorted(set(map(tuple, ends_of_rods.tolist())))
+    per_metre = np.ptp(overview.band["mapX"]) / np.ptp(findings.band["x"].values)
+    apart = np.diff(marked(overview.map), axis=0)
+    np.testing.assert_allclose(apart, [[0.07 * per_metre, 0.0]], atol=0.5)  # of the drawing's tenths
+
+
+def marked(drawing):
+    """Places of pivots in a drawing, from left to right."""
+    found = [attrs for attrs in Page(drawing).all("circle") if attrs["class"] == "pivot"]
+    return sorted((float(attrs["cx"]), float(attrs["cy"])) for attrs in found)
+
+
+def with_rig(posterior, rig, **attrs):
+    """The posterior as if every draw had this rig; its second sweep has a pivot of its own."""
+    draws = posterior_draws(posterior)
+    draws = draws.assign({name: xr.full_like(draws["q"], value) for name, value in rig.items()})
+    columns = posterior["constant_data"].to_dataset()
+    columns["base_x"] = columns["base_x"].copy(data=np.where(columns["sweep"] == 1, 0.05, 0.0))
+    groups = {name: group.to_dataset() for name, group in posterior.children.items()}
+    tree = xr.DataTree.from_dict({**groups, "posterior": draws, "constant_data": columns})
+    tree.attrs = posterior.attrs | {"nuisances": json.dumps(list(rig))} | attrs
+    return tree
+
+
+def predicted(tree, rig):
+    """Loads of the likeliest draw by which the likelihood judges the record, shape (samples, 3)."""
+    record = record_of(tree)
+    best = posterior_draws(tree).isel(tree["sample_stats"]["lp"].argmax(("chain", "draw")))
+    cell, rod = LoadCell.from_record(record), rod_of(record)
+    nuisances = nuisances_of(record, list(rig), {}, cell, 0.0)
+    values = {name: np.array([value]) for name, value in rig.items()}
+    likelihood = RecordLikelihood(record, cell, exact=True)
+    loads, _ = likelihood.predict(contours_of(best, "parabola"), nuisances.rig(values))
+    return loads[0] * [rod.moment_unit, rod.force_unit, rod.force_unit]
+
+
+def test_of_a_long_record_some_samples_are_shown_of_every_sweep(posterior):
+    all_, few = motion_of(posterior), motion_of(posterior, most=20)
+    assert few.every == -(-all_.samples.size // 20)
+    assert set(few.sweep) == {0, 1}
+    assert set(few.samples) < set(all_.samples)
+
+
+def test_the_frames_are_those_rods_in_the_drawing(page, posterior):
+    frames, motion = page.data["frames"], motion_of(posterior)
+    assert len(frames["rod"]) == motion.samples.size
+    drawn = np.array(frames["rod"]).reshape(motion.samples.size, -1, 2)
+    for axis, values in ((0, motion.rod_x), (1, motion.rod_y)):
+        slope, offset = np.polyfit(values.ravel(), drawn[..., axis].ravel(), 1)
+        np.testing.assert_allclose(drawn[..., axis], slope * values + offset, atol=0.06)
+        assert (slope > 0) == (axis == 0)
+    assert [point is None for point in frames["contact"]] == (motion.phase == "none").tolist()
+    readings = [number(rows[0]) for rows in frames["said"]["holding_moment"]]
+    measured = record_of(posterior)["holding_moment"].values[motion.samples]
+    np.testing.assert_allclose(readings, 1e3 * measured, rtol=6e-4)
+
+
+# --- Other records ------------------------------------------------------------------------------------------------
+
+
+def test_a_rig_that_measures_the_moment_only_has_no_contact_points(tmp_path):
+    ideal = tb.scan(tb.contours.Parabola(0.5, 0.5), direction="backward", drive_step=0.1).record
+    record = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(ideal, seed=1)
+    record["force_x"][:] = record["force_y"][:] = np.nan
+    analysed_quickly(record, tmp_path, nuisances=[])
+    page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
+    assert "Contact points take all three channels, and force x and force y were not measured." in page.texts["p"]
+    assert "There are sweeps in one direction only, so there is no gap between two." in page.texts["p"]
+    assert [attrs["id"] for attrs in page.all("svg")][-1] == "readings-holding-moment"
+    assert page.data["frames"]["said"]["force_x"][0][:2] == ["not measured", "not measured"]
+    assert any("lengths are in rod lengths L" in words for words in page.texts["p"])
+
+
+@pytest.mark.slow
+def test_a_shape_free_contour_hides_its_directions_among_the_details(tmp_path):
+    few = tb.SamplerSettings(ensembles=2, walkers=80, block_steps=5, max_steps=5)
+    analysed_quickly(coarse_record(), tmp_path, family="shape-free", nuisances=[], settings=few)
+    page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
+    names = [row[0] for row in page.table("Estimates are medians")]
+    assert "length_scale" in names
+    assert not any(name.startswith("z_") for name in names)
+    assert "z_1" in [row[0] for row in page.table("All parameters")]
+
+
+def test_probabilities_of_shapes_are_told_where_there_are_some(folder, posterior, tmp_path):
+    comparison(posterior.attrs["data_sha256"]).to_netcdf(tmp_path / "comparison.nc", engine="h5netcdf")
+    page = Page(write_report(folder, tmp_path / "page.html", compare=tmp_path).read_text(encoding="utf-8"))
+    assert "ellipse with probability 0.90" in page.texts["p"]
+    assert page.table("Shapes")[1:] == [
+        ["ellipse", "0.900", "10.0", "0.200", "yes"],
+        ["parabola", "0.100", "8.0", "0.300", "yes"],
+        ["circle", "–", "–", "–", "not sampled"],
+    ]
+    assert [float(attrs["value"]) for attrs in page.all("meter")] == [0.9, 0.1, 0.0]
+
+
+def test_a_comparison_that_does_not_state_its_record_is_left_out_unless_it_is_asked_for(folder, tmp_path):
+    unstated = comparison()
+    del unstated.attrs["data_sha256"]
+    unstated.to_netcdf(tmp_path / "comparison.nc", engine="h5netcdf")
+    refused(folder, r"comparison\.nc does not state which record it is of: compare again", compare=tmp_path)
+    (tmp_path / "posterior.nc").write_bytes((folder / "posterior.nc").read_bytes())
+    assert findings_of(tmp_path).comparison is None
+
+
+# --- Escaping -----------------------------------------------------------------------------------------------------
+
+
+def test_no_text_of_a_record_becomes_an_element(hostile):
+    text = write_report(hostile).read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    assert len(page.all("script")) == 2
+    assert page.all("img") == page.all("b") == []
+    assert "49" not in [cell for row in page.table("What the record says") for cell in row]
+    assert "onerror" not in {name for _, attrs in page.elements for name in attrs}
+    assert page.table("Further columns")[1:] == [[COLUMN, UNIT, LONG_NAME]]
+    assert [ENTRY, VALUE] in page.table("What the record says of itself")
+    assert page.texts["h1"] == [f"The contour from {FILE}"]
+    assert page.texts["title"][0] == f"Contour from {FILE} – tactile_bayes"
+    assert f"tactile_bayes, report of the run {FOLDER}" in page.texts["p"]
+
+
+def test_what_the_script_is_given_cannot_end_it():
+    from tactile_bayes.report.writing import _as_json
+
+    attack = {"a": "</script><!--<script>&\u2028\u2029"}
+    said = _as_json(attack)
+    assert not set("<>&\u2028\u2029") & set(said)
+    assert json.loads(said) == attack
+
+
+# --- Refusals -----------------------------------------------------------------------------------------------------
+
+
+def refused(folder, message, **options):
+    with pytest.raises(InferenceError, match=message) as caught:
+        write_report(folder, **options)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_what_is_no_run_is_refused(folder, tmp_path):
+    refused(tmp_path / "nowhere", r"^there is no folder .*nowhere: give the folder that `tactile-bayes infer")
+    refused(folder / "band.csv", r"band\.csv is a file: give the folder")
+    refused(tmp_path, r"holds no posterior\.nc: give the folder")
+    comparison().to_netcdf(tmp_path / "comparison.nc", engine="h5netcdf")
+    refused(tmp_path, r"holds no posterior\.nc, but a comparison of shapes: give the folder")
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9, 0.9999])
+def test_a_file_that_was_cut_short_is_refused(folder, tmp_path, share):
+    content = (folder / "posterior.nc").read_bytes()
+    (tmp_path / "posterior.nc").write_bytes(content[: int(share * len(content))])
+    refused(tmp_path, r"posterior\.nc (is damaged, it is not as it was written|cannot be read, it is damaged)")
+
+
+def test_another_posterior_is_refused(tmp_path):
+    draws = xr.Dataset({"q": (("chain", "draw"), np.zeros((2, 9)))})
+    write_result(xr.DataTree.from_dict({"posterior": draws}), tmp_path / "posterior.nc")
+    refused(tmp_path, r"is a posterior, but not of a contour \(it has no sample_stats, posterior_predictive, events")
+
+
+def test_a_comparison_that_is_none_or_of_another_record_is_refused(folder, tmp_path):
+    refused(folder, r"holds no comparison\.nc: give --compare the folder", compare=tmp_path)
+    path = tmp_path / "comparison.nc"
+    path.write_bytes(b"nothing")
+    refused(folder, r"comparison\.nc cannot be read, it is damaged", compare=tmp_path)
+    xr.Dataset({"a": 1.0}).to_netcdf(path, engine="h5netcdf")
+    refused(folder, r"comparison\.nc is no comparison of shapes", compare=tmp_path)
+    comparison().to_netcdf(path, engine="h5netcdf")
+    refused(
+        folder, "is of another record, or of another rod, than the run: compare the record of the run", compare=tmp_path
+    )
+
+
+def test_a_posterior_that_states_little_is_reported_all_the_same(posterior, tmp_path):
+    """As written by `tb.write_result`, and by versions that stated less."""
+    bare = posterior.copy()
+    for name in ("versions", "probability", "command", "record_file", "record_file_sha256", "record_attributes"):
+        del bare.attrs[name]
+    bare.attrs["priors"] = json.dumps({"q": str(stats.norm)})
+    write_result(bare, tmp_path / "posterior.nc")
+    page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
+    assert dict(page.table("Software")[1:])["tactile-bayes"] == tb.__version__
+    assert page.texts["h1"] == [f"The contour of the run {tmp_path.name}"]
+    assert "95\u00a0% from" in page.table("Estimates are medians")[0]
+
+
+# --- Parts --------------------------------------------------------------------------------------------------------
+
+
+def areas(x, lower, upper):
+    plot = Plot(Scale(0.0, 1.0, 0.0, 1.0), Scale(0.0, 1.0, 0.0, 1.0), "x", "y")
+    plot.area(x, lower, upper, "band")
+    return Page(plot.content[0]).all("path")[0]["d"]
+
+
+def test_a_band_is_drawn_in_pieces_where_both_edges_are_known():
+    nan = np.nan
+    assert areas([0, 1, 2], [1, 1, 1], [2, 2, 2]) == "M0 1L1 1L2 1L2 2L1 2L0 2Z"
+    assert areas([0, 1, 2, 3], [1, 1, 1, nan], [2, 2, 2, nan]) == "M0 1L1 1L2 1L2 2L1 2L0 2Z"
+    assert areas([0, 1, 2, 3, 4], [1, 1, nan, 1, 1], [2, 2, 2, 2, 2]) == "M0 1L1 1L1 2L0 2ZM3 1L4 1L4 2L3 2Z"
+    assert areas([0, 1, 2], [1, 1, 1], [nan, 2, 2]) == "M1 1L2 1L2 2L1 2Z"
+    assert areas([0, 1], [nan, nan], [2, 2]) == areas([], [], []) == ""
+
+
+MODULES = [
+    importlib.import_module(f"tactile_bayes.report.{module.name}")
+    for module in pkgutil.iter_modules(importlib.import_module("tactile_bayes.report").__path__)
+]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_every_public_name_says_what_it_is(module):
+    here = {n: v for n, v in vars(module).items() if getattr(v, "__module__", None) == module.__name__}
+    for name, value in here.items():
+        own = vars(value).items() if inspect.isclass(value) else ()
+        methods = {f"{name}.{n}": v for n, v in own if isinstance(v, property | classmethod) or inspect.isfunction(v)}
+        for called, described in ({name: value} | methods).items():
+            assert called.rpartition(".")[2].startswith("_") or inspect.getdoc(described), called
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_imports_go_down_and_to_what_the_package_depends_on(module):
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {re.match(r"[\w-]+", words)[0] for words in project["dependencies"]}
+    imported = set()
+    for node in ast.walk(ast.parse(inspect.getsource(module))):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module)
+    assert imported.isdisjoint({"tactile_bayes", "tactile_bayes.cli"})
+    others = {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names) - {"tactile_bayes"}
+    assert others <= declared

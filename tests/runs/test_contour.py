@@ -1,0 +1,272 @@
+"""A run: every file it names, whatever the record holds."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from helpers.contour_posteriors import QUICK
+from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.result import read_result
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import to_dimensionless
+from tactile_bayes.runs import contour as module
+from tactile_bayes.runs.contour import analyse
+from tactile_bayes.runs.demonstration import CONTOUR, ROD, TRUTH
+from tactile_bayes.sweep import scan
+from tactile_bayes.uncertainty.summary import summary
+
+FIGURES = ("observables", "predictive", "rods", "contour", "gap", "trace", "pairs")
+
+
+def assert_every_file_is_there(run, folder):
+    assert {path.name for path in run.files.values()} == {path.name for path in folder.iterdir()}
+    for name in set(FIGURES) & set(run.files):
+        content = run.files[name].read_bytes()
+        assert content.startswith(b"\x89PNG\r\n")
+        assert len(content) > 5000
+
+
+def test_a_run_writes_every_file_it_names(analysed):
+    run, folder = analysed
+    assert list(run.files) == ["posterior", "contacts", "band", "verdicts", "summary", *FIGURES]
+    assert_every_file_is_there(run, folder)
+
+
+def test_the_files_hold_what_the_run_returns(analysed, measured):
+    run, _ = analysed
+    stored = read_result(run.files["posterior"])
+    assert stored["posterior"].to_dataset().identical(run.posterior["posterior"].to_dataset())
+    assert stored.attrs["message"] == run.posterior.attrs["message"]
+
+    contacts = pd.read_csv(run.files["contacts"], index_col="sample")
+    assert len(contacts) == measured.sizes["sample"]
+    np.testing.assert_allclose(contacts["contact_x"], run.contacts.contact_x, rtol=1e-13)
+    assert contacts["status"].tolist() == run.contacts.status.values.tolist()
+
+    band = pd.read_csv(run.files["band"], index_col="x")
+    np.testing.assert_allclose(band["upper"], run.band.upper, rtol=1e-13)
+    assert (band["lower"] <= band["median"]).all()
+    assert (band["median"] <= band["upper"]).all()
+
+    table = pd.read_csv(run.files["summary"], index_col="quantity")
+    assert table.index.tolist() == ["a", "q", "x_c", "noise_scale", "gap width"]
+    assert table["unit"].tolist() == ["1/m", "m", "m", "1", "m"]
+
+
+def test_the_summary_begins_with_the_verdicts(analysed):
+    run, _ = analysed
+    lines = run.files["verdicts"].read_text(encoding="utf-8").splitlines()
+    assert tuple(lines[: lines.index("")]) == run.verdicts
+    assert run.verdicts[0].startswith("NOT CONVERGED, the steps allowed ran out after 30 steps: largest R̂ ")
+    table = lines[lines.index("") + 1 : -2]
+    assert [line.split()[0] for line in table] == ["median", "quantity", "a", "q", "x_c", "noise_scale", "gap"]
+    assert lines[-1] == run.posterior.attrs["message"]
+
+
+def test_where_no_contour_is_found_the_former_run_stays_whole(measured, tmp_path, monkeypatch):
+    def infer_nothing(*arguments, **options):
+        raise InferenceError("no parabola was found.")
+
+    monkeypatch.setattr(module, "infer_contour", infer_nothing)
+    (tmp_path / "report.html").write_text("of the posterior beside it", encoding="utf-8")
+    with pytest.raises(InferenceError):
+        analyse(measured, tmp_path)
+    assert (tmp_path / "report.html").exists()
+
+
+def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path, monkeypatch):
+    def infer_nothing(*arguments, **options):
+        raise InferenceError("no parabola was found.")
+
+    monkeypatch.setattr(module, "infer_contour", infer_nothing)
+    wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
+    with pytest.raises(InferenceError, match=r"^no parabola was found\. Forces reach .* check the units of the loads"):
+        analyse(wrong, tmp_path)
+    with pytest.raises(InferenceError, match=r"^no parabola was found\.$"):
+        analyse(measured, tmp_path)
+
+
+def test_the_estimate_is_near_the_truth(analysed):
+    """Not a test of the posterior: that names and units were not mixed up on the way."""
+    run, _ = analysed
+    table = summary(run.posterior)
+    for name in ("a", "q", "noise_scale"):
+        assert table["median"].sel(quantity=name) == pytest.approx(TRUTH[name], rel=0.2)
+    assert abs(table["median"].sel(quantity="x_c")) < 0.01 * ROD.length
+    np.testing.assert_allclose(run.band["median"], CONTOUR.height(run.band.x), atol=0.01 * ROD.length)
+
+
+@pytest.mark.slow
+def test_a_record_of_the_moment_alone_in_one_direction(tmp_path):
+    record = scan(Parabola(0.5, 0.5), direction="backward", base=(0.1, 0.0), drive_step=0.05).record
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    measured["force_x"][:] = measured["force_y"][:] = np.nan
+    run = analyse(measured, tmp_path, nuisances=[], settings=QUICK)
+    assert run.contacts is None
+    assert list(run.files) == ["posterior", "band", "verdicts", "summary", *(f for f in FIGURES if f != "gap")]
+    assert_every_file_is_there(run, tmp_path)
+    assert summary(run.posterior).quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
+
+
+@pytest.mark.slow
+def test_a_dimensionless_record_with_unknown_noise(tmp_path):
+    contour = Circle(1.0, 0.5)
+    record = scan(contour, direction="forward", drive_step=0.05).record
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02).measure(record, seed=1)
+    for name in ("load_cell_force_noise", "load_cell_moment_noise"):
+        del measured.attrs[name]
+    run = analyse(measured, tmp_path, family="circle", nuisances=[], settings=QUICK, truth=contour)
+    assert_every_file_is_there(run, tmp_path)
+    table = summary(run.posterior)
+    assert table.quantity.values.tolist() == ["r", "q", "x_c", "moment_noise", "force_noise"]
+    assert set(table.unit.values) == {"1"}
+    assert table["median"].sel(quantity="q") == pytest.approx(0.5, abs=0.05)
+    assert not any("noise" in str(name) for name in run.posterior.attrs)
+    # The noise that was found tells unloaded samples from contacts, and weighs the channels.
+    loaded = record.truth_contact_phase.values != "none"
+    assert np.count_nonzero((run.contacts.status.values == "no contact") & ~loaded) >= np.count_nonzero(~loaded) - 1
+    assert run.contacts.contact_arclength.max() <= 1.0
+    assert run.contacts.attrs["misfit_probability"] > 1e-4
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_second_run_replaces_the_files_of_the_first(measured, tmp_path):
+    (tmp_path / "band.csv").write_text("old", encoding="utf-8")
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    (tmp_path / "report.html").write_text("of another posterior", encoding="utf-8")
+    analyse(measured, tmp_path)
+    assert not (tmp_path / "report.html").exists()
+    assert (tmp_path / "band.csv").read_text(encoding="utf-8") != "old"
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+def test_another_rod_is_that_of_all_results(measured, tmp_path):
+    wrong = measured.assign_attrs(rod_length=0.21, rod_diameter=0.0)
+    run = analyse(wrong, tmp_path, rod=ROD)
+    assert run.posterior.attrs["rod_length"] == ROD.length
+    expected = reconstruct(measured, method="constrained")
+    np.testing.assert_array_equal(run.contacts.contact_x, expected.contact_x)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick")
+def test_units_do_not_matter(analysed, measured, tmp_path):
+    """To the rounding of the conversion; priors and random numbers scale with the rod."""
+    si, plain = analysed[0], analyse(to_dimensionless(measured), tmp_path, nuisances=[])
+    ratio = si.contacts.contact_x / plain.contacts.contact_x
+    np.testing.assert_allclose(ratio[si.contacts.status == "ok"], ROD.length, rtol=1e-9)
+    medians = [summary(run.posterior)["median"].sel(quantity="q").item() for run in (si, plain)]
+    assert medians[0] / ROD.length == pytest.approx(medians[1], rel=0.01)
+
+
+def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    few = SamplerSettings(ensembles=2, walkers=10, max_steps=1)
+    run = analyse(measured, tmp_path, nuisances=[], settings=few)
+    assert not run.posterior.attrs["converged"]
+    assert "not converged, the steps allowed ran out after 1 steps" in run.posterior.attrs["message"]
+
+
+@pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])
+def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_path, probability):
+    with pytest.raises(ParameterError, match=re.escape(f"probability is {probability!r}: give a number between 0 and")):
+        analyse(measured, tmp_path / "run", probability=probability)
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_unknown_family_is_refused(measured, tmp_path):
+    with pytest.raises(
+        ParameterError, match="there is no family 'blob': choose parabola, circle, ellipse, power-law, one"
+    ):
+        analyse(measured, tmp_path, family="blob")
+
+
+@pytest.fixture
+def drawn_before(analysed, monkeypatch):
+    """Runs that are given the posterior of another."""
+    posterior = analysed[0].posterior
+
+    def infer(measured, *, keep, **options):
+        keep(posterior.copy(deep=True))
+        return posterior.copy(deep=True)
+
+    monkeypatch.setattr(module, "infer_contour", infer)
+
+
+def broken(*arguments, **options):
+    raise RuntimeError("it broke")
+
+
+@pytest.mark.parametrize(
+    ("function", "what", "file"),
+    [
+        ("contact_points", "contacts", "contacts.csv"),
+        ("contour_band", "band", "band.csv"),
+        ("gap_if_any", "gap", None),
+        ("verdicts", "verdicts", None),
+    ],
+)
+@pytest.mark.usefixtures("drawn_before")
+def test_what_fails_is_named_and_left_out_and_all_else_is_there(function, what, file, measured, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    whole = analyse(measured, tmp_path)
+    monkeypatch.setattr(module, function, broken)
+    run = analyse(measured, tmp_path)
+    assert list(run.left_out) == [what]
+    assert str(run.left_out[what]) == "it broke"
+    said = f"Left out: {what}. Unexpected error, RuntimeError: it broke"
+    assert run.verdicts == ((said,) if what == "verdicts" else (*whole.verdicts, said))
+    lines = run.files["verdicts"].read_text(encoding="utf-8").splitlines()
+    assert tuple(lines[: lines.index("")]) == run.verdicts
+    assert list(run.files) == [name for name in whole.files if name != what or what == "verdicts"]
+    assert_every_file_is_there(run, tmp_path)  # of the former run, too, nothing is there that is not of this one
+    assert read_result(run.files["posterior"])["posterior"].to_dataset().equals(run.posterior["posterior"].to_dataset())
+    gap_row = "gap width" in run.summary.quantity
+    assert gap_row == (what != "gap")
+    if file is not None:
+        assert (run.contacts if what == "contacts" else run.band) is None
+
+
+@pytest.mark.usefixtures("drawn_before", "coarse_pictures")
+def test_a_figure_that_fails_is_named_and_the_others_are_drawn(measured, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "scan", broken)
+    monkeypatch.setattr(module, "predictive_interval", broken)
+    run = analyse(measured, tmp_path)
+    failed = ("observables", "predictive", "rods")
+    assert list(run.left_out) == [f"figure {name}" for name in failed]
+    assert list(run.files)[5:] == [name for name in FIGURES if name not in failed]
+    assert_every_file_is_there(run, tmp_path)
+    text = run.files["verdicts"].read_text(encoding="utf-8")
+    assert all(f"\nLeft out: figure {name}. Unexpected error, RuntimeError: it broke\n" in text for name in failed)
+
+
+def test_a_posterior_outlives_its_predictions(measured, tmp_path, monkeypatch):
+    """Its draws and what is made of them alone are there; all else says what it lacks."""
+    monkeypatch.setattr("tactile_bayes.inference.contour.predicted_groups", broken)
+    monkeypatch.setattr(module, "_draw", lambda *arguments, **options: {})
+    run = analyse(measured, tmp_path, nuisances=[], settings=QUICK)
+    assert list(run.left_out) == ["predictions", "band", "gap", "verdicts"]
+    assert run.verdicts[0] == "Left out: predictions. Unexpected error, RuntimeError: it broke"
+    assert run.verdicts[1].startswith("Left out: band. the posterior holds no events")
+    assert list(run.files) == ["posterior", "contacts", "verdicts", "summary"]
+    assert_every_file_is_there(run, tmp_path)
+    stored = read_result(run.files["posterior"])
+    assert stored["posterior"].sizes["draw"] == 300
+    assert stored.attrs["probability"] == 0.95
+    assert run.summary.quantity.values.tolist() == ["a", "q", "x_c", "noise_scale"]
+
+
+def test_what_fails_before_a_posterior_is_drawn_is_passed_on(measured, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "infer_contour", broken)
+    with pytest.raises(RuntimeError, match="it broke"):
+        analyse(measured, tmp_path)
+    assert not any(tmp_path.iterdir())

@@ -1,0 +1,85 @@
+"""Time and memory of a run, as the operating system counts them, on records that no budget was made for."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.contour_posteriors import CELL
+from tactile_bayes.contours import Contour, Parabola, from_function
+from tactile_bayes.record import write_record
+from tactile_bayes.sweep import scan
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="there is no wait4")]
+
+SECONDS = 20
+"""Time that is given."""
+
+COMPILERS, ALLOWANCE = 45.0, 25.0
+"""Processor time beside it [s]: of compilers, if these have not run before, and of all that is not bounded."""
+
+
+def superellipse() -> Contour:
+    """|x/a|⁴ + |y/b|⁴: flatter than a shape-free contour likes to be, and with rounder corners."""
+    return from_function(lambda x: 0.9 - 0.5 * (1.0 - (np.abs(x) / 0.5) ** 4) ** 0.25, (-0.485, 0.485))
+
+
+def hyperbola() -> Contour:
+    """A corner that is rounded by 0.03."""
+    return from_function(lambda x: 0.4 + 0.8 * np.hypot(x, 0.03) + 0.05 * x * x, (-0.9, 0.9))
+
+
+def parabola() -> Contour:
+    return Parabola(0.5, q=0.5)
+
+
+def record_of(contour: Contour, samples: int) -> xr.Dataset:
+    """Sweeps in both directions, of as many samples each, from before first contact to past snap-off."""
+    events = scan(contour, drive_step=np.radians(5.0)).events
+    parts = []
+    for k, direction in enumerate(("forward", "backward")):
+        begin, end = (float(getattr(events[direction], e).drive_angle) for e in ("first_contact", "snap_off"))
+        margin = 0.1 * (end - begin)
+        angles = np.linspace(begin - margin, end + margin, samples)
+        part = scan(contour, direction=direction, drive_angles=angles).record
+        parts.append(part.assign(sweep=part.sweep + k))
+    return CELL.measure(xr.concat(parts, "sample", combine_attrs="override"), seed=1)
+
+
+@pytest.mark.parametrize(
+    ("shape", "samples", "family", "gigabytes"),
+    [
+        (superellipse, 500, "shape-free", 2.0),
+        (hyperbola, 500, "shape-free", 2.0),
+        (parabola, 12_000, "parabola", 1.0),
+        (parabola, 12_000, "shape-free", 1.0),
+    ],
+)
+def test_a_run_keeps_its_time_and_its_memory(shape, samples, family, gigabytes, tmp_path):
+    write_record(record_of(shape(), samples), tmp_path / "record.csv")
+    command = f"infer record.csv --out run --family {family} --max-seconds {SECONDS} --quiet".split()
+    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    with subprocess.Popen(
+        [sys.executable, "-m", "tactile_bayes.cli", *command],
+        cwd=tmp_path,
+        env=os.environ | threads,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        said = process.stdout.read()
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0, said
+    assert (tmp_path / "run" / "posterior.nc").exists()
+    assert (tmp_path / "run" / "band.csv").exists()
+    unit = 1.0 if sys.platform == "darwin" else 1024.0
+    assert used.ru_maxrss * unit < gigabytes * 1e9
+    # Processor time, for on a machine that others use, too, the clock says little of what comes after the time given.
+    spent = used.ru_utime + used.ru_stime
+    assert spent < SECONDS + COMPILERS + ALLOWANCE

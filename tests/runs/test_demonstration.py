@@ -1,0 +1,44 @@
+"""The demonstration's record: what a stranger's own would look like."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.record import MEASURED, read_record, rod_of
+from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
+from tactile_bayes.sweep import scan
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return measure_demo(tmp_path_factory.mktemp("demo") / "new", seed=1)
+
+
+def test_the_record_is_complete_and_holds_no_truth(path):
+    assert path.name == "record.csv"
+    record = read_record(path)
+    assert tuple(record.data_vars) == MEASURED
+    assert "truth" not in path.read_text(encoding="utf-8")
+    assert record.attrs["units"] == "SI"
+    assert rod_of(record) == ROD
+    assert LoadCell.from_record(record) == LOAD_CELL
+
+
+def test_it_is_the_scan_of_the_contour_with_the_noise_that_is_stated(path):
+    """Mean square over 3 n normal numbers: within five standard deviations, √(2 / 3n) each."""
+    record, true = read_record(path), scan(CONTOUR, rod=ROD).record
+    np.testing.assert_array_equal(record.drive_angle, true.drive_angle)
+    deviations = LOAD_CELL.standard_deviations
+    noise = np.concatenate([((record[name] - true[name]) / deviations[name]).values for name in deviations])
+    assert abs(np.mean(noise**2) - 1.0) < 5.0 * np.sqrt(2.0 / noise.size)
+
+
+def test_the_truth_that_is_printed_is_that_of_the_contour():
+    assert {name: TRUTH[name] for name in ("a", "q", "x_c")} == vars(CONTOUR)
+
+
+def test_the_seed_decides(path, tmp_path):
+    assert measure_demo(tmp_path / "same", seed=1).read_bytes() == path.read_bytes()
+    assert measure_demo(tmp_path / "other", seed=2).read_bytes() != path.read_bytes()

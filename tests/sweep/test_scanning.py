@@ -1,0 +1,463 @@
+"""Scans and equilibria as a user asks for them: against shooting, bisection, a hundred-digit judge, and themselves."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from helpers import exact_rod
+from helpers.integration import shoot
+from helpers.legendre import equilibrium, tangential_arclength
+from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_function, paper_profile
+from tactile_bayes.errors import ContourError, ParameterError, ReachError
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import equilibria, scan
+
+EPS = np.finfo(float).eps
+LOADS = ("holding_moment", "force_x", "force_y")
+
+
+# --- equilibria ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+@pytest.mark.parametrize(
+    ("contour", "base"),
+    [
+        (paper_profile("II", 0.5), (0.0, 0.0)),
+        (paper_profile("III", 0.3), (0.15, -0.1)),
+        (paper_profile("IV", 0.5), (-0.1, 0.05)),
+        (paper_profile("I", 0.7), (0.05, 0.0)),
+    ],
+    ids=["II", "III", "IV", "I"],
+)
+def test_equilibria_against_shooting(contour, base, direction):
+    """Equations (19) and (20) integrated from the pivot, shot at the contact from a guess five per cent off."""
+    side = 1 if direction == "forward" else -1
+    alpha = side * np.array([0.05, 0.2, 0.4])
+    states = equilibria(contour, alpha, base=base, direction=direction)
+    shots = 0
+    for k, angle in enumerate(alpha):
+        state = states.isel(slope_angle=k)
+        phase = str(state.contact_phase.values)
+        if phase == "none":
+            continue
+        x, y = contour.point(angle)
+        np.testing.assert_allclose([state.contact_x, state.contact_y], [x, y], rtol=0, atol=4 * EPS)
+        told = [float(state.drive_angle), float(state.holding_moment), float(np.hypot(state.force_x, state.force_y))]
+        guess = np.array(told) * [1.01, 1.05, 0.95]
+        slope = None
+        if phase == "tangential":
+            guess = np.append(guess, 0.97 * float(state.contact_arclength))
+            slope = angle if side > 0 else angle + np.pi
+        shot = shoot((x - base[0], y - base[1]), angle, tuple(guess), slope)
+        np.testing.assert_allclose(told, shot[:3], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(np.arctan2(-state.force_x, state.force_y), angle, rtol=0, atol=4 * EPS)
+        assert side * told[1] > 0
+        if slope is None:
+            assert float(state.contact_arclength) == 1.0
+        else:
+            assert float(state.contact_arclength) == pytest.approx(shot[3], abs=1e-9)
+            assert float(state.tip_angle) == pytest.approx(slope, abs=4 * EPS)
+        shots += 1
+    assert shots >= 2
+
+
+def test_equilibria_of_a_symmetric_contour_mirror():
+    alpha = np.array([-0.02, 0.05, 0.2, 0.4, 0.6])
+    for name in ("I", "II", "III"):
+        contour = paper_profile(name, 0.5)
+        forward = equilibria(contour, alpha)
+        backward = equilibria(contour, -alpha, direction="backward")
+        np.testing.assert_array_equal(forward.contact_phase, backward.contact_phase)
+        for quantity in ("holding_moment", "force_x", "contact_x"):
+            np.testing.assert_array_equal(backward[quantity], -forward[quantity])
+        for quantity in ("force_y", "contact_y", "contact_arclength"):
+            np.testing.assert_array_equal(backward[quantity], forward[quantity])
+        for quantity in ("drive_angle", "tip_angle"):
+            np.testing.assert_array_equal(backward[quantity], np.pi - forward[quantity])
+
+
+def test_none_where_the_rod_cannot_reach():
+    states = equilibria(paper_profile("II", 0.5), [-0.3, 0.2, 1.2])
+    np.testing.assert_array_equal(states.contact_phase, ["none", "tangential", "none"])
+    for name, values in states.data_vars.items():
+        if name != "contact_phase":
+            np.testing.assert_array_equal(np.isnan(values), [True, False, True], err_msg=name)
+    gentle = equilibria(from_function(lambda x: 0.5 + 0.1 * x**2, (-1.0, 1.0)), [0.05, 1.2])  # no such slope
+    np.testing.assert_array_equal(np.isnan(gentle.drive_angle), [False, True])
+    circle = equilibria(Circle(0.3, 0.4), [1.5, 0.1])
+    assert circle.contact_phase.values.tolist() == ["none", "tangential"]
+
+
+SI = Rod(length=0.12, flexural_rigidity=3.5e-5)
+
+
+def test_si_is_the_dimensionless_answer_in_units():
+    unit, big = Parabola(0.5, 0.5, 0.1), Parabola(0.5 / 0.12, 0.06, 0.012)
+    alpha = [0.05, 0.3, 0.5]
+    one, si = equilibria(unit, alpha), equilibria(big, alpha, rod=SI)
+    scale = {
+        "holding_moment": SI.moment_unit,
+        **dict.fromkeys(("force_x", "force_y"), SI.force_unit),
+        **dict.fromkeys(("contact_x", "contact_y", "contact_arclength"), SI.length_unit),
+    }
+    for name in set(one.data_vars) - {"contact_phase"}:
+        np.testing.assert_allclose(si[name], one[name] * scale.get(name, 1.0), rtol=1e-12, err_msg=name)
+    assert si.force_x.attrs["units"] == "N"
+    assert one.force_x.attrs["units"] != "N"
+    a, b = scan(unit), scan(big, rod=SI)
+    assert a.record.sizes == b.record.sizes
+    for name in LOADS:
+        atol = 1e-9 * float(np.abs(b.record[name]).max())  # rounding of a sample just after a tip's onset
+        np.testing.assert_allclose(b.record[name], a.record[name] * scale[name], rtol=1e-9, atol=atol)
+    assert b.events["forward"].snap_off.contact_x == pytest.approx(a.events["forward"].snap_off.contact_x * 0.12)
+
+
+def test_a_thick_rod_is_a_thin_one_on_the_parallel_curve():
+    """Around a circle the parallel curve is a circle: same centre, radius larger by half the diameter."""
+    d = 0.02
+    thick, thin = Circle(0.5, 0.4, 0.1), Circle(0.5 + d / 2, 0.4 - d / 2, 0.1)
+    alpha = [0.3, 0.45, 0.6]
+    for direction in ("forward", "backward"):
+        slopes = alpha if direction == "forward" else [-a for a in alpha]
+        one = equilibria(thick, slopes, direction=direction, rod=Rod(diameter=d))
+        two = equilibria(thin, slopes, direction=direction)
+        for name in (*LOADS, "drive_angle", "contact_arclength", "tip_angle"):
+            np.testing.assert_allclose(one[name], two[name], rtol=1e-12, err_msg=name)
+        np.testing.assert_array_equal(one.contact_phase, two.contact_phase)
+        np.testing.assert_allclose([one.contact_x, one.contact_y], thick.point(slopes), rtol=1e-13)
+    a, b = scan(thick, rod=Rod(diameter=d)).events, scan(thin).events
+    for direction in ("forward", "backward"):
+        assert a[direction].snap_off.drive_angle == pytest.approx(b[direction].snap_off.drive_angle, abs=1e-12)
+        assert a[direction].first_contact.drive_angle == pytest.approx(
+            b[direction].first_contact.drive_angle, abs=1e-12
+        )
+
+
+# --- events ----------------------------------------------------------------------------------------------------------
+
+
+def kinds(events):
+    return [events.first_contact.kind, *(e.kind for e in events.transitions), events.snap_off.kind]
+
+
+def corner_slope(contour, lo, hi):
+    def excess(alpha):
+        x, y = contour.point(alpha)
+        return tangential_arclength(float(x), float(y), alpha) - 1
+
+    return brentq(excess, lo, hi, xtol=1e-15)
+
+
+def test_profile_two_lets_go_at_the_corner():
+    contour = paper_profile("II", 0.5)
+    corner = corner_slope(contour, 0.02, 0.2)
+    x, y = contour.point(corner)
+    truth = equilibrium(float(x), float(y), corner)
+    assert corner == pytest.approx(0.0608483016, abs=0.5e-10)
+    assert truth.drive_angle == pytest.approx(3.154274856, abs=0.5e-9)
+    events = scan(contour).events
+    for direction, side in (("forward", 1), ("backward", -1)):
+        sweep = events[direction]
+        assert kinds(sweep) == ["tip", "tip → tangential", "corner"]
+        last = sweep.snap_off
+        assert side * last.slope_angle == pytest.approx(corner, abs=1e-10)
+        assert (last.drive_angle if side > 0 else np.pi - last.drive_angle) == pytest.approx(
+            truth.drive_angle, abs=1e-10
+        )
+        assert side * last.holding_moment == pytest.approx(truth.moment, rel=1e-9)
+        assert last.force_y == pytest.approx(truth.force * np.cos(corner), rel=1e-9)
+        assert last.contact_arclength == pytest.approx(1.0, abs=1e-12)
+        assert side * last.contact_x == pytest.approx(np.tan(corner), abs=1e-10)
+    # Beyond, the tip would touch, at smaller drive angles.
+    beyond = equilibria(contour, [corner - 1e-3, corner - 0.02])
+    np.testing.assert_array_equal(beyond.contact_phase, "tip")
+    assert np.all(beyond.drive_angle < truth.drive_angle)
+
+
+def rate(contour, alpha):
+    """dφ0/dα along a contour: the judge's hundred-digit partial derivatives, put together here."""
+    x, y = (float(v) for v in contour.point(alpha))
+    radius = float(contour.radius_of_curvature(alpha))
+    dx, dy = radius * np.cos(alpha), radius * np.sin(alpha)
+    state = equilibria(contour, [alpha])
+    guess = None
+    if state.contact_phase.values[0] == "tip":
+        guess = (
+            float(state.drive_angle[0]),
+            float(state.holding_moment[0]),
+            float(np.hypot(state.force_x, state.force_y)[0]),
+        )
+    exact, _ = exact_rod.judge_wrench([x, y, alpha, 0.0], guess)
+    by_slope, by_distance = float(exact["by_slope"]), float(exact["by_distance"])
+    if guess is None:
+        by_distance = 0.0
+    polar = (x * dy - y * dx) / (x * x + y * y)
+    return polar + by_slope * (1 - polar) + by_distance * 2 * (x * dx + y * dy), float(exact["drive_angle"])
+
+
+@pytest.mark.parametrize(
+    ("contour", "phases"),
+    [
+        pytest.param(paper_profile("II", 0.3), ["tangential", "fold"], marks=pytest.mark.slow),
+        (paper_profile("II", 0.4), ["tip", "tip → tangential", "fold"]),
+        pytest.param(
+            paper_profile("III", 0.6), ["tip", "tip → tangential", "tangential → tip", "fold"], marks=pytest.mark.slow
+        ),
+        (paper_profile("II", 0.7), ["tip", "fold"]),
+        pytest.param(Circle(0.2, 0.3), ["tangential", "fold"], marks=pytest.mark.slow),
+    ],
+    ids=["II-0.3", "II-0.4", "III-0.6", "II-0.7", "small-circle"],
+)
+def test_smooth_folds(contour, phases):
+    sweep = scan(contour, direction="forward").events["forward"]
+    assert kinds(sweep) == phases
+    found = sweep.snap_off
+    near = 1e-5
+    fold = brentq(lambda a: rate(contour, a)[0], found.slope_angle - near, found.slope_angle + near, xtol=1e-12)
+    assert found.slope_angle == pytest.approx(fold, abs=1e-10)
+    assert found.drive_angle == pytest.approx(rate(contour, fold)[1], abs=1e-12)
+    assert rate(contour, fold - near)[0] > 0 > rate(contour, fold + near)[0]
+
+
+@pytest.mark.parametrize("name", ["I", "II", "III", "IV"])
+@pytest.mark.parametrize("q", [0.2, 0.4, 0.6])
+@pytest.mark.parametrize("base", [(0.0, 0.0), (0.2, -0.1)])
+def test_phase_changes_and_first_contact_by_bisection(name, q, base):
+    contour = paper_profile(name, q)
+    for direction, side in (("forward", 1), ("backward", -1)):
+        sweep = scan(contour, direction=direction, base=base).events[direction]
+
+        def relative(alpha, side=side):
+            x, y = (float(v) for v in contour.point(side * alpha))
+            return side * (x - base[0]), y - base[1], alpha
+
+        first = sweep.first_contact
+        slope = side * first.slope_angle
+        x, y, _ = relative(slope)
+        if first.kind == "tip":
+            truth = brentq(lambda a: np.hypot(*relative(a)[:2]) - 1, slope - 1e-3, slope + 1e-3, xtol=1e-15)
+            # The tangent from the pivot touches only beyond the rod.
+            assert y * np.cos(slope) - x * np.sin(slope) > 0
+        else:
+            truth = brentq(
+                lambda a: relative(a)[1] * np.cos(a) - relative(a)[0] * np.sin(a),
+                slope - 1e-3,
+                slope + 1e-3,
+                xtol=1e-15,
+            )
+            assert np.hypot(x, y) <= 1
+        assert slope == pytest.approx(truth, abs=1e-10)
+        bearing = np.arctan2(y, x)
+        assert (first.drive_angle if side > 0 else np.pi - first.drive_angle) == pytest.approx(bearing, abs=1e-12)
+        assert first.holding_moment == first.force_x == first.force_y == 0
+        for change in sweep.transitions:
+            at = side * change.slope_angle
+            exact = brentq(lambda a: tangential_arclength(*relative(a)) - 1, at - 1e-5, at + 1e-5, xtol=1e-15)
+            assert at == pytest.approx(exact, abs=1e-10)
+            truth = equilibrium(*relative(at))
+            assert (change.drive_angle if side > 0 else np.pi - change.drive_angle) == pytest.approx(
+                truth.drive_angle, abs=1e-10
+            )
+
+
+def test_profile_four_goes_from_tangential_to_tip():
+    """The sequence B-A; the others are among the folds."""
+    assert kinds(scan(paper_profile("IV", 0.5)).events["forward"]) == ["tangential", "tangential → tip", "fold"]
+
+
+def test_profile_four_lets_go_at_its_vertex():
+    last = scan(paper_profile("IV", 0.3), direction="forward").events["forward"].snap_off
+    assert last.kind == "thrust"  # a fold, too: the rate of the drive angle vanishes with the moment
+    assert last.slope_angle == pytest.approx(0.0, abs=1e-13)
+    assert last.drive_angle == pytest.approx(np.pi, abs=1e-12)
+    assert last.holding_moment == pytest.approx(0.0, abs=1e-12)
+    assert (last.contact_x, last.contact_y) == (pytest.approx(0.0, abs=1e-13), pytest.approx(0.3, abs=1e-15))
+
+
+# --- the record ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("base", [(0.0, 0.0), (0.15, -0.05)])
+@pytest.mark.parametrize("contour", [paper_profile("II", 0.5), paper_profile("IV", 0.3), Circle(0.2, 0.35)])
+def test_the_record(contour, base):
+    result = scan(contour, base=base)
+    record = result.record
+    np.testing.assert_array_equal(np.unique(record.sweep), [0, 1])
+    for number, (direction, side) in enumerate((("forward", 1), ("backward", -1))):
+        sweep = record.isel(sample=np.flatnonzero(record.sweep == number))
+        assert set(sweep.direction.values) == {direction}
+        np.testing.assert_array_equal(sweep.base_x, base[0])
+        np.testing.assert_array_equal(sweep.base_y, base[1])
+        angle = sweep.drive_angle.values
+        assert np.all(side * np.diff(angle) > 0)
+        steps = angle / np.radians(1.0)
+        np.testing.assert_allclose(steps, np.round(steps), rtol=0, atol=1e-12)
+        events = result.events[direction]
+        ends = sorted([events.first_contact.drive_angle, events.snap_off.drive_angle])
+        # Profile IV with q = 0.3 lets go at π, a multiple of the step: that sample may fall on either side.
+        inside = (angle > ends[0]) & (angle < ends[1])
+        apart = np.abs(angle[:, None] - ends).min(axis=1) > 1e-9
+        sweep, angle, inside = sweep.isel(sample=apart), angle[apart], inside[apart]
+        assert inside.sum() > 20
+        assert np.flatnonzero(inside)[0] >= 14
+        assert np.flatnonzero(inside[::-1])[0] >= 14
+        for name in LOADS:
+            assert np.all(sweep[name].values[~inside] == 0)
+        assert np.all(side * sweep.holding_moment.values[inside] > 0)
+        np.testing.assert_array_equal(sweep.truth_contact_phase.values == "none", ~inside)
+        for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle"):
+            np.testing.assert_array_equal(np.isnan(sweep[f"truth_{name}"]), ~inside, err_msg=name)
+
+        # States at the grid's angles are exact: asked again by slope angle, which has half a dozen roundings.
+        slopes = sweep.truth_slope_angle.values[inside]
+        assert np.all(side * np.diff(slopes) < 0)
+        again = equilibria(contour, slopes, base=base, direction=direction)
+        np.testing.assert_array_equal(again.contact_phase, sweep.truth_contact_phase.values[inside])
+        h = 1e-7
+        around = [
+            equilibria(contour, slopes + s * h, base=base, direction=direction).drive_angle.values for s in (-1, 1)
+        ]
+        rates = np.nan_to_num(np.abs(around[1] - around[0]) / (2 * h), nan=1e8)
+        off = np.abs(again.drive_angle.values - angle[inside])
+        assert np.all(off <= 1e-12 + 8 * EPS * rates)
+        for name in LOADS:
+            bound = 1e-9 * np.abs(sweep[name].values[inside]).max()
+            np.testing.assert_allclose(sweep[name].values[inside], again[name], rtol=0, atol=bound)
+        x, y = contour.point(slopes)
+        np.testing.assert_allclose(sweep.truth_contact_x.values[inside], x, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(sweep.truth_contact_y.values[inside], y, rtol=0, atol=1e-12)
+
+
+def test_moving_pivot_and_contour_together_changes_nothing():
+    """But for rounding of the moved numbers, which a tip's onset amplifies."""
+    one, two = Parabola(0.5, 0.5, 0.1), Parabola(0.5, 1.25, -0.4)
+    a, b = scan(one).record, scan(two, base=(-0.5, 0.75)).record
+    for name in (*LOADS, "drive_angle"):
+        np.testing.assert_allclose(b[name], a[name], rtol=0, atol=1e-10 * float(np.abs(a[name]).max()))
+    np.testing.assert_allclose(b.truth_contact_x + 0.5, a.truth_contact_x, rtol=0, atol=1e-10)
+
+
+def test_backward_is_the_mirror_of_forward():
+    contour, image = Parabola(0.6, 0.45, 0.2), Parabola(0.6, 0.45, -0.2)
+    grid = np.radians(np.arange(-20.0, 201.0, 2.0))
+    forward = scan(contour, direction="forward", drive_angles=grid).record
+    backward = scan(image, direction="backward", drive_angles=np.pi - grid).record
+    np.testing.assert_allclose(backward.drive_angle, np.pi - forward.drive_angle, rtol=0, atol=2 * EPS)
+    for name, sign in (("holding_moment", -1), ("force_x", -1), ("force_y", 1)):
+        np.testing.assert_allclose(backward[name], sign * forward[name], rtol=0, atol=1e-10)
+
+
+def test_grids_of_ones_own():
+    contour = paper_profile("II", 0.5)
+    grid = [2.0, 1.0, 2.5, 9.0 - 2 * np.pi, 1.0]
+    record = scan(contour, drive_angles=grid).record
+    np.testing.assert_array_equal(record.drive_angle[:4], np.unique(grid))
+    np.testing.assert_array_equal(record.drive_angle[4:], np.unique(grid)[::-1])
+    fine = scan(contour, drive_step=np.radians(0.25), direction="forward").record
+    coarse = scan(contour, direction="forward").record
+    common = np.isin(np.round(np.degrees(fine.drive_angle) * 4), np.round(np.degrees(coarse.drive_angle) * 4))
+    shared = np.isin(np.round(np.degrees(coarse.drive_angle) * 4), np.round(np.degrees(fine.drive_angle) * 4))
+    assert shared.sum() > 100
+    for name in LOADS:
+        np.testing.assert_allclose(fine[name][common], coarse[name][shared], rtol=0, atol=1e-9)
+    empty = scan(contour, direction="forward", drive_angles=[-3.0, -2.9]).record
+    assert np.all(empty.force_y == 0)
+
+
+# --- refusals --------------------------------------------------------------------------------------------------------
+
+II = paper_profile("II", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: scan(paper_profile("II", 1.2)), ReachError, r"out of reach: .* 1\.2 from the pivot .*rod is 1 long"),
+        (lambda: scan(Parabola(5, 0.2), rod=SI), ReachError, r"0\.2 from the pivot.*rod is 0\.12 long"),
+        (lambda: scan(II, base=(0.0, 0.6)), ContourError, r"cuts the base: at x = 0 it is at y = 0\.5, not above"),
+        (lambda: scan(II, base=(0.0, 0.5)), ContourError, "cuts the base"),
+        (lambda: scan(II, base=(0.0, 0.495), rod=Rod(diameter=0.02)), ContourError, "cuts the base"),
+        (lambda: scan(Circle(0.2, 0.3, -0.6)), ContourError, "forward sweep .* beyond the contour's right end"),
+        (lambda: scan(Circle(0.2, 0.3, 0.6), direction="backward"), ContourError, "beyond the contour's left end"),
+        (lambda: scan(II, direction="sideways"), ParameterError, "'sideways': choose 'forward' or 'backward'"),
+        (lambda: equilibria(II, [0.1], direction="both"), ParameterError, "direction is 'both'"),
+        (lambda: scan(II, drive_step=-0.1), ParameterError, r"drive_step is -0\.1: give a positive angle"),
+        (lambda: scan(II, drive_step=1), ParameterError, r"drive_step is 1: .*in radians, at most 0\.5; .*np\.radians"),
+        (lambda: scan(II, drive_step="1"), ParameterError, "drive_step is '1'"),
+        (lambda: scan(II, drive_step=np.nan), ParameterError, "drive_step is nan"),
+        (lambda: scan(II, drive_angles=np.arange(0, 181)), ParameterError, "radians, at most a turn"),
+        (lambda: scan(II, drive_angles=[]), ParameterError, "drive_angles must be finite"),
+        (lambda: scan(II, drive_angles=[0.1, np.nan]), ParameterError, "drive_angles must be finite"),
+        (lambda: scan(Parabola(np.array([0.5, 0.6]), 0.5)), ParameterError, r"one contour.*shape \(2,\)"),
+        (lambda: equilibria(Parabola(np.array([0.5, 0.6]), 0.5), [0.1]), ParameterError, "one contour"),
+        (lambda: equilibria(II, [10.0]), ParameterError, r"slope_angles must be a list of angles in \(−π/2, π/2\)"),
+        (lambda: equilibria(II, [np.nan]), ParameterError, "slope_angles"),
+        (lambda: equilibria(II, [[0.1]]), ParameterError, "slope_angles"),
+        (lambda: equilibria(II, "steep"), ParameterError, "slope_angles must be a list of angles"),
+        (lambda: equilibria(II, [0.1], base=[(0, 0), (1, 0)]), ParameterError, r"base is .*equilibria takes one pivot"),
+        (lambda: equilibria(II, [0.1], base=(0, 0, 0)), ParameterError, r"base is \(0, 0, 0\): give a pivot \(x, y\)"),
+        (lambda: equilibria(II, [0.1], base=(np.nan, 0)), ParameterError, "base is .*nan.*: give a pivot"),
+        (lambda: scan(II, drive_angles="all"), ParameterError, "drive_angles must be finite"),
+        (lambda: scan(None), ParameterError, "the contour is None: give one, such as tb.contours.Parabola"),
+        (lambda: equilibria(np.square, [0.1]), ParameterError, "the contour is <ufunc 'square'>"),
+        (lambda: scan(II, rod=1.0), ParameterError, r"the rod is 1\.0: give a Rod, such as tb\.Rod\(length="),
+        (lambda: equilibria(II, [0.1], rod=0.0), ParameterError, r"the rod is 0\.0: give a Rod"),
+        (lambda: scan(II, friction="0.3"), ParameterError, r"friction is '0\.3': .*a number from 0 to 0\.84"),
+        (lambda: scan(II, friction=-0.1), ParameterError, r"friction is -0\.1: give Coulomb's coefficient"),
+        (lambda: scan(II, friction=np.nan), ParameterError, "friction is nan"),
+        (lambda: equilibria(II, [0.1], friction=0.85), ParameterError, r"friction is 0\.85: .* from 0 to 0\.84"),
+    ],
+)
+def test_refusals(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_steps_so_coarse_that_the_margin_is_more_than_a_turn():
+    angle = scan(II, drive_step=0.5).record.drive_angle
+    assert -2.0 * np.pi < float(angle.min()) < -5.5
+    assert 5.5 < float(angle.max()) < 2.0 * np.pi
+
+
+def test_a_pivot_just_below_the_contour():
+    """The whole load then comes in a few degrees of the drive; nearer than the clearance the scan is refused."""
+    for contour in (Parabola(0.3, 0.03), Parabola(3.0, 0.03), Circle(0.7, 0.03)):
+        for sweep in scan(contour).events.values():
+            assert np.isfinite(sweep.snap_off.drive_angle)
+            assert abs(sweep.snap_off.drive_angle - sweep.first_contact.drive_angle) > 1
+    with pytest.raises(ContourError, match=r"comes within 0.002 of the pivot at \(0, 0\); .* from 0.004 on \(2%"):
+        scan(Parabola(0.3, 0.002), rod=Rod(length=0.2, flexural_rigidity=1.0))
+
+
+def test_random_scans():
+    """Labelled scans of random contours from random pivots raise nothing, and their events are in order."""
+    rng = np.random.default_rng(8)
+    done = 0
+    for k in range(18):
+        a, q, x_c = np.exp(rng.uniform(np.log(0.1), np.log(5))), rng.uniform(-0.3, 0.95), rng.uniform(-0.7, 0.7)
+        base = tuple(rng.uniform(-0.2, 0.2, 2))
+        contour = (
+            Parabola(a, q, x_c),
+            Circle(a, q, x_c),
+            Joined(Parabola(a, q, x_c), PowerLaw(a, 4, q, x_c)),
+        )[k % 3]
+        try:
+            result = scan(contour, base=base, drive_step=np.radians(5.0))
+        except ContourError:
+            continue
+        done += 1
+        for direction, side in (("forward", 1), ("backward", -1)):
+            sweep = result.events[direction]
+            angles = [e.drive_angle for e in (sweep.first_contact, *sweep.transitions, sweep.snap_off)]
+            slopes = [e.slope_angle for e in (sweep.first_contact, *sweep.transitions, sweep.snap_off)]
+            assert all(side * b >= side * a for a, b in pairwise(angles))
+            assert all(side * b <= side * a for a, b in pairwise(slopes))
+            assert np.isfinite(angles).all()
+        loaded = result.record.truth_contact_phase != "none"
+        assert np.isfinite(result.record.truth_contact_x[loaded]).all()
+    assert done > 5

@@ -1,0 +1,154 @@
+"""Tasks in this process, in others, and what becomes of them when processes die."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from helpers.tasks import alive, die, die_once, double, fail, fail_strangely, note_and_sleep, wait_until
+from tactile_bayes.errors import ParameterError, TaskError
+from tactile_bayes.tasks import run_tasks
+from tactile_bayes.tasks import workers as tasks
+
+TESTS = Path(__file__).resolve().parents[1]
+on_linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+
+
+def script(text, *arguments, **options):
+    """A Python process that runs a text."""
+    return subprocess.Popen(
+        [sys.executable, "-c", text, *map(str, arguments)],
+        cwd=TESTS,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+def group_lives(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_every_task_is_done_once(workers):
+    tasks = list(range(7))
+    assert sorted(run_tasks(double, tasks, workers=workers)) == [(task, 2 * task) for task in tasks]
+
+
+def test_no_task_is_no_work():
+    assert list(run_tasks(double, [])) == []
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, "2", True])
+def test_no_number_of_workers_is_refused(workers):
+    with pytest.raises(ParameterError, match="give a positive number"):
+        list(run_tasks(double, [1], workers=workers))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_a_task_raises_is_raised(workers):
+    with pytest.raises(ValueError, match="no 3 here") as caught:
+        list(run_tasks(fail, list(range(5)), workers=workers))
+    if workers == 2:
+        assert "in fail" in "".join(caught.value.__notes__)  # where it happened there
+
+
+def test_what_cannot_travel_is_told_in_words():
+    with pytest.raises(TaskError, match="StrangeError: strange 1"):
+        list(run_tasks(fail_strangely, [1, 1], workers=2))
+
+
+@on_linux
+def test_the_task_of_a_killed_process_is_done_again(tmp_path):
+    tasks = [(str(tmp_path), number) for number in range(6)]
+    assert sorted(result for _, result in run_tasks(die_once, tasks, workers=2)) == list(range(6))
+    assert (tmp_path / "died").exists()
+
+
+@on_linux
+def test_a_task_that_always_kills_is_given_up():
+    with pytest.raises(TaskError, match=r"died 4 times over task 1: .* Try fewer workers"):
+        list(run_tasks(die, [0, 1], workers=2))
+
+
+def test_processes_end_when_the_results_are_wanted_no_more(tmp_path):
+    results = run_tasks(note_and_sleep, [(str(tmp_path), 0.0), *[(str(tmp_path), 60.0)] * 2], workers=2)
+    next(results)
+    team = multiprocessing.active_children()
+    assert len(team) == 2
+    results.close()
+    assert not multiprocessing.active_children()
+
+
+SLEEPING = """
+import sys
+from tactile_bayes.tasks import run_tasks
+from helpers.tasks import note_and_sleep
+list(run_tasks(note_and_sleep, [(sys.argv[1], 60.0)] * 2, workers=2))
+"""
+
+
+@on_linux
+def test_processes_die_with_their_parent(tmp_path):
+    parent = script(SLEEPING, tmp_path)
+    wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
+    parent.kill()
+    parent.communicate()
+    wait_until(lambda: not any(alive(path.name) for path in tmp_path.iterdir()), seconds=5.0)
+
+
+@pytest.mark.slow
+@on_linux
+@pytest.mark.parametrize("begun", [True, False])
+def test_an_interrupt_ends_all_at_once(tmp_path, begun):
+    """From a terminal the whole group hears it; the processes for the work keep silent, even while they start."""
+    text = SLEEPING.replace("list(run", "print('now', flush=True)\nlist(run")
+    parent = script(text, tmp_path, start_new_session=True)
+    parent.stdout.readline()
+    if begun:
+        wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
+    else:
+        wait_until(lambda: Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().count(" ") >= 2)
+    os.killpg(parent.pid, signal.SIGINT)
+    _, words = parent.communicate(timeout=10.0)
+    assert words.count("Traceback") == 1, words
+    assert words.rstrip().endswith("KeyboardInterrupt")
+    wait_until(lambda: not group_lives(parent.pid), seconds=5.0)
+
+
+@pytest.mark.parametrize("address", ["nonsense", "foo://1", "tcp://x:y", "http://localhost:8786", ""])
+def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address, monkeypatch):
+    """Before there is a client, whose destructor would fail."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", None)
+    with pytest.raises(ParameterError, match=f"^'{address}' is no address of a Dask scheduler .*: give one like 'tcp"):
+        list(run_tasks(double, [1, 2], scheduler=address))
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "127.0.0.1:1"])
+def test_a_scheduler_that_does_not_answer_is_waited_for_no_longer_than_it_takes(address, monkeypatch):
+    pytest.importorskip("distributed")
+    assert tasks._PATIENCE == "10s"
+    monkeypatch.setattr(tasks, "_PATIENCE", "0.2s")
+    with pytest.raises(ParameterError, match=f"no Dask scheduler answers at '{address}': Timed out"):
+        list(run_tasks(double, [1, 2], scheduler=address))
+
+
+def test_a_script_without_guard_is_told_so(tmp_path):
+    path = tmp_path / "unguarded.py"
+    path.write_text("from tactile_bayes.tasks import run_tasks\nprint(list(run_tasks(abs, [1, 2], workers=2)))\n")
+    done = subprocess.run([sys.executable, path], cwd=TESTS, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert "TaskError: a process for the work ended before it began" in done.stderr.splitlines()[-1]
+    assert "if __name__ == '__main__'" in done.stderr.splitlines()[-1]

@@ -1,0 +1,223 @@
+"""The gap, against quantiles, hand geometry and exact events."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from helpers.contour_posteriors import TRUTH, posterior
+from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.sweep import scan
+from tactile_bayes.uncertainty.band import contour_band
+from tactile_bayes.uncertainty.gap import gap
+
+BOTH = ["forward", "backward"]
+A, Q, X_C = 0.5, 0.3, 0.05
+
+
+def tree(last, strokes=BOTH, *, first=None, a=A, q=Q, x_c=X_C, units="SI"):
+    """Parabolas whose sweeps end at `last`, of shape (chain, draw, stroke)."""
+    last = np.asarray(last, dtype=float)
+    first = np.where(np.array(strokes) == "forward", 1.0, -1.0) if first is None else first
+    angles = np.where(np.array(strokes) == "forward", 3.2, -0.1)
+    events = {"snap_off_contact_x": last, "first_contact_x": first, "snap_off_drive_angle": angles}
+    dims = ("chain", "draw", "stroke")
+    shape = last.shape[:2]
+    out = xr.DataTree.from_dict(
+        {
+            "posterior": xr.Dataset(
+                {k: (dims[:2], np.broadcast_to(v, shape)) for k, v in {"a": a, "q": q, "x_c": x_c}.items()}
+            ),
+            "events": xr.Dataset(
+                {k: (dims, np.broadcast_to(v, last.shape)) for k, v in events.items()}, coords={"stroke": strokes}
+            ),
+        }
+    )
+    out.attrs = {"family": "parabola", "units": units}
+    return out
+
+
+def spread(size=500):
+    rng = np.random.default_rng(1)
+    a, q, x_c = rng.normal([[[A]], [[Q]], [[X_C]]], [[[0.05]], [[0.01]], [[0.03]]], size=(3, 2, size))
+    right, left = rng.normal(0.1, 0.01, size=(2, size)), rng.normal(-0.2, 0.02, size=(2, size))
+    return tree(np.stack([right, left], axis=-1), a=a, q=q, x_c=x_c), left, right, a, q, x_c
+
+
+def test_bounds_are_quantiles():
+    """The triangle of a parabola is half of a w² wide, and its apex in the middle."""
+    made, left, right, a, q, x_c = spread()
+    found = gap(made, 0.9)
+    expected = {
+        "left": left,
+        "right": right,
+        "width": right - left,
+        "left_y": a * (left - x_c) ** 2 + q,
+        "right_slope_angle": np.arctan(2.0 * a * (right - x_c)),
+        "vertex_x": x_c,
+        "vertex_y": q,
+        "apex_x": 0.5 * (left + right),
+        "triangle_width": 0.5 * a * (right - left) ** 2,
+        "triangle_height": 0.5 * a * (right - left) ** 2 * np.cos(np.arctan(a * (left + right - 2.0 * x_c))),
+    }
+    for name, values in expected.items():
+        np.testing.assert_allclose(found[name], np.quantile(values, [0.05, 0.5, 0.95]), rtol=1e-9, err_msg=name)
+        assert found[name].attrs["units"] == ("rad" if name.endswith("_angle") else "m")
+    np.testing.assert_allclose(found.snap_off_drive_angle.sel(stroke="forward"), 3.2, rtol=1e-15)
+    assert found.bound.values.tolist() == ["lower", "median", "upper"]
+    assert (found.attrs["probability"], found.attrs["gaps"]) == (0.9, 1)
+    assert (found.status.item(), found.share_open.item()) == ("ok", 1.0)
+
+
+def test_one_contour_has_its_triangle_and_no_band():
+    found = gap(tree([[[0.2, -0.1]] * 5]))
+    np.testing.assert_allclose(found.triangle_width, 0.5 * A * 0.3**2, rtol=1e-13)
+    y = A * (found.x - X_C) ** 2 + Q
+    np.testing.assert_allclose(found.band_median, y, rtol=1e-14)
+    assert found.band_width.item() == 0.0
+    assert (found.triangle_lower <= y + 1e-15).all()
+    assert (found.triangle_upper >= y - 1e-15).all()
+    np.testing.assert_allclose(found.triangle_upper, Q + A * 0.15**2, rtol=1e-13)  # the vertex is in the middle
+
+
+def test_the_band_lies_between_the_edges_of_the_triangles():
+    """Quantiles are in order because each contour is in its own triangle."""
+    found = gap(spread()[0])
+    assert (found.triangle_lower <= found.band_lower + 1e-12).all()
+    assert (found.triangle_upper >= found.band_upper - 1e-12).all()
+
+
+def test_bands_are_compared_over_the_same_places():
+    made, other = spread()[0], spread()[0]
+    other["posterior"]["q"] = other["posterior"]["q"] + 3.0 * (other["posterior"]["q"] - Q)
+    found = gap(made, 0.9, without_events=other)
+    assert (found.x[0], found.x[-1]) == (found.left.sel(bound="median"), found.right.sel(bound="median"))
+    for name, posterior_ in (("band", made), ("band_without_events", other)):
+        band = contour_band(posterior_, found.x.values, 0.9)
+        for edge in ("lower", "median", "upper"):
+            np.testing.assert_array_equal(found[f"{name}_{edge}"], band[edge])
+        widest = float((band.upper - band.lower).max())
+        assert found[name.replace("band", "band_width")].item() == widest
+    assert found.band_width < found.band_width_without_events
+    assert "band_width_without_events" not in gap(made)
+
+
+def test_events_belong_to_the_draws_of_their_labels():
+    """Events are there for some draws only."""
+    made, _, right, a, _, x_c = spread()
+    some = made.copy()
+    some["events"] = made["events"].to_dataset().assign_coords(draw=np.arange(500)).isel(draw=slice(3, None, 7))
+    expected = np.median(np.arctan(2.0 * a * (right - x_c))[:, 3::7])
+    np.testing.assert_allclose(gap(some).right_slope_angle.sel(bound="median"), expected, rtol=1e-12)
+
+
+def test_several_pivots_leave_open_what_none_has_reached():
+    strokes = ["forward", "backward", "forward", "backward"]
+    found = gap(tree([[[0.3, -0.2, 0.1, -0.4]]], strokes)).sel(bound="median")
+    assert (float(found.left), float(found.right)) == (-0.2, 0.1)
+    assert float(found.width) == pytest.approx(0.3)
+    assert found.snap_off_drive_angle.sizes == {"stroke": 4}
+
+
+def test_arcs_of_several_pivots_are_merged():
+    """The second pivot's backward arc fills the middle of the first one's gap: the wider rest is described."""
+    strokes = ["forward", "backward", "forward", "backward"]
+    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], strokes, first=[1.0, -1.0, 1.0, -0.2]))
+    middle = found.sel(bound="median")
+    assert found.attrs["gaps"] == 2
+    assert (float(middle.left), float(middle.right)) == (0.1, 0.3)
+    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], strokes, first=[1.0, -1.0, 1.0, -0.05]))
+    middle = found.sel(bound="median")
+    assert (float(middle.left), float(middle.right)) == (-0.3, -0.05)
+    found = gap(tree([[[0.3, -0.3, 0.6, 0.35]]], strokes, first=[1.0, -1.0, 1.0, -0.4]))
+    assert found.attrs["gaps"] == 0
+    assert float(found.width.sel(bound="median")) == pytest.approx(-0.05)
+
+
+def test_sweeps_may_overlap():
+    found = gap(tree([[[-0.1, 0.1]]]))
+    assert float(found.width.sel(bound="median")) == pytest.approx(-0.2)
+    assert found.status.item() == "the sweeps overlap: no gap is left"
+    for name in ("triangle_width", "apex_x", "band_width", "band_lower", "triangle_upper"):
+        assert np.isnan(found[name]).all(), name
+
+
+def test_sweeps_may_overlap_in_some_contours():
+    found = gap(tree([[[0.1, -0.1], [0.1, -0.1], [0.1, 0.12]]]))
+    np.testing.assert_allclose(found.triangle_width, 0.5 * A * 0.2**2, rtol=1e-13)
+    assert found.share_open.item() == pytest.approx(2.0 / 3.0)
+    assert found.status.item().startswith("the sweeps overlap in some contours")
+    assert np.isfinite(found.band_width)
+    found = gap(tree([[[0.1, -0.1], [0.1, 0.14], [0.1, 0.12]]]))
+    assert found.status.item().startswith("the sweeps overlap in most contours")
+    assert np.isnan(found.band_width)
+    assert np.isfinite(found.triangle_width).all()
+
+
+def test_of_an_inferred_contour():
+    """The true gap, its vertex and its angles lie within central intervals of 99.99 %."""
+    truth = Parabola(**TRUTH)
+    events = scan(truth).events
+    last = {"left": events["backward"].snap_off, "right": events["forward"].snap_off}
+    found = gap(posterior(), 0.9999)
+    true = {side: event.contact_x for side, event in last.items()}
+    true |= {f"{side}_y": event.contact_y for side, event in last.items()}
+    true |= {f"{side}_slope_angle": event.slope_angle for side, event in last.items()}
+    true |= {"width": true["right"] - true["left"], "vertex_x": TRUTH["x_c"], "vertex_y": TRUTH["q"]}
+    true |= {"triangle_width": 0.5 * TRUTH["a"] * true["width"] ** 2}
+    for name, value in true.items():
+        lower, _, upper = found[name].values
+        assert lower < value < upper, name
+    for stroke in BOTH:
+        lower, _, upper = found.snap_off_drive_angle.sel(stroke=stroke).values
+        assert lower < events[stroke].snap_off.drive_angle < upper
+    y = truth.height(found.x.values)
+    assert np.all((found.triangle_lower < y) & (y < found.triangle_upper))
+    assert found.status.item() == "ok"
+
+
+@pytest.mark.parametrize("there", BOTH)
+def test_one_direction_leaves_no_gap(there):
+    missing = {"forward": "backward", "backward": "forward"}[there]
+    with pytest.raises(InferenceError, match=f"there is no {missing} one here"):
+        gap(tree([[[0.1]]], [there]))
+
+
+def test_an_impossible_probability_is_refused():
+    with pytest.raises(ParameterError, match="give a number between 0 and 1"):
+        gap(tree([[[-0.1, 0.1]]]), 95.0)
+
+
+def with_events(made, **there):
+    """The same with events only in some of the draws, which are said for one stroke."""
+    events = made["events"].to_dataset()
+    for name, (draws, stroke) in there.items():
+        gone = ~draws[:, None] & (np.arange(2) == stroke)
+        events[name] = events[name].where(~xr.DataArray(gone, dims=("draw", "stroke")))
+    out = made.copy()
+    out["events"] = xr.DataTree(events)
+    return out
+
+
+def test_draws_without_an_event_do_not_count():
+    """As if they were not there, but for the band, which is of contours that need not be touched."""
+    made, *_ = spread()
+    number = np.arange(500)
+    lost = with_events(made, snap_off_contact_x=(number % 7 > 0, 0), first_contact_x=(number % 11 > 0, 1))
+    rest = made.copy()
+    rest["events"] = xr.DataTree(
+        made["events"].to_dataset().assign_coords(draw=number).isel(draw=(number % 7 > 0) & (number % 11 > 0))
+    )
+    found, expected = gap(lost, 0.9), gap(rest, 0.9)
+    for name in ("left", "right", "width", "triangle_height", "snap_off_drive_angle", "band_lower", "band_upper"):
+        np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+    assert expected.status == "ok"
+    assert found.status == "some contours are not touched in every sweep: this is of the others"
+
+
+def test_without_any_event_there_are_no_ends():
+    made = with_events(spread()[0], first_contact_x=(np.zeros(500, dtype=bool), 0))
+    with pytest.raises(InferenceError, match=r"none of the posterior's contours is touched in every sweep"):
+        gap(made)

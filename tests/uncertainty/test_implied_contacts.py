@@ -1,0 +1,342 @@
+"""Contacts that a posterior of the contour implies: against scans of its contours, their layout, and how tight."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+
+mpl.use("Agg")
+
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+
+from helpers.contour_posteriors import CELL, measured, posterior, swept
+from tactile_bayes import plotting
+from tactile_bayes.contours import Circle, Parabola
+from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.inference.contact_posterior import infer_contacts
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.reconstruction import reconstruct
+from tactile_bayes.record import in_frame, record_hash
+from tactile_bayes.sweep import scan
+from tactile_bayes.uncertainty.contact_moments import contact_moments
+from tactile_bayes.uncertainty.contact_region import contact_region
+from tactile_bayes.uncertainty.implied_contacts import implied_contacts
+
+COLUMNS = ("contact_x", "contact_y", "slope_angle", "contact_arclength")
+STEP = float(np.radians(6.0))
+THICK = Rod(length=0.1, flexural_rigidity=1.2e-5, diameter=0.003)
+
+
+def tree_of(record, family, *, friction=0.0, nuisances=(), **draws) -> xr.DataTree:
+    """What `infer_contour` would have returned of these draws."""
+    values = {name: (("chain", "draw"), np.atleast_2d(np.asarray(v, dtype=float))) for name, v in draws.items()}
+    loads = ["holding_moment", "force_x", "force_y"]
+    tree = xr.DataTree.from_dict(
+        {
+            "posterior": xr.Dataset(values).assign_coords(chain=[0], draw=np.arange(np.size(draws["q"]))),
+            "observed_data": record[loads],
+            "constant_data": record.drop_vars(loads).drop_attrs(deep=False),
+        }
+    )
+    attrs = ("units", "rod_length", "rod_flexural_rigidity", "rod_diameter", "load_cell_frame")
+    tree.attrs = {name: record.attrs[name] for name in attrs if name in record.attrs} | {
+        "family": family,
+        "friction": friction,
+        "nuisances": json.dumps(nuisances),
+        "data_sha256": record_hash(record),
+        "message": "made up",
+    }
+    return tree
+
+
+@cache
+def implied() -> xr.DataTree:
+    return implied_contacts(posterior(), draws=100)
+
+
+@cache
+def single() -> xr.Dataset:
+    """Contacts of the same record, each by itself."""
+    return reconstruct(measured(), method="constrained", load_cell=CELL)
+
+
+def parameters(contour):
+    return {name: [getattr(contour, name)] * 3 for name in ("a", "r", "q", "x_c") if hasattr(contour, name)}
+
+
+# --- Against scans ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("family", "contour", "options"),
+    [
+        ("parabola", Parabola(0.5, 0.5), {}),
+        ("parabola", Parabola(0.5, 0.6, 0.03), {"bases": ((0.0, 0.0), (0.2, 0.05))}),
+        ("circle", Circle(1.0, 0.4), {"friction": 0.2}),
+        ("parabola", Parabola(5.0, 0.05), {"rod": THICK, "bases": ((0.01, 0.002),)}),
+    ],
+    ids=["two directions", "two bases", "friction", "SI, thick rod"],
+)
+def test_the_contacts_of_one_contour_are_those_of_its_scan(family, contour, options):
+    record = swept(contour, step=STEP, **options)
+    tree = tree_of(record, family, friction=options.get("friction", 0.0), **parameters(contour))
+    found = implied_contacts(tree)
+    length = record.attrs["rod_length"]
+    for name in COLUMNS:
+        draws = found["posterior"][name]
+        assert draws.dims == ("chain", "draw", "sample")
+        assert draws.shape == (1, 3, record.sizes["sample"])
+        unit = 1.0 if name == "slope_angle" else length
+        expected = np.broadcast_to(record[f"truth_{name}"].values, draws.shape)
+        np.testing.assert_allclose(draws.values, expected, rtol=0.0, atol=1e-9 * unit, equal_nan=True)
+    phase = record.truth_contact_phase.values
+    expected = np.select([phase == "none", phase == "tip"], [np.nan, 0.0], 1.0)
+    np.testing.assert_array_equal(found["posterior"].tangential.values[0, 1], expected)
+    stats = found["sample_stats"].to_dataset()
+    np.testing.assert_array_equal(stats.contact_probability, (phase != "none").astype(float))
+    np.testing.assert_array_equal(stats.tangential_probability, expected)
+
+
+def test_the_frame_of_the_load_cell_does_not_matter():
+    record = swept(Parabola(0.5, 0.5), step=STEP)
+    fixed, turning = (
+        implied_contacts(tree_of(r, "parabola", **parameters(Parabola(0.5, 0.5))))
+        for r in (record, in_frame(record, "turning"))
+    )
+    xr.testing.assert_identical(fixed["posterior"].to_dataset(), turning["posterior"].to_dataset())
+
+
+@pytest.mark.parametrize("name", ["drive_angle_offset", "backlash"])
+def test_an_inferred_offset_is_taken_off_the_drive_angle_draw_by_draw(name):
+    contour, offsets = Parabola(0.5, 0.5), np.array([0.0, 0.02, -0.03])
+    record = swept(contour, step=STEP)
+    tree = tree_of(record, "parabola", nuisances=[name], **parameters(contour), **{name: offsets})
+    found = implied_contacts(tree)["posterior"].to_dataset().isel(chain=0)
+    for k, offset in enumerate(offsets):
+        for direction in ("forward", "backward"):
+            on = record.direction.values == direction
+            share = {"drive_angle_offset": 1.0, "backlash": 0.5 if direction == "forward" else -0.5}[name]
+            angles = record.drive_angle.values[on] - share * offset
+            there = scan(contour, direction=direction, drive_angles=angles).record.sortby("drive_angle")
+            draw = found.isel(draw=k, sample=np.flatnonzero(on)[np.argsort(angles)])
+            for column in COLUMNS:
+                np.testing.assert_allclose(draw[column], there[f"truth_{column}"], rtol=0.0, atol=1e-9, equal_nan=True)
+            touched = there.truth_contact_phase.values != "none"
+            np.testing.assert_allclose(draw.drive_angle, np.where(touched, np.sort(angles), np.nan), atol=1e-14)
+
+
+def test_inferred_friction_and_compliance_go_into_the_paths_draw_by_draw():
+    """With a compliant suspension the rod's slope at the pivot is that of a scan at the same state."""
+    contour, friction, compliance = Parabola(0.5, 0.5), np.array([0.0, 0.2, 0.1]), np.array([0.0, 0.0, 0.05])
+    record = swept(contour, step=STEP)
+    names = ["friction", "suspension_compliance"]
+    further = {"friction": friction, "suspension_compliance": compliance}
+    tree = tree_of(record, "parabola", nuisances=names, **parameters(contour))
+    further = {name: (("chain", "draw"), [values]) for name, values in further.items()}
+    tree["posterior"] = tree["posterior"].to_dataset().assign(further)
+    tree = implied_contacts(tree)
+    found = tree["posterior"].to_dataset().isel(chain=0)
+    for k in range(3):
+        draw = found.isel(draw=k).dropna("sample")
+        for direction in ("forward", "backward"):
+            on = draw.isel(sample=record.direction.values[draw.sample.values] == direction)
+            state = scan(contour, direction=direction, drive_angles=on.drive_angle, friction=friction[k]).record
+            state = state.isel(sample=np.argsort(state.drive_angle.values)[np.argsort(np.argsort(on.drive_angle))])
+            driven = on.drive_angle + compliance[k] * state.holding_moment.values
+            np.testing.assert_allclose(driven, record.drive_angle.values[on.sample], rtol=0.0, atol=1e-9)
+            for name in COLUMNS:
+                np.testing.assert_allclose(on[name], state[f"truth_{name}"], rtol=0.0, atol=1e-8)
+
+
+# --- Jointly ----------------------------------------------------------------------------------------------------
+
+
+def test_all_contacts_of_a_draw_lie_on_its_contour():
+    found = implied()["posterior"].to_dataset()
+    draws = posterior()["posterior"].to_dataset().sel(draw=found.draw)
+    off = found.contact_x - draws.x_c
+    has = np.isfinite(found.contact_x)
+    assert has.any("sample").all()
+    height = (draws.q + draws.a * off**2).transpose(*found.contact_y.dims)
+    np.testing.assert_allclose(found.contact_y, height, rtol=0.0, atol=1e-12)
+    slope = np.arctan(2.0 * draws.a * off).transpose(*found.contact_y.dims)
+    np.testing.assert_allclose(found.slope_angle, slope, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_contact_begins_and_ends_with_the_events_of_the_same_draw():
+    tree = implied_contacts(posterior())
+    events = posterior()["events"].to_dataset()
+    np.testing.assert_array_equal(tree["posterior"].draw, events.draw)
+    angle, direction = measured().drive_angle.values, measured().direction.values
+    first, snap = (events[f"{name}_drive_angle"] for name in ("first", "snap_off"))
+    for stroke in ("forward", "backward"):
+        on = direction == stroke
+        low, high = (x.sel(stroke=stroke) for x in ((first, snap) if stroke == "forward" else (snap, first)))
+        within = (angle[on] >= low.values[..., None]) & (angle[on] <= high.values[..., None])
+        np.testing.assert_array_equal(np.isfinite(tree["posterior"].contact_x.values[..., on]), within)
+
+
+def test_a_sample_that_only_some_contours_touch_says_so():
+    contour = Parabola(0.5, 0.5)
+    record = swept(contour, step=STEP)
+    q = np.linspace(0.5, 0.65, 40)
+    tree = implied_contacts(tree_of(record, "parabola", a=0.0 * q + 0.5, q=q, x_c=0.0 * q), draws=40)
+    share = tree["sample_stats"].contact_probability.values
+    has = np.isfinite(tree["posterior"].contact_x.values)
+    np.testing.assert_allclose(share, has.mean(axis=(0, 1)))
+    partly = np.flatnonzero((share > 0.3) & (share < 0.9))
+    assert partly.size
+    assert len(contact_region(tree, int(partly[0])).draws) == has[..., partly[0]].sum()
+    moments = contact_moments(tree)
+    np.testing.assert_array_equal(moments.contact_probability, share)
+    np.testing.assert_array_equal(np.isnan(moments.tangent_sd), has.sum(axis=(0, 1)) < 10)
+
+
+# --- How tight --------------------------------------------------------------------------------------------------
+
+
+def test_the_contour_tightens_single_contacts():
+    """Some 90 contacts determine three parameters: each contact is tighter than alone by about √(90/3), or more."""
+    tight, loose = contact_moments(implied()), single()
+    shown = (loose.status == "ok").values & (tight.contact_probability == 1.0).values
+    assert shown.sum() > 40
+    for name in ("tangent_sd", "normal_sd"):
+        ratio = (loose[name] / tight[name]).values[shown]
+        assert np.quantile(ratio, 0.1) > 3.0
+        assert np.median(ratio) < 100.0
+
+
+def test_the_truth_is_within_reach_of_the_implied_contacts():
+    """Contacts of a sweep are nearly one number: no more than five standard deviations off anywhere."""
+    moments = contact_moments(implied())
+    on = (moments.contact_probability == 1.0).values
+    for name in ("contact_x", "contact_y", "slope_angle"):
+        off = (moments[name] - measured()[f"truth_{name}"].values) / moments[f"{name}_sd"]
+        assert np.abs(off.values[on]).max() < 5.0
+
+
+def test_moments_are_those_of_the_draws():
+    single = infer_contacts(measured().isel(sample=[50, 60]), load_cell=CELL, seed=1, draws=400, method="importance")
+    moments, draws = contact_moments(single), single["posterior"].to_dataset().isel(sample=1)
+    x, y = draws.contact_x.values.ravel(), draws.contact_y.values.ravel()
+    slope = draws.slope_angle.values.mean()
+    at = moments.isel(sample=1)
+    assert float(at.contact_x_sd) == pytest.approx(x.std())
+    assert float(at.contact_xy_correlation) == pytest.approx(np.corrcoef(x, y)[0, 1])
+    assert float(at.tangent_sd) == pytest.approx((np.cos(slope) * x + np.sin(slope) * y).std())
+    assert float(at.normal_sd) == pytest.approx((np.cos(slope) * y - np.sin(slope) * x).std())
+    assert str(at.contact_phase.values) == "tangential"
+
+
+# --- Layout -----------------------------------------------------------------------------------------------------
+
+
+def test_the_layout_is_that_of_infer_contacts():
+    cell = LoadCell(force_noise=0.05, moment_noise=0.02)
+    single = infer_contacts(measured().isel(sample=[50]), load_cell=cell, seed=1, draws=4, method="importance")
+    tree = implied()
+    assert set(tree.children) == set(single.children)
+    assert list(tree["posterior"].data_vars) == list(single["posterior"].data_vars)
+    for name in tree["posterior"].data_vars:
+        assert tree["posterior"][name].dims == single["posterior"][name].dims
+        assert tree["posterior"][name].dtype == single["posterior"][name].dtype
+        assert tree["posterior"][name].attrs == single["posterior"][name].attrs
+    for group in ("observed_data", "constant_data"):
+        assert list(tree[group].data_vars) == list(single[group].data_vars)
+    assert dict(tree["posterior"].sizes) == {"chain": 2, "draw": 100, "sample": measured().sizes["sample"]}
+    assert tree.attrs["draws"] == 200
+    assert tree.attrs["data_sha256"] == record_hash(measured())
+    assert tree.attrs["message"].startswith("contacts of 200 contours of the posterior; converged")
+
+
+def test_draws_are_picked_evenly():
+    count = posterior()["posterior"].sizes["draw"]
+    assert implied_contacts(posterior(), draws=3)["posterior"].draw.values.tolist() == [0, (count - 1) // 2, count - 1]
+
+
+# --- What is refused --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("draws", [0, -1, 2.0, True, "all"])
+def test_impossible_numbers_of_draws_are_refused(draws):
+    with pytest.raises(ParameterError, match=r"draws is .*: give a whole number from 1 up"):
+        implied_contacts(posterior(), draws=draws)
+
+
+def test_anything_but_a_posterior_of_a_contour_is_refused():
+    for thing in (implied(), measured(), None):
+        with pytest.raises(InferenceError, match="this is no result of infer_contour"):
+            implied_contacts(thing)
+
+
+def test_another_record_is_refused():
+    tree = posterior().copy()
+    tree["observed_data"] = tree["observed_data"].to_dataset() * 1.01
+    with pytest.raises(InferenceError, match="not the record that this posterior was inferred from"):
+        implied_contacts(tree)
+
+
+# --- Figure -----------------------------------------------------------------------------------------------------
+
+
+def own_axes(count=5):
+    return Figure().subplots(count)
+
+
+def ratios(ax):
+    return [line for line in ax.get_lines() if len(line.get_xdata()) > 2]
+
+
+def test_the_figure_shows_both_and_their_ratio():
+    axes = own_axes()
+    found = plotting.tightening(implied(), single(), probability=0.5, truth=Parabola(0.5, 0.5), axes=axes)
+    assert found.tolist() == axes.tolist()
+    tight = contact_moments(implied())
+    expected = (
+        (single().tangent_sd / tight.tangent_sd).where(single().status == "ok").where(tight.contact_probability == 1)
+    )
+    drawn = np.concatenate([line.get_ydata() for line in ratios(axes[4])[:2]])
+    np.testing.assert_allclose(drawn, expected, rtol=1e-12)
+    for ax in axes[1:4]:
+        small, large = sorted(max(patch.width, patch.height) for patch in ax.patches[1:] if isinstance(patch, Ellipse))
+        assert 3.0 * small < large
+        assert ax.get_aspect() == 1.0
+    assert len(axes[0].texts) == 3
+    assert "drive angle" in axes[4].get_xlabel()
+
+
+def test_the_figure_takes_posteriors_of_single_contacts_and_chosen_samples():
+    posteriors = infer_contacts(measured(), load_cell=CELL, seed=1, draws=40, method="importance")
+    axes = plotting.tightening(implied(), posteriors, samples=[40, 60, 120], axes=own_axes())
+    x = contact_moments(implied()).contact_x.values[[40, 60, 120]]
+    assert [text.xy[0] for text in axes[0].texts] == x.tolist()
+
+
+def test_the_figure_refuses_what_does_not_belong_together():
+    with pytest.raises(ParameterError, match="not of one record"):
+        plotting.tightening(implied(), single().isel(sample=slice(100)), axes=own_axes())
+    with pytest.raises(ParameterError, match=r"axes have shape \(2,\).*: give five"):
+        plotting.tightening(implied(), single(), axes=own_axes(2))
+    with pytest.raises(ParameterError, match=r"samples are .*: give three"):
+        plotting.tightening(implied(), single(), samples=[0, 60], axes=own_axes())
+    with pytest.raises(ParameterError, match=r"probability is 1\.0"):
+        plotting.tightening(implied(), single(), probability=1.0, axes=own_axes())
+    with pytest.raises(ParameterError, match="implied is no tree"):
+        plotting.tightening(implied()["posterior"].to_dataset(), single(), axes=own_axes())
+    with pytest.raises(ParameterError, match="not three contacts"):
+        plotting.tightening(
+            implied(), single().assign(status=single().status.where(False, "nonlinear")), axes=own_axes()
+        )
+
+
+def test_ellipses_of_moments_are_drawn():
+    ax = plotting.contact_ellipses(contact_moments(implied()), ax=Figure().subplots())
+    assert len([patch for patch in ax.patches if isinstance(patch, Ellipse)]) == 12
