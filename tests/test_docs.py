@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import pytest
 import typer
+from typer.testing import CliRunner
 
 import tactile_bayes as tb
 from helpers.pages import DOCS, ROOT, agree, blocks, commands, matter, run

@@ -7,8 +7,9 @@ from helpers.pages import ROOT, blocks
 
 @pytest.mark.slow
 def test_the_python_block_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (example,) = (block for block in blocks(text) if block.language == "python")
     names: dict = {}
-    (example,) = (block for block in blocks((ROOT / "README.md").read_text(encoding="utf-8")) if block.language == "python")
     exec(compile(example.code, "README.md", "exec"), names)
     assert names["posterior"].attrs["converged"], names["posterior"].attrs["message"]
     assert (names["band"]["lower"] < names["band"]["upper"]).all()
