@@ -11,7 +11,7 @@ PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification designs efficiency nuisances samplers images docs lint clean
+.PHONY: demo test test-lowest test-slow bench coverage calibration shapes recognition misspecification designs efficiency nuisances samplers images docs dist lint clean
 
 demo: $(READY)
 	$(BIN)/tactile-bayes demo --out $(DEMO_OUT)
@@ -71,13 +71,17 @@ docs: $(DOCS_READY)
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs docs/_build/html
 	@echo "The documentation begins at $(CURDIR)/docs/_build/html/index.html"
 
+dist: $(READY)
+	$(BIN)/python -m build --outdir dist
+	$(BIN)/python -m twine check --strict dist/*
+
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) .venv-lowest results docs/_build .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) .venv-lowest results dist docs/_build .pytest_cache .mypy_cache .ruff_cache
 
 $(READY): pyproject.toml
 	@test -n "$(PYTHON)" || { echo "tactile_bayes needs Python 3.11 or later: none found. Name one with: make PYTHON=/path/to/python ..." >&2; exit 1; }

@@ -1,4 +1,4 @@
-"""Draw the figures of README.md into docs/images, but for that of the demonstration: `python docs/images.py`."""
+"""Draw the figures of the pages into docs/images, except that of the demonstration: `python docs/images.py`."""
 
 from __future__ import annotations
 

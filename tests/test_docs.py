@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import pytest
 import typer
+from typer.testing import CliRunner
 
 import tactile_bayes as tb
 from helpers.pages import DOCS, ROOT, agree, blocks, commands, matter, run
@@ -18,7 +19,8 @@ from tactile_bayes.cli import app
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS
 
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
-TEXTS = {path: path.read_text(encoding="utf-8") for path in [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "VISION.md"]}
+FRONT = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "VISION", "SECURITY", "CODE_OF_CONDUCT")]
+TEXTS = {path: path.read_text(encoding="utf-8") for path in [*PAGES, *FRONT]}
 LINK = re.compile(r"\]\((?!https?:)(?P<target>[^)#\s]*)(?:#(?P<anchor>[^)\s]+))?\)")
 
 
@@ -50,6 +52,22 @@ def test_blocks_run_and_print_what_the_page_says(path: Path, clone: Path) -> Non
 @pytest.mark.parametrize("path", pages_tested("slow"), ids=identify)
 def test_slow_blocks_run_and_print_what_the_page_says(path: Path, clone: Path) -> None:
     assert run(path, TEXTS[path]) > 0
+
+
+def test_a_rigs_file_says_what_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    section = TEXTS[DOCS / "howto" / "your-record.md"].split("## From a rig's file to a report\n")[1]
+    shown = [block.code for block in blocks(section) if block.language == "text"]
+    assert Path("data/synthetic/rig.csv").read_text(encoding="utf-8").startswith(shown[0])
+    (asked,) = (words for block in blocks(section) for words in commands(block.code) if words[0] == "inspect")
+    first, *_ = CliRunner().invoke(app, asked).stdout.splitlines(keepends=True)
+    assert first == shown[1]
+    asked = [word.replace("force_x=Fx", "force_x=-Fx") for word in asked]
+    inspected = CliRunner().invoke(app, asked).stdout
+    for part in shown[2].split("\n\n"):
+        assert part in inspected
+    found = CliRunner().invoke(app, ["reconstruct", *asked[1:], "--out", str(tmp_path)]).stdout
+    assert found.startswith(shown[3])
 
 
 def test_no_python_block_is_left_untested() -> None:
