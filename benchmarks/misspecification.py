@@ -1,7 +1,8 @@
 """Prints what becomes of bands where the world is not as inference assumes, whether it is noticed, and what cures it.
 
 Every row is a calibration: parabolas are drawn from the default prior, swept, measured and inferred as `infer` does by
-default, and bands compared with the truth; what else is not known of the rig is drawn from its default prior. Below a
+default, and bands compared with the truth; what else is not known of the rig is drawn from its default prior, noise is
+as stated. Below a
 world that the default allows for stands what becomes of it where everything is taken as stated; below the others what
 is to be inferred, or told, to cure it. What is done is kept in results/misspecification, so that a run that was stopped
 goes on.
@@ -111,7 +112,8 @@ def main(replicates: int = 40, *names: str) -> None:
 def calibrated(name: str, run: Run, replicates: int) -> xr.Dataset:
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in name.strip())
     options = {"load_cell": CELL, **run.asked}
-    world = tb.World(**run.world)
+    as_stated = {"noise_scale": stats.lognorm(s=1e-9)}
+    world = tb.World(**{**run.world, "priors": as_stated | run.world.get("priors", {})})
     if options.get("family") == "shape-free":  # which takes parabolas for any smooth contour
         world = replace(world, family="parabola")
     else:
