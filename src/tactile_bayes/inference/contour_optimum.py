@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,9 +15,9 @@ from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import Logarithms
+from tactile_bayes.inference.found_rig import rig_with
 from tactile_bayes.inference.nuisances import BIASES
-from tactile_bayes.inference.start import descend, optima
-from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.inference.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
@@ -47,6 +47,10 @@ _FIRM = 2.0
 _FAR_BETTER, _NEARLY = 100.0, 5.0
 """Log-likelihood, roughly, by which a record is explained better beyond the end of a prior for that to be a mistake;
 and cost per residual there, for what is not nearly explained is where a search got lost."""
+
+
+_CLEARLY = 0.9
+"""Share of its cost that a search from Step 2's contacts may leave, to be gone on with."""
 
 
 class ContourOptimum(NamedTuple):
@@ -143,10 +147,8 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
     measured = model.likelihood.measured[:, present] / deviation[present]
     brackets = event_brackets(model)
     candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
-    units = [model.nuisances.units[name] for name in BIASES]
-    for name, zero, unit in zip(BIASES, model.zero, units, strict=True):
-        if name in model.names and np.isfinite(zero):
-            candidates[:, model.names.index(name)] = zero * unit
+    for name, zero in _zeros(model).items():
+        candidates[:, model.names.index(name)] = zero
 
     drawn = located.of(candidates[:, :size])
     percentiles = np.quantile(drawn, [0.16, 0.84], axis=0)
@@ -192,7 +194,23 @@ def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline 
     low, high = ends.low[:size], ends.high[:size]
     about = middle, spread, walked.low[:size], walked.high[:size], deadline
     possible = candidates[:, size:]
+
+    def seen_again(found: Optimum) -> Optimum | None:
+        """From where Step 2 sees the contour: the rig is often found long before a contour that is far away."""
+        point = located.parameters(found.point[None])[0][0]
+        point = np.where(model.may_vanish[:size], np.maximum(point, 0.0), point)
+        by_contacts = contact_fit(model, dict(zip(model.located, point.tolist(), strict=True)))
+        if by_contacts is None:
+            return None
+        place = located.of(np.append(by_contacts, point[by_contacts.size :]))
+        return next(optima(residuals, [place], *about))
+
     for found in optima(residuals, starts(), *about):
+        while not found.fits and not deadline.has_passed:
+            again = seen_again(found)
+            if again is None or again.cost > _CLEARLY * found.cost:
+                break
+            found = again
         point = located.parameters(found.point[None])[0][0]
         noise = fitted_noise(model, found.residuals[: measured.size].reshape(measured.shape))
         if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
@@ -238,12 +256,20 @@ def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
     return np.array([np.median([ratio[c] for c in channels if c in ratio]) for channels in model.noise.channels])
 
 
-def contact_fit(model: ContourModel) -> Floats | None:
-    """The family fitted to Step 2's contact points."""
+def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
+    """The family fitted to Step 2's contact points, with the rig that was found, or with zeros as they show."""
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None
+    rod = model.likelihood.rod
+    moment, *forces = model.deviation * np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
+    rig = rig_with(model.measured, cell, _zeros(model) if found is None else found, model.nuisances.friction)
     contacts = reconstruct(
-        model.measured, method="constrained", load_cell=_zeroed_cell(model), friction=model.nuisances.friction
+        rig.record,
+        method="constrained",
+        load_cell=rig.load_cell,
+        friction=rig.friction,
+        suspension_compliance=rig.suspension_compliance,
     )
     firm = contacts.status.values == "ok"
     if firm.any():
@@ -251,19 +277,16 @@ def contact_fit(model: ContourModel) -> Floats | None:
     said = len(model.family.parameters) - len(model.family.roughness)
     if np.count_nonzero(firm) < 2 * said:
         return None
-    length = model.likelihood.rod.length
+    length = rod.length
     values = model.family.fit(contacts.contact_x.values[firm] / length, contacts.contact_y.values[firm] / length)
     point = np.array([values[name] * length**power for name, power in model.family.length_powers.items()])
     inside = [np.isfinite(model.priors[n].logpdf(v)) for n, v in zip(model.family.parameters, point, strict=True)]
     return point if all(inside) else None
 
 
-def _zeroed_cell(model: ContourModel) -> LoadCell:
-    """The load cell, its noise that of the record, and its zeros, where they are inferred, too."""
-    rod = model.likelihood.rod
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
-    inferred = [name in model.nuisances.names for name in BIASES]
-    cell = model.noise.cell
-    bias = np.where(inferred & np.isfinite(model.zero), model.zero * units, cell.bias)
-    moment, *forces = model.deviation * units
-    return replace(cell, bias=tuple(bias.tolist()), moment_noise=float(moment), force_noise=float(max(forces)))
+def _zeros(model: ContourModel) -> dict[str, float]:
+    """Biases that are inferred as unloaded samples show them, by name."""
+    names, stated = model.nuisances.names, model.noise.cell.bias
+    units = [model.nuisances.units.get(name, np.nan) for name in BIASES]
+    shown = zip(BIASES, model.zero * np.array(units) - np.array(stated), strict=True)
+    return {name: float(zero) for name, zero in shown if name in names and np.isfinite(zero)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
 
-__all__ = ["FoundRig", "contact_points", "found_rig"]
+__all__ = ["FoundRig", "contact_points", "found_rig", "rig_with"]
 
 _SHORT = ("moment", "force_x", "force_y")
 
@@ -51,22 +52,38 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
     found = {str(name): float(values.median()) for name, values in draws.data_vars.items()}
     stated = load_cell or LoadCell.from_record(measured) or LoadCell()
     names = json.loads(posterior.attrs.get("nuisances", "[]"))
+    noise: dict[str, Any] = {name: found[name] for name in ("moment_noise", "force_noise") if name in found}
     rig = {name: value for name, value in found.items() if name in names}
+    return rig_with(measured, replace(stated, **noise), rig, float(posterior.attrs["friction"]))
+
+
+def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float], friction: float) -> FoundRig:
+    """What nuisance parameters, by name and in the record's units, make of a rig that was stated.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        The record.
+    load_cell : LoadCell
+        As it was stated.
+    rig : mapping of str to float
+        What differs from that.
+    friction : float
+        Coulomb's coefficient, where it is not among the parameters.
+    """
 
     def of_channels(what: str, otherwise: float) -> np.ndarray[Any, np.dtype[np.float64]]:
         return np.array([rig.get(f"{channel}_{what}", otherwise) for channel in _SHORT])
 
-    gain: Any = np.array(stated.gain) * of_channels("gain", 1.0) * rig.get("rigidity_scale", 1.0)
-    bias = np.array(stated.bias) + of_channels("bias", 0.0)
-    noise: dict[str, Any] = {name: found[name] for name in ("moment_noise", "force_noise") if name in found}
+    gain: Any = np.array(load_cell.gain) * of_channels("gain", 1.0) * rig.get("rigidity_scale", 1.0)
+    bias = np.array(load_cell.bias) + of_channels("bias", 0.0)
     cell = replace(
-        stated,
+        load_cell,
         gain=gain,
-        lever=(stated.lever[0] + rig.get("lever_x", 0.0), stated.lever[1] + rig.get("lever_y", 0.0)),
+        lever=(load_cell.lever[0] + rig.get("lever_x", 0.0), load_cell.lever[1] + rig.get("lever_y", 0.0)),
         bias=tuple(bias.tolist()),
-        drive_angle_offset=stated.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
-        drive_angle_backlash=stated.drive_angle_backlash + rig.get("backlash", 0.0),
-        **noise,
+        drive_angle_offset=load_cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
+        drive_angle_backlash=load_cell.drive_angle_backlash + rig.get("backlash", 0.0),
     )
     way = np.linspace(-0.5, 0.5, measured.sizes["sample"])
     columns = {
@@ -82,7 +99,7 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
     return FoundRig(
         record,
         cell,
-        rig.get("friction", float(posterior.attrs["friction"])),
+        rig.get("friction", friction),
         rig.get("suspension_compliance", 0.0) * rig.get("rigidity_scale", 1.0),
     )
 
