@@ -16,7 +16,7 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["check"]
 
-Lane = tuple[int, ...]
+BatchIndex = tuple[int, ...]
 
 _PROBES, _FEW = 400, 10
 """Places at which rates are tried, and every how many of them the searches for a slope angle and an x."""
@@ -99,8 +99,8 @@ class _Checked:
         """The locus, of which all members have the shape of the parameters."""
         return Locus(*(np.broadcast_to(np.asarray(v, dtype=float), stops.shape) for v in self.contour.locate(stops)))
 
-    def _refusal(self, lane: Lane, what: str) -> ContourError:
-        which = f" at index {lane if lane[1:] else lane[0]}" if lane else ""
+    def _refusal(self, index: BatchIndex, what: str) -> ContourError:
+        which = f" at index {index if index[1:] else index[0]}" if index else ""
         return ContourError(f"{self.contour}{which}: {what}")
 
     def _window(self) -> tuple[Floats, Floats]:
@@ -146,8 +146,8 @@ class _Checked:
         locus = self._located(stops)
         for name, values in locus._asdict().items():
             if np.any(bad := ~np.isfinite(values)):
-                at, *lane = _first(bad)
-                raise self._refusal(tuple(lane), f"{name} is {values[bad][0]} at parameter {stops[at, *lane]:.6g}")
+                at, *index = _first(bad)
+                raise self._refusal(tuple(index), f"{name} is {values[bad][0]} at parameter {stops[at, *index]:.6g}")
         return locus
 
     def _refuse_falling(self, locus: Locus) -> None:
@@ -155,13 +155,13 @@ class _Checked:
         for name, values, unit in (("x", locus.x, ""), ("slope angle", locus.slope_angle, " rad")):
             falls = np.diff(values, axis=0) < -_SAME * (1.0 if unit else np.abs(values[1:]))
             if np.any(falls):
-                _, *lane = _first(falls)
-                at = np.flatnonzero(falls[_of(lane)])
+                _, *index = _first(falls)
+                at = np.flatnonzero(falls[_of(index)])
                 runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
                 run = min(runs, key=lambda run: np.abs(run - len(falls) // 2).min())
-                first, last = (run[0], *lane), (run[-1] + 1, *lane)
+                first, last = (run[0], *index), (run[-1] + 1, *index)
                 raise self._refusal(
-                    tuple(lane),
+                    tuple(index),
                     f"it is not strictly convex, or runs backward: its {name} falls from {values[first]:.4g} to "
                     f"{values[last]:.4g}{unit}, from x = {_text(locus.x[first])} to {_text(locus.x[last])}",
                 )
@@ -190,20 +190,20 @@ class _Checked:
             if found is None:
                 continue
             ends = np.array([found.left, found.right])
-            x = [_text(v) for v in self._located(self._each(ends)).x[_of(found.lane)]]
+            x = [_text(v) for v in self._located(self._each(ends)).x[_of(found.contour)]]
             if np.isnan(found.miss):
-                raise self._refusal(found.lane, f"{name} jumps at x ≈ {x[1]}: name the parameter there in `knots`")
+                raise self._refusal(found.contour, f"{name} jumps at x ≈ {x[1]}: name the parameter there in `knots`")
             raise self._refusal(
-                found.lane,
+                found.contour,
                 f"{name} is not the derivative of {whose}: from x = {x[0]} to {x[1]} they differ by {found.miss:.3g}",
             )
 
     def _refuse_straight(self, locus: Locus) -> None:
         flat = (locus.slope_rate <= 0.0) & (locus.arclength_rate > 0.0)
         if np.any(straight := sliding_window_view(flat, _STRAIGHT, axis=0).all(axis=-1)):
-            at, *lane = _first(straight)
-            x = _text(locus.x[at, *lane]), _text(locus.x[at + _STRAIGHT - 1, *lane])
-            raise self._refusal(tuple(lane), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
+            at, *index = _first(straight)
+            x = _text(locus.x[at, *index]), _text(locus.x[at + _STRAIGHT - 1, *index])
+            raise self._refusal(tuple(index), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
 
     def _refuse_searches(self, stops: Floats) -> None:
         contour, locus = self.contour, self._located(stops)
@@ -217,11 +217,11 @@ class _Checked:
             ("the slope angle that parameter_of_slope finds", angle, locus.slope_angle, 1.0),
         ):
             if np.any(bad := ~(np.abs(found - wanted) <= _SAME * rounding)):
-                at, *lane = _first(bad)
+                at, *index = _first(bad)
                 raise self._refusal(
-                    tuple(lane),
+                    tuple(index),
                     f"{name} is {np.broadcast_to(found, stops.shape)[bad][0]:.6g} at x = "
-                    f"{_text(locus.x[at, *lane])}, not {wanted[bad][0]:.6g}",
+                    f"{_text(locus.x[at, *index])}, not {wanted[bad][0]:.6g}",
                 )
 
     def _refuse_picking(self, stops: Floats) -> None:
@@ -237,13 +237,13 @@ class _Checked:
             )
 
 
-def _first(bad: ArrayLike) -> Lane:
+def _first(bad: ArrayLike) -> BatchIndex:
     return tuple(int(i) for i in np.argwhere(bad)[0])
 
 
-def _of(lane: Sequence[int]) -> tuple[Any, ...]:
+def _of(index: Sequence[int]) -> tuple[Any, ...]:
     """Index of all values of one contour."""
-    return (slice(None), *lane)
+    return (slice(None), *index)
 
 
 def _text(x: float) -> str:

@@ -38,7 +38,7 @@ class Mismatch(NamedTuple):
     right: float
     miss: float
     """By which they differ over the stretch; NaN where the derivative only jumps, at `right`."""
-    lane: tuple[int, ...]
+    contour: tuple[int, ...]
     """Which of many functions."""
 
 
@@ -67,19 +67,19 @@ def mismatch(rate: Rate, of: Rate, stops: Floats) -> Mismatch | None:
     excess = miss - _MISS * np.abs(change).max(axis=0) - _ROUNDING * np.abs(of(stops)).max(axis=0)
     jump = None
     for place in np.argsort(excess, axis=None)[::-1][:_SUSPECTS]:
-        stretch, *lane = (int(i) for i in np.unravel_index(place, excess.shape))
-        at = (stretch, *lane)
+        stretch, *index = (int(i) for i in np.unravel_index(place, excess.shape))
+        at = (stretch, *index)
         if excess[at] <= 0.0:
             break
         ends = stops[stretch], stops[stretch + 1]
         _, finer = _misses(rate, of, np.linspace(*ends, 2**_HALVINGS + 1))
-        if finer.sum(axis=0)[tuple(lane)] > _SHRINKS * miss[at]:
-            return Mismatch(float(stops[at]), float(stops[stretch + 1, *lane]), float(miss[at]), tuple(lane))
-        left, right, size = (v[tuple(lane)] for v in _steepest(rate, *ends))
-        begin, end = (stop[tuple(lane)] for stop in ends)
+        if finer.sum(axis=0)[tuple(index)] > _SHRINKS * miss[at]:
+            return Mismatch(float(stops[at]), float(stops[stretch + 1, *index]), float(miss[at]), tuple(index))
+        left, right, size = (v[tuple(index)] for v in _steepest(rate, *ends))
+        begin, end = (stop[tuple(index)] for stop in ends)
         inside = begin < left and right < end  # at a stop it may jump, or rise as steeply as a power of almost zero
-        if jump is None and inside and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(lane)]:
-            jump = Mismatch(float(left), float(right), np.nan, tuple(lane))
+        if jump is None and inside and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(index)]:
+            jump = Mismatch(float(left), float(right), np.nan, tuple(index))
     return jump
 
 

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.base import Contour, Locus, Parameter
 
-__all__ = ["SeenContour"]
+__all__ = ["SweepFrame"]
 
 _FAR = 1e3
 """Rod lengths beyond which an end of a contour is as good as none."""
 
 
 @dataclass(frozen=True)
-class SeenContour:
+class SweepFrame:
     """Many contours of one family, each seen by a rod on its own pivot; a "lane" is one of them.
 
     The rod's centreline stays `standoff` (half the rod's diameter) outside the object, so what it traces is the
@@ -45,22 +45,22 @@ class SeenContour:
     mirrored: NDArray[np.bool_]
 
     @property
-    def lanes(self) -> int:
+    def size(self) -> int:
         return int(self.base_x.size)
 
-    def locate(self, lane: Index, parameter: Floats) -> Locus:
+    def locate(self, index: Index, parameter: Floats) -> Locus:
         """Points relative to the pivot in rod lengths; `lane` and `parameter` broadcast. The parameter is seen too:
         it still grows from left to right."""
-        sign = np.where(self.mirrored[lane], -1.0, 1.0)
-        x, y, slope, arclength_rate, slope_rate = self.contour.take(lane).locate(sign * parameter)
-        length, standoff = (v[lane] if isinstance(v, np.ndarray) else v for v in (self.length, self.standoff))
+        sign = np.where(self.mirrored[index], -1.0, 1.0)
+        x, y, slope, arclength_rate, slope_rate = self.contour.take(index).locate(sign * parameter)
+        length, standoff = (v[index] if isinstance(v, np.ndarray) else v for v in (self.length, self.standoff))
         if np.any(standoff):
             x = x + standoff * np.sin(slope)
             y = y - standoff * np.cos(slope)
             arclength_rate = arclength_rate + standoff * slope_rate
         return Locus(
-            sign * (x - self.base_x[lane]) / length,
-            (y - self.base_y[lane]) / length,
+            sign * (x - self.base_x[index]) / length,
+            (y - self.base_y[index]) / length,
             sign * slope,
             arclength_rate / length,
             slope_rate,
@@ -71,18 +71,18 @@ class SeenContour:
 
         So are ends so far away that rounding would hide in which direction they are.
         """
-        lo, hi = (np.broadcast_to(end, (self.lanes,)).astype(float) for end in self.contour.domain)
+        lo, hi = (np.broadcast_to(end, (self.size,)).astype(float) for end in self.contour.domain)
         lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
-        lanes = np.arange(self.lanes)
+        size = np.arange(self.size)
         for end, outward in ((lo, -1.0), (hi, 1.0)):
             open_ended = ~np.isfinite(end)
-            reach = np.full(self.lanes, self.length)
+            reach = np.full(self.size, self.length)
             while np.any(open_ended):
                 end[open_ended] = outward * reach[open_ended]
-                x = self.locate(lanes[open_ended], end[open_ended]).x
+                x = self.locate(size[open_ended], end[open_ended]).x
                 open_ended[open_ended] = outward * x <= 1.0
                 reach *= 2.0
-            far = np.flatnonzero(~(outward * self.locate(lanes, end).x <= _FAR))
+            far = np.flatnonzero(~(outward * self.locate(size, end).x <= _FAR))
             if far.size:
                 end[far] = self._parameter_at(far, 2.0 * outward)
         return lo, hi
@@ -92,8 +92,8 @@ class SeenContour:
         low, high = self.domain()
         return np.where(self.mirrored, -high, low), np.where(self.mirrored, -low, high)
 
-    def _parameter_at(self, lane: Index, x: float) -> Floats:
+    def _parameter_at(self, index: Index, x: float) -> Floats:
         """Parameters at which the contour itself, without standoff, is at x as seen."""
-        sign = np.where(self.mirrored[lane], -1.0, 1.0)
-        length = self.length[lane] if isinstance(self.length, np.ndarray) else self.length
-        return np.asarray(sign * self.contour.take(lane).parameter_of_x(self.base_x[lane] + sign * x * length))
+        sign = np.where(self.mirrored[index], -1.0, 1.0)
+        length = self.length[index] if isinstance(self.length, np.ndarray) else self.length
+        return np.asarray(sign * self.contour.take(index).parameter_of_x(self.base_x[index] + sign * x * length))
