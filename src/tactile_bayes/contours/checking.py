@@ -1,4 +1,4 @@
-"""Whether the formulas of a family of contours fit together."""
+"""The consistency check of the formulas of a family of contours."""
 
 from __future__ import annotations
 
@@ -19,27 +19,28 @@ __all__ = ["check"]
 BatchIndex = tuple[int, ...]
 
 _PROBES, _FEW = 400, 10
-"""Places at which rates are tried, and every how many of them the searches for a slope angle and an x."""
+"""Number of points at which rates are checked, and the stride of the points at which searches are checked."""
 
 _STEEPEST = 1.5
-"""Slope angles [rad] up to which a contour is tried."""
+"""Largest slope angle at which a contour is checked [rad]."""
 
 _NEAREST, _ENDLESS = 1e-9, 62.0
-"""Endless parameters are first tried at the former times the hyperbolic sine of up to the latter, up to 4e17."""
+"""Endless parameters are first sampled at the former times the hyperbolic sine of up to the latter, up to 4e17."""
 
 _STRAIGHT = 5
-"""Neighbouring places without curvature that make a contour straight; rounding may leave fewer."""
+"""Number of neighbouring points without curvature that make a contour straight; rounding may cause fewer."""
 
 _SAME = 1e-9
-"""Share of a contour's size, or angle [rad], that is rounding."""
+"""Rounding error, as a share of a contour's size, or as an angle [rad]."""
 
 
 def check(contour: Contour) -> None:
-    """Refuse a contour whose formulas do not fit together, or which is not strictly convex: for a family of one's own.
+    """Refuse a contour whose formulas are inconsistent, or which is not strictly convex: for a family of one's own.
 
-    Tried are 400 places a contour, where it is not steeper than 1.5 rad: the rates of point and slope angle against
-    their changes from place to place, the growth of the slope angle, height, and what finds the parameter of a slope
-    angle and of an x. Features much narrower than the distance of the places may be overlooked.
+    The check takes 400 points a contour, where it is not steeper than 1.5 rad. It compares the rates of point and slope
+    angle with their changes from point to point, and verifies the growth of the slope angle, the height, and the
+    searches for the parameter of a slope angle and of an x. It may overlook features that are much narrower than the
+    distance of the points.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def check(contour: Contour) -> None:
     Raises
     ------
     ContourError
-        That says what is wrong, where on the contour, and by how much.
+        If a formula is wrong; the message says which, where on the contour, and by how much.
 
     Examples
     --------
@@ -92,11 +93,11 @@ class _Checked:
         self._refuse_searches(places[::_FEW])
 
     def _each(self, values: Floats) -> Floats:
-        """The same values for each of the contours, along a first axis."""
+        """Repeat values along the first axis for each contour."""
         return values.reshape(-1, *(1,) * len(self.shape)) + np.zeros(self.shape)
 
     def _located(self, stops: Floats) -> Locus:
-        """The locus, of which all members have the shape of the parameters."""
+        """Locus with all members broadcast to the shape of the parameters."""
         return Locus(*(np.broadcast_to(np.asarray(v, dtype=float), stops.shape) for v in self.contour.locate(stops)))
 
     def _refusal(self, index: BatchIndex, what: str) -> ContourError:
@@ -104,7 +105,7 @@ class _Checked:
         return ContourError(f"{self.contour}{which}: {what}")
 
     def _window(self) -> tuple[Floats, Floats]:
-        """Parameters between which a contour is tried: short of upright, and of where an endless one is straight."""
+        """Parameters between which a contour is checked: not too steep, and not where an endless one is straight."""
         lo, hi = (np.broadcast_to(end, self.shape).astype(float) for end in self.contour.domain)
         if not np.all(lo < hi):
             raise self._refusal((), f"its domain is {self.contour.domain}: the first must be the smaller")
@@ -151,7 +152,7 @@ class _Checked:
         return locus
 
     def _refuse_falling(self, locus: Locus) -> None:
-        """Refuse an x or a slope angle that falls along the contour; of several stretches the middle one is named."""
+        """Refuse an x or a slope angle that decreases along the contour; the message names the middle stretch."""
         for name, values, unit in (("x", locus.x, ""), ("slope angle", locus.slope_angle, " rad")):
             falls = np.diff(values, axis=0) < -_SAME * (1.0 if unit else np.abs(values[1:]))
             if np.any(falls):
@@ -225,7 +226,7 @@ class _Checked:
                 )
 
     def _refuse_picking(self, stops: Floats) -> None:
-        """Many contours are picked from by `broadcast_to` and `take`; families of one's own may spoil that."""
+        """Refuse contours for which `broadcast_to` and `take` give other points."""
         shape = self.shape or (1,)
         index = tuple(axis.ravel() for axis in np.indices(shape))
         picked = self.contour.broadcast_to(shape).take(index)
@@ -242,7 +243,7 @@ def _first(bad: ArrayLike) -> BatchIndex:
 
 
 def _of(index: Sequence[int]) -> tuple[Any, ...]:
-    """Index of all values of one contour."""
+    """Return the index of all values of one contour."""
     return (slice(None), *index)
 
 

@@ -1,4 +1,4 @@
-"""A contour as the rod sees it: from the pivot, in rod lengths, mirrored for a backward sweep."""
+"""Contours in the sweep frame: relative to the pivot, in rod lengths, mirrored for a backward sweep."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from tactile_bayes.contours.base import Contour, Locus, Parameter
 __all__ = ["SweepFrame"]
 
 _FAR = 1e3
-"""Rod lengths beyond which an end of a contour is as good as none."""
+"""Rod lengths beyond which an end of a contour does not matter."""
 
 
 @dataclass(frozen=True)
 class SweepFrame:
-    """Many contours of one family, each seen by a rod on its own pivot; a "lane" is one of them.
+    """A batch of n contours of one family, each in the frame of a sweep with its own pivot.
 
-    The rod's centreline stays `standoff` (half the rod's diameter) outside the object, so what it traces is the
-    parallel curve, strictly convex like the contour. All sweeps seen this way are forward ones.
+    The rod's centreline stays `standoff` (half the rod's diameter) outside the object: it traces the parallel curve,
+    which is strictly convex too. In this frame all sweeps are forward ones.
 
     Parameters
     ----------
     contour : Contour
-        With parameters that are all arrays of shape (lanes,).
-    base_x, base_y : ndarray, shape (lanes,)
+        Contours whose parameters are all arrays of shape (n,).
+    base_x, base_y : ndarray, shape (n,)
         Pivots, in the contour's unit of length.
-    length : float or ndarray, shape (lanes,)
-        The rod's length, in the same unit.
-    standoff : float or ndarray, shape (lanes,)
+    length : float or ndarray, shape (n,)
+        Length of the rod, in the same unit.
+    standoff : float or ndarray, shape (n,)
         Half the rod's diameter, in the same unit.
-    mirrored : ndarray of bool, shape (lanes,)
+    mirrored : ndarray of bool, shape (n,)
         Whether the sweep is a backward one.
     """
 
@@ -49,8 +49,8 @@ class SweepFrame:
         return int(self.base_x.size)
 
     def locate(self, index: Index, parameter: Floats) -> Locus:
-        """Points relative to the pivot in rod lengths; `lane` and `parameter` broadcast. The parameter is seen too:
-        it still grows from left to right."""
+        """Points in the sweep frame; `index` and `parameter` broadcast. The parameter is in the sweep frame too: it
+        grows from left to right."""
         sign = np.where(self.mirrored[index], -1.0, 1.0)
         x, y, slope, arclength_rate, slope_rate = self.contour.take(index).locate(sign * parameter)
         length, standoff = (v[index] if isinstance(v, np.ndarray) else v for v in (self.length, self.standoff))
@@ -67,9 +67,10 @@ class SweepFrame:
         )
 
     def domain(self) -> tuple[Floats, Floats]:
-        """Least and greatest parameter of every lane, infinite ones brought in to just beyond the rod's reach.
+        """Least and greatest parameter of every contour, shape (n,).
 
-        So are ends so far away that rounding would hide in which direction they are.
+        Where a contour has no end, or one so far away that rounding hides its direction, it is cut just beyond the
+        rod's reach.
         """
         lo, hi = (np.broadcast_to(end, (self.size,)).astype(float) for end in self.contour.domain)
         lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
@@ -88,12 +89,12 @@ class SweepFrame:
         return lo, hi
 
     def own_domain(self) -> tuple[Floats, Floats]:
-        """The same in the contour's own sense."""
+        """Least and greatest parameter of every contour in its own frame, shape (n,); see `domain`."""
         low, high = self.domain()
         return np.where(self.mirrored, -high, low), np.where(self.mirrored, -low, high)
 
     def _parameter_at(self, index: Index, x: float) -> Floats:
-        """Parameters at which the contour itself, without standoff, is at x as seen."""
+        """Parameters at which the contour itself, without standoff, is at x in the sweep frame."""
         sign = np.where(self.mirrored[index], -1.0, 1.0)
         length = self.length[index] if isinstance(self.length, np.ndarray) else self.length
         return np.asarray(sign * self.contour.take(index).parameter_of_x(self.base_x[index] + sign * x * length))

@@ -71,7 +71,7 @@ class Paths:
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
 
     def is_clear(self) -> NDArray[np.bool_]:
-        """Return whether the straight rod is clear of the object after snap-off, as far as that is known; shape (n,)."""
+        """Return whether the straight rod is clear of the object after snap-off, as far as known; shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)
 
