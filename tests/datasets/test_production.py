@@ -307,11 +307,11 @@ def test_another_data_set_is_left_alone(tmp_path):
     before = hashes(tmp_path)
     for change, message in {
         "seed": ({"seed": 8}, r"\('parabolas'\), seed is 7 there and is 8 here: choose another folder, or give"),
-        "law": (
+        "distribution": (
             {"contours": [{**PLAIN["contours"][0], "q": 0.5}]},
             r"\), contours\[0\]\.q is \{'uniform': \[0\.3, 0\.7\]\} there and is 0\.5 here: choose",
         ),
-        "other law": (
+        "other distribution": (
             {"contours": [{**PLAIN["contours"][0], "q": {"normal": [0.5, 0.1]}}]},
             r"\), contours\[0\]\.q is \{'uniform': \[0\.3, 0\.7\]\} there and is \{'normal': \[0\.5, 0\.1\]\} here: ch",
         ),

@@ -174,7 +174,7 @@ REFUSED = [
     ({"contours": [PARABOLA, {"family": "square"}]}, "contours[1].family is 'square': choose from parabola, circle"),
     (
         {"contours": [{"family": "parabola", "a": 1.0}]},
-        "contours[0] is a parabola and has no q: give a number or a law",
+        "contours[0] is a parabola and has no q: give a number or a distribution",
     ),
     (contour(r=1.0), "there is no key 'contours[0].r'"),
     (contour(weight=0), "contours[0].weight is 0.0: it must be positive"),
@@ -185,15 +185,18 @@ REFUSED = [
         {**contour(weight=1), "each_contour": True},
         "contours[0].weight is 1.0: with each_contour every family comes as often",
     ),
-    (contour(q="deep"), "contours[0].q is 'deep': give a number, or a law such as"),
-    (contour(q=float("nan")), "contours[0].q is nan: give a number, or a law"),
+    (contour(q="deep"), "contours[0].q is 'deep': give a number, or a distribution such as"),
+    (contour(q=float("nan")), "contours[0].q is nan: give a number, or a distribution"),
     (contour(q=10**400), "contours[0].q is 1"),
-    (contour(q=True), "contours[0].q is True: give a number, or a law"),
+    (contour(q=True), "contours[0].q is True: give a number, or a distribution"),
     (contour(q={"uniform": [0.3, 0.5], "normal": [0, 1]}), "contours[0].q is {"),
-    (contour(q={"gamma": [1, 2]}), "contours[0].q has the law 'gamma', which there is not: give a number, or a law"),
+    (
+        contour(q={"gamma": [1, 2]}),
+        "contours[0].q has the distribution 'gamma', which is unknown: give a number, or a distribution",
+    ),
     (
         contour(q={"uniform, log_uniform": [1, 2]}),
-        "contours[0].q has the law 'uniform, log_uniform', which there is not",
+        "contours[0].q has the distribution 'uniform, log_uniform', which is unknown",
     ),
     (contour(q={"uniform": 0.3}), "contours[0].q.uniform is 0.3: give a list of finite numbers"),
     (contour(q={"choice": []}), "contours[0].q.choice is []: give a list of finite numbers"),
@@ -212,15 +215,15 @@ REFUSED = [
     ({"rod": {"length": 0.1, "stiffness": 1.0}}, "there is no key 'rod.stiffness'"),
     (
         {"rod": {"length": {"normal": [0.1, 0.01]}, "flexural_rigidity": 1.0}},
-        "rod.length may be negative: choose a law of positive",
+        "rod.length may be negative: choose a distribution of positive",
     ),
-    ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, "rod.flexural_rigidity may be 0: choose a law"),
+    ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, "rod.flexural_rigidity may be 0: choose a distribution"),
     ({"rod": {"length": 0.1, "flexural_rigidity": 1.0, "diameter": -1.0}}, "rod.diameter may be negative"),
     ({"scan": "all"}, "scan is 'all': write it as a table, [scan]"),
     ({"scan__speed": 1.0}, "there is no key 'scan.speed'"),
     ({"scan__bases": []}, "scan.bases is []: give a list of pivots, each [x, y]"),
     ({"scan__bases": [0.0, 0.0]}, "scan.bases is [0.0, 0.0]: give a list of pivots"),
-    ({"scan__bases": [[0.0, "x"]]}, "scan.bases[0][1] is 'x': give a number, or a law"),
+    ({"scan__bases": [[0.0, "x"]]}, "scan.bases[0][1] is 'x': give a number, or a distribution"),
     ({"scan__directions": "forward"}, "scan.directions is 'forward': give 'forward', 'backward' or both"),
     ({"scan__directions": ["up"]}, "scan.directions is ['up']: give"),
     ({"scan__directions": [["forward"]]}, "scan.directions is [['forward']]: give"),
@@ -247,9 +250,9 @@ REFUSED = [
     ({"load_cell__force_noise": -1.0}, "load_cell: the load cell's force_noise is -1.0"),
     (
         {"load_cell__force_noise": {"normal": [0.05, 0.001]}},
-        "load_cell.force_noise may be negative: choose a law of positive",
+        "load_cell.force_noise may be negative: choose a distribution of positive",
     ),
-    ({"load_cell__force_noise": "some"}, "load_cell.force_noise is 'some': give a number, or a law"),
+    ({"load_cell__force_noise": "some"}, "load_cell.force_noise is 'some': give a number, or a distribution"),
     (
         {"load_cell": {"force_resolution": 2.0, "force_range": 1.0}},
         "load_cell: the load cell's force_resolution is 2.0",
@@ -305,8 +308,8 @@ def test_a_key_of_no_table_is_refused_without_all_there_are():
 
 
 def test_the_time_of_a_drift_is_stated_though_it_is_left_out():
-    laws = read_specification(changed(PLAIN, load_cell={"ornstein_uhlenbeck_force": 0.1})).load_cell
-    assert laws["ornstein_uhlenbeck_time"].numbers == (OrnsteinUhlenbeck().time,)
+    distributions = read_specification(changed(PLAIN, load_cell={"ornstein_uhlenbeck_force": 0.1})).load_cell
+    assert distributions["ornstein_uhlenbeck_time"].numbers == (OrnsteinUhlenbeck().time,)
 
 
 def test_defaults():

@@ -38,22 +38,24 @@ def card(spec: Specification, manifest: Manifest) -> str:
         "",
         "## What is drawn",
         "",
-        "| quantity | law |",
+        "| quantity | distribution |",
         "|---|---|",
     ]  # fmt: skip
     for name, group in zip(_names(spec), spec.groups, strict=True):
         share = "in turn" if spec.each_group else f"weight {group.weight:g}"
         lines.append(f"| **{name}** | {share if len(spec.groups) > 1 else 'always'} |")
-        # Weights of a shape-free contour, of which there are many, have one row where they have one law.
-        alike = groupby(group.laws.items(), lambda entry: entry[1].words if entry[0].startswith("z_") else entry[0])
+        # Weights of a shape-free contour, of which there are many, have one row where they have one distribution.
+        alike = groupby(
+            group.distributions.items(), lambda entry: entry[1].text if entry[0].startswith("z_") else entry[0]
+        )
         for _, entries in alike:
-            (first, law), *others = entries
-            lines.append(f"| {name}: {f'{first} to {others[-1][0]}' if others else first} | {law.words} |")
-    lines += [f"| rod: {name} | {law.words} |" for name, law in spec.rod.items()]
+            (first, distribution), *others = entries
+            lines.append(f"| {name}: {f'{first} to {others[-1][0]}' if others else first} | {distribution.text} |")
+    lines += [f"| rod: {name} | {distribution.text} |" for name, distribution in spec.rod.items()]
     for number, pair in enumerate(spec.bases, start=1):
         pivot = "pivot" if bases == 1 else f"pivot {number}"
-        lines += [f"| {pivot}: {axis} | {law.words} |" for axis, law in zip("xy", pair, strict=True)]
-    lines += [f"| load cell: {name} | {law.words} |" for name, law in spec.load_cell.items()]
+        lines += [f"| {pivot}: {axis} | {distribution.text} |" for axis, distribution in zip("xy", pair, strict=True)]
+    lines += [f"| load cell: {name} | {distribution.text} |" for name, distribution in spec.load_cell.items()]
     drive = spec.drive
     if drive.begin is None:
         lines.append(f"| drive angles | from first contact to snap-off, and {drive.margin:g} of that on either side |")
@@ -117,7 +119,7 @@ def _in_turn(spec: Specification) -> list[str]:
 
 def _of_axis(spec: Specification, name: str) -> str:
     """The list of this name, or those on the axis of this name."""
-    together = [key for key, law in spec.laws if law.axis == name]
+    together = [key for key, distribution in spec.distributions if distribution.axis == name]
     return f"{name} ({' and '.join(together)} in step)" if together else name
 
 
@@ -132,7 +134,7 @@ def _redrawn(spec: Specification, manifest: Manifest) -> str:
     if not (total := sum(manifest.redrawn.values())):
         return f"Every contour drawn is one {reached}."
     why = ", ".join(f"{count} {reason}" for reason, count in sorted(manifest.redrawn.items()))
-    return f"{total} contours were drawn again ({why}), so the laws above hold among contours {reached}."
+    return f"{total} contours were drawn again ({why}), so the distributions above hold among contours {reached}."
 
 
 def _to_beware_of(spec: Specification, manifest: Manifest) -> list[str]:

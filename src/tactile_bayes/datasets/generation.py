@@ -80,7 +80,7 @@ _REMEDIES = {
     "still touched at its other end": _WIDER,
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the straight rod would still cut the object",
-    _NO_CONTOUR: "change the law of that parameter",
+    _NO_CONTOUR: "change the distribution of that parameter",
 }
 
 
@@ -101,7 +101,7 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
         If of 1000 draws of a record none is a contour that every sweep can reach.
     """
     index = np.arange(begin, end)
-    drawn = {key: np.full(index.size, np.nan) for key, _ in spec.laws}
+    drawn = {key: np.full(index.size, np.nan) for key, _ in spec.distributions}
     records = Records(index, np.zeros(index.size, dtype=np.intp), drawn, {}, {}, Counter())
     uniform, turns = streams(spec.seed, index, CONTOUR), _turns(spec, index)
     in_vain: list[tuple[Index, NDArray[Any]]] = []
@@ -139,7 +139,7 @@ def _drawn(
     spec: Specification, uniform: list[np.random.Generator], turns: Mapping[str, Index], row: Index
 ) -> _Candidates:
     """The next draw of each of these records; one that is named more than once draws again."""
-    count = 1 + len(spec.laws)
+    count = 1 + len(spec.distributions)
     shares = np.array([_shares(uniform[i], count) for i in row])
     if "contours" in turns:
         group = turns["contours"][row]
@@ -148,8 +148,10 @@ def _drawn(
         group = np.searchsorted(weights, shares[:, 0] * weights[-1], side="right")
         group = np.minimum(group, len(spec.groups) - 1)
     values = {
-        key: law.at(shares[:, 1 + k], turns[law.axis or key][row] if law.kind == "each" else row)
-        for k, (key, law) in enumerate(spec.laws)
+        key: distribution.at(
+            shares[:, 1 + k], turns[distribution.axis or key][row] if distribution.kind == "each" else row
+        )
+        for k, (key, distribution) in enumerate(spec.distributions)
     }
     return _Candidates(row, group, values)
 

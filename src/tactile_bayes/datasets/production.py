@@ -22,14 +22,14 @@ from tactile_bayes.tasks import alone_in, run_tasks, write_atomically
 
 __all__ = ["Production", "generate"]
 
-_NOTING = 0.05
+_WRITING_SHARE = 0.05
 """Share of the time that goes into notes of what is finished: what is not noted when all is killed is made again."""
 
 
-_MOST_TOLD = 3
+_MOST_NAMED = 3
 """Differences between two specifications that a refusal names."""
 
-_LONGEST_TOLD = 60
+_LONGEST_VALUE = 60
 """Characters of a value in it."""
 
 
@@ -110,16 +110,16 @@ def generate(
         done = {shard.file for shard in manifest.shards}
         tasks = [(spec.text, n, str(folder)) for n in range(spec.shards) if shard_file(n) not in done]
         began, made, waiting = time.monotonic(), 0, list[Written]()
-        next_note = began
+        next_write = began
         before = sum(shard.records for shard in manifest.shards)
         try:
             with closing(run_tasks(write_shard, tasks, workers=workers, scheduler=scheduler)) as results:
                 for _, written in results:
                     waiting.append(written)
                     made += written.records
-                    if (now := time.monotonic()) >= next_note:
+                    if (now := time.monotonic()) >= next_write:
                         manifest, waiting = _noted(manifest, waiting, folder), []
-                        next_note = time.monotonic() + (time.monotonic() - now) / _NOTING
+                        next_write = time.monotonic() + (time.monotonic() - now) / _WRITING_SHARE
                     if progress is not None:
                         progress(Production(before + made, spec.records, made, time.monotonic() - began))
         finally:
@@ -182,20 +182,20 @@ def _first(spec: Specification, folder: Path) -> Manifest:
 
 def _other(manifest: Manifest, spec: Specification, folder: Path) -> SpecificationError:
     found = differences(meaning(manifest.specification), meaning(spec.text))
-    told = [f"{key} {_said(there)} there and {_said(here)} here" for key, there, here in found[:_MOST_TOLD]]
-    told += [f"{len(found) - _MOST_TOLD} more"] if len(found) > _MOST_TOLD else []
+    named = [f"{key} {_described(there)} there and {_described(here)} here" for key, there, here in found[:_MOST_NAMED]]
+    named += [f"{len(found) - _MOST_NAMED} more"] if len(found) > _MOST_NAMED else []
     name = "" if manifest.name == UNNAMED else f" ({manifest.name!r})"
     remedy = "choose another folder, or give the specification that its manifest states"
     if [key for key, _, _ in found] == ["records"]:
         remedy = "a data set does not grow: choose another folder, where the first records will be the same"
-    return SpecificationError(f"{folder} holds a data set of another specification{name}, {', '.join(told)}: {remedy}")
+    return SpecificationError(f"{folder} holds a data set of another specification{name}, {', '.join(named)}: {remedy}")
 
 
-def _said(value: Any) -> str:
+def _described(value: Any) -> str:
     if value is None:
         return "is left out"
     if isinstance(value, dict) and "family" in value:
         return f"is of family {value['family']!r}"
     is_whole = isinstance(value, float) and value.is_integer()
     text = str(int(value)) if is_whole else reprlib.repr(value)
-    return f"is {text if len(text) <= _LONGEST_TOLD else text[: _LONGEST_TOLD - 1] + '…'}"
+    return f"is {text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + '…'}"

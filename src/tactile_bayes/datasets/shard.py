@@ -148,8 +148,8 @@ def _flags(long_name: str, meanings: list[str] | tuple[str, ...], kind: Any = np
 def _parameters(spec: Specification, records: Records) -> dict[str, tuple[str, Floats, dict[str, str]]]:
     """Parameters of the contours by name, NaN where a family has no such."""
     found = {}
-    for name in dict.fromkeys(name for group in spec.groups for name in group.laws):
-        having = [g for g, group in enumerate(spec.groups) if name in group.laws]
+    for name in dict.fromkeys(name for group in spec.groups for name in group.distributions):
+        having = [g for g, group in enumerate(spec.groups) if name in group.distributions]
         values = np.full(records.index.size, np.nan)
         for g in having:
             drawn = records.drawn[f"contours[{g}].{name}"]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tactile_bayes.checks import as_number, check_choice, check_kind, check_number, check_whole_number, refused
 from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
 from tactile_bayes.contours.family import Family
-from tactile_bayes.datasets.laws import Law, law_of
+from tactile_bayes.datasets.distributions import Distribution, distribution_of
 from tactile_bayes.datasets.specification_text import canonical, toml_of, without
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
@@ -83,7 +83,7 @@ class Group:
 
     family: str
     weight: float
-    laws: Mapping[str, Law]
+    distributions: Mapping[str, Distribution]
 
 
 @dataclass(frozen=True)
@@ -144,12 +144,12 @@ class Specification:
     seed: int
     groups: tuple[Group, ...]
     each_group: bool
-    rod: Mapping[str, Law]
-    bases: tuple[tuple[Law, Law], ...]
+    rod: Mapping[str, Distribution]
+    bases: tuple[tuple[Distribution, Distribution], ...]
     directions: tuple[str, ...]
     drive: Drive
     friction: float
-    load_cell: Mapping[str, Law]
+    load_cell: Mapping[str, Distribution]
     frame: Frame
     single: bool
 
@@ -183,15 +183,19 @@ class Specification:
         return np.array_split(np.arange(records), max(1, -(-samples // _AT_HAND)))
 
     @property
-    def laws(self) -> tuple[tuple[str, Law], ...]:
+    def distributions(self) -> tuple[tuple[str, Distribution], ...]:
         """Every law with its key, in the order in which numbers are drawn."""
         tables = {
-            **{f"contours[{g}].": group.laws for g, group in enumerate(self.groups)},
+            **{f"contours[{g}].": group.distributions for g, group in enumerate(self.groups)},
             "rod.": self.rod,
             **{f"scan.bases[{b}]": {"[0]": x, "[1]": y} for b, (x, y) in enumerate(self.bases)},
             "load_cell.": self.load_cell,
         }
-        return tuple((prefix + name, law) for prefix, laws in tables.items() for name, law in laws.items())
+        return tuple(
+            (prefix + name, distribution)
+            for prefix, distributions in tables.items()
+            for name, distribution in distributions.items()
+        )
 
     @property
     def combinations(self) -> int:
@@ -202,11 +206,13 @@ class Specification:
     def lists(self) -> tuple[tuple[str, int], ...]:
         """What comes one after the other, with the number of turns: the last changes fastest."""
         found = {"contours": len(self.groups)} if self.each_group else {}
-        for key, law in self.laws:
-            if law.kind == "each" and found.setdefault(law.axis or key, len(law.numbers)) != len(law.numbers):
+        for key, distribution in self.distributions:
+            if distribution.kind == "each" and found.setdefault(
+                distribution.axis or key, len(distribution.numbers)
+            ) != len(distribution.numbers):
                 raise SpecificationError(
-                    f"{key} has {len(law.numbers)} numbers, and another list on the axis {law.axis!r} has "
-                    f"{found[law.axis or key]}: lists that advance in step are equally long"
+                    f"{key} has {len(distribution.numbers)} numbers, and another list on the axis "
+                    f"{distribution.axis!r} has {found[distribution.axis or key]}: lists that advance in step are equally long"
                 )
         return tuple(found.items())
 
@@ -346,14 +352,14 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
     values = {"weight": 1.0, **left_out(family), **group}
     missing = [parameter for parameter in names if parameter not in values]
     if missing:
-        raise SpecificationError(f"{key} is a {name} and has no {missing[0]}: give a number or a law")
+        raise SpecificationError(f"{key} is a {name} and has no {missing[0]}: give a number or a distribution")
     weight = _number(values["weight"], f"{key}.weight", 0.0, 1e9)
     if weight == 0.0 or (each and "weight" in group):
         why = "it must be positive" if not each else "with each_contour every family comes as often"
         raise SpecificationError(f"{key}.weight is {weight!r}: {why}")
-    laws = {parameter: law_of(values[parameter], f"{key}.{parameter}") for parameter in names}
-    _refuse_no_contour(family, laws, key)
-    return Group(name, weight, laws)
+    distributions = {parameter: distribution_of(values[parameter], f"{key}.{parameter}") for parameter in names}
+    _refuse_no_contour(family, distributions, key)
+    return Group(name, weight, distributions)
 
 
 def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
@@ -371,71 +377,76 @@ def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
         )
 
 
-def _refuse_no_contour(family: Family, laws: Mapping[str, Law], key: str) -> None:
+def _refuse_no_contour(family: Family, distributions: Mapping[str, Distribution], key: str) -> None:
     """Refuse parameters that no contour has, whatever the others are, by what a law may give at its ends; draws of laws
     without end are tried as they come."""
     possible = {name: np.full(1, 2.0 if name.endswith("n") else 1.0) for name in family.parameters}
-    for name, law in laws.items():
-        numbers = law.numbers
-        if law.kind in ("normal", "log_normal"):
-            numbers = () if law.numbers[1] else law.numbers[:1]
+    for name, distribution in distributions.items():
+        numbers = distribution.numbers
+        if distribution.kind in ("normal", "log_normal"):
+            numbers = () if distribution.numbers[1] else distribution.numbers[:1]
         for number in numbers:
             try:
                 family.contour(possible | {name: np.full(1, number)})
             except ContourError as error:
-                verb = "is" if law.kind == "constant" else "may be"
+                verb = "is" if distribution.kind == "constant" else "may be"
                 raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
 
 
-def _rod(rod: Mapping[str, Any]) -> dict[str, Law]:
+def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
     if not rod:
         return {}
     if "length" not in rod or "flexural_rigidity" not in rod:
         raise SpecificationError(
             "rod needs length [m] and flexural_rigidity [N m²]; without [rod] lengths are in rod lengths"
         )
-    laws = {name: law_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
-    _refuse_negative(laws, "rod.", or_zero={"diameter"})
+    distributions = {name: distribution_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
+    _refuse_negative(distributions, "rod.", or_zero={"diameter"})
     try:
-        Rod(*_at_share(laws, 0.5).values())
+        Rod(*_at_share(distributions, 0.5).values())
     except ParameterError as error:
         raise SpecificationError(f"rod: {error}") from error
-    return laws
+    return distributions
 
 
-def _load_cell(table: Mapping[str, Any]) -> dict[str, Law]:
-    laws = {name: law_of(value, f"load_cell.{name}") for name, value in table.items()}
-    if any(name.startswith("ornstein_uhlenbeck") for name in laws):
-        laws.setdefault("ornstein_uhlenbeck_time", Law("constant", (OrnsteinUhlenbeck().time,)))
+def _load_cell(table: Mapping[str, Any]) -> dict[str, Distribution]:
+    distributions = {name: distribution_of(value, f"load_cell.{name}") for name, value in table.items()}
+    if any(name.startswith("ornstein_uhlenbeck") for name in distributions):
+        distributions.setdefault("ornstein_uhlenbeck_time", Distribution("constant", (OrnsteinUhlenbeck().time,)))
     for share in (0.05, 0.5, 0.95):
         try:
-            LoadCell.from_entries(_at_share(laws, share))
+            LoadCell.from_entries(_at_share(distributions, share))
         except ParameterError as error:
             raise SpecificationError(f"load_cell: {error}") from error
     signed = ("bias_holding", "bias_force", "gain_", "lever_", "correlation_", "drive_angle_o", "drive_angle_b")
-    unsigned = {name: law for name, law in laws.items() if not name.startswith(signed)}
+    unsigned = {name: distribution for name, distribution in distributions.items() if not name.startswith(signed)}
     _refuse_negative(unsigned, "load_cell.", or_zero=set(unsigned))
-    return laws
+    return distributions
 
 
-def _at_share(laws: Mapping[str, Law], share: float) -> dict[str, float]:
+def _at_share(distributions: Mapping[str, Distribution], share: float) -> dict[str, float]:
     """The numbers of laws at a share of their probability."""
     turn = np.zeros(1, dtype=np.intp)
-    return {name: float(law.at(np.full(1, share), turn)[0]) for name, law in laws.items()}
+    return {name: float(distribution.at(np.full(1, share), turn)[0]) for name, distribution in distributions.items()}
 
 
-def _refuse_negative(laws: Mapping[str, Law], prefix: str, or_zero: Container[str]) -> None:
-    for name, law in laws.items():
-        low = law.least
+def _refuse_negative(distributions: Mapping[str, Distribution], prefix: str, or_zero: Container[str]) -> None:
+    for name, distribution in distributions.items():
+        low = distribution.least
         if low < 0.0 or (low == 0.0 and name not in or_zero):
             what = "negative" if low < 0.0 else "0"
-            raise SpecificationError(f"{prefix}{name} may be {what}: choose a law of positive numbers, as log_normal")
+            raise SpecificationError(
+                f"{prefix}{name} may be {what}: choose a distribution of positive numbers, as log_normal"
+            )
 
 
-def _bases(value: Any) -> tuple[tuple[Law, Law], ...]:
+def _bases(value: Any) -> tuple[tuple[Distribution, Distribution], ...]:
     if not isinstance(value, list) or not value or not all(isinstance(pair, list) and len(pair) == 2 for pair in value):
         raise refused("scan.bases", value, "give a list of pivots, each [x, y]")
-    return tuple((law_of(x, f"scan.bases[{i}][0]"), law_of(y, f"scan.bases[{i}][1]")) for i, (x, y) in enumerate(value))
+    return tuple(
+        (distribution_of(x, f"scan.bases[{i}][0]"), distribution_of(y, f"scan.bases[{i}][1]"))
+        for i, (x, y) in enumerate(value)
+    )
 
 
 def _directions(value: Any) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
 from tactile_bayes.record.origin import renamed
 from tactile_bayes.record.schema import FRAMES, Frame
-from tactile_bayes.record.stroke import split_at_turns
+from tactile_bayes.record.sweep_segments import split_at_turns
 from tactile_bayes.record.units import in_units_of_record
 from tactile_bayes.record.validation import validate
 

@@ -15,7 +15,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number
 from tactile_bayes.errors import SpecificationError
 
-__all__ = ["Law", "law_of"]
+__all__ = ["Distribution", "distribution_of"]
 
 
 class _Kind(NamedTuple):
@@ -24,7 +24,7 @@ class _Kind(NamedTuple):
     is_possible: Callable[[float, float], bool]
     rule: str
     """What they must be."""
-    words: str
+    text: str
     at: Callable[[float, float, Floats], Any]
     """The numbers at shares of the probability."""
 
@@ -58,7 +58,7 @@ _KINDS = {
 
 
 @dataclass(frozen=True)
-class Law:
+class Distribution:
     """A number for each record: always the same, drawn, or one after the other of a list.
 
     Parameters
@@ -89,14 +89,14 @@ class Law:
         return self.numbers[0] if self.kind in ("normal", "log_normal") else min(self.numbers)
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """For people."""
         numbers = [f"{number:g}" for number in self.numbers]
         if self.kind == "choice":
             return f"one of {', '.join(numbers)}"
         if self.kind == "each":
             return f"each of {', '.join(numbers)}" + (f", on the axis {self.axis}" if self.axis else "")
-        return _KINDS[self.kind].words.format(*numbers) if self.kind in _KINDS else numbers[0]
+        return _KINDS[self.kind].text.format(*numbers) if self.kind in _KINDS else numbers[0]
 
     def at(self, share: Floats, turn: NDArray[np.intp]) -> Floats:
         """The numbers at shares of the probability, in [0, 1), of records whose turn in the list is given."""
@@ -110,7 +110,7 @@ class Law:
         return np.asarray(_KINDS[self.kind].at(first, second, share))
 
 
-def law_of(value: Any, key: str) -> Law:
+def distribution_of(value: Any, key: str) -> Distribution:
     """The law that a value of a specification states; `key` names it in refusals.
 
     Raises
@@ -120,13 +120,13 @@ def law_of(value: Any, key: str) -> Law:
 
     Examples
     --------
-    >>> law_of({"uniform": [0.3, 0.8]}, "contours[0].q").at(np.array([0.0, 0.5]), np.zeros(2, dtype=int))
+    >>> distribution_of({"uniform": [0.3, 0.8]}, "contours[0].q").at(np.array([0.0, 0.5]), np.zeros(2, dtype=int))
     array([0.3 , 0.55])
     """
     if _is_number(value):
-        return Law("constant", (float(value),))
+        return Distribution("constant", (float(value),))
     kinds = (*_KINDS, "choice", "each")
-    hint = f"give a number, or a law such as {{ uniform = [0.3, 0.8] }} (laws: {', '.join(kinds)})"
+    hint = f"give a number, or a distribution such as {{ uniform = [0.3, 0.8] }} (distributions: {', '.join(kinds)})"
     axis = None
     if isinstance(value, dict) and "each" in value and "axis" in value:
         value = dict(value)
@@ -137,14 +137,14 @@ def law_of(value: Any, key: str) -> Law:
         raise SpecificationError(f"{key} is {value!r}: {hint}")
     ((kind, numbers),) = value.items()
     if kind not in kinds:
-        raise SpecificationError(f"{key} has the law {kind!r}, which there is not: {hint}")
+        raise SpecificationError(f"{key} has the distribution {kind!r}, which is unknown: {hint}")
     if not isinstance(numbers, list) or not numbers or not all(map(_is_number, numbers)):
         raise SpecificationError(f"{key}.{kind} is {numbers!r}: give a list of finite numbers")
     if kind in _KINDS and len(numbers) != 2:
         raise SpecificationError(f"{key}.{kind} has {len(numbers)} numbers: give two")
     if kind in _KINDS and not _KINDS[kind].is_possible(*numbers):
         raise SpecificationError(f"{key}.{kind} is {numbers!r}: {_KINDS[kind].rule}")
-    return Law(kind, tuple(float(number) for number in numbers), axis)
+    return Distribution(kind, tuple(float(number) for number in numbers), axis)
 
 
 def _is_number(value: Any) -> bool:

@@ -1,4 +1,4 @@
-"""A ledger: which of many tasks are done, and what came of them, in a file that is always whole."""
+"""The results store: outcomes of finished tasks in a file that is always complete."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.tasks.files import alone_in, write_atomically
 from tactile_bayes.tasks.workers import run_tasks
 
-__all__ = ["Kind", "Ledger", "TaskProgress", "keep_outcomes", "open_ledger"]
+__all__ = ["Kind", "ResultsStore", "TaskProgress", "keep_outcomes", "open_results_store"]
 
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
 
 _FORMAT = 1
 
-_NOTING = 0.05
-"""Share of the time that goes into notes of what is finished."""
+_WRITING_SHARE = 0.05
+"""Share of the time that is spent on writing outcomes."""
 
 
 class Kind(NamedTuple):
-    """What a ledger is of."""
+    """Kind of the outcomes in a results store."""
 
     what: str
-    """The outcomes, in a word; the file is called by it."""
+    """Name of the outcomes, and of the file."""
     error: type[TactileBayesError]
     encode: Callable[[Any], dict[str, Any]]
-    """From an outcome to what JSON can hold, without NaN."""
+    """Maps an outcome to JSON values without NaN."""
     decode: Callable[[dict[str, Any]], Any]
-    """The way back; raises KeyError, TypeError, ValueError or AttributeError."""
+    """Inverse of `encode`; raises KeyError, TypeError, ValueError or AttributeError."""
 
     @property
     def file(self) -> str:
@@ -41,66 +41,67 @@ class Kind(NamedTuple):
 
 
 class TaskProgress(NamedTuple):
-    """How far many tasks have come."""
+    """Progress of many tasks."""
 
     done: int
     wanted: int
     made: int
-    """Of those that are done, in this run."""
+    """Number of tasks done in this run."""
     seconds: float
-    """Since this run began."""
+    """Time since the beginning of this run [s]."""
 
 
-class Ledger(Generic[Outcome]):
-    """Outcomes by number; without a folder they are kept in memory alone."""
+class ResultsStore(Generic[Outcome]):
+    """Outcomes by number, in a file; without a folder they stay in memory."""
 
-    def __init__(self, words: Mapping[str, str], folder: Path | None, kind: Kind) -> None:
-        self._words = dict(words)
+    def __init__(self, identity: Mapping[str, str], folder: Path | None, kind: Kind) -> None:
+        self._identity = dict(identity)
         self._kind = kind
         self._file = None if folder is None else folder / kind.file
         self.outcomes: dict[int, Outcome] = {}
         if self._file is not None and self._file.exists():
-            self.outcomes = _read(self._file, self._words, kind)
+            self.outcomes = _read(self._file, self._identity, kind)
 
     def write(self) -> None:
-        """Write what is there."""
+        """Write all outcomes, if there is a folder."""
         if self._file is None:
             return
         rows = [{"number": number, **self._kind.encode(outcome)} for number, outcome in sorted(self.outcomes.items())]
-        table = {"format": _FORMAT, "experiment": self._words, self._kind.what: rows}
+        table = {"format": _FORMAT, "experiment": self._identity, self._kind.what: rows}
         with write_atomically(self._file) as temporary:
             temporary.write_text(json.dumps(table, ensure_ascii=False, allow_nan=False), encoding="utf-8")
 
 
 @contextmanager
-def open_ledger(words: Mapping[str, str], folder: Path | None, kind: Kind) -> Iterator[Ledger[Any]]:
-    """The ledger in a folder, which is made if it is not there; written when the block ends, however it does.
+def open_results_store(identity: Mapping[str, str], folder: Path | None, kind: Kind) -> Iterator[ResultsStore[Any]]:
+    """Open the results store in a folder, which is created if it does not exist; write it at the end of the block.
 
     Parameters
     ----------
-    words : mapping of str to str
-        What the outcomes follow from.
+    identity : mapping of str to str
+        Description of all that the outcomes depend on.
     folder : Path, optional
+        By default outcomes stay in memory.
     kind : Kind
-        Its error is raised if the folder has the ledger of another experiment, or none that can be read, or is being
-        worked on.
+        Its error is raised if the folder holds results of another experiment, or a file that cannot be read, or if
+        another run uses it.
     """
     if folder is None:
-        yield Ledger(words, None, kind)
+        yield ResultsStore(identity, None, kind)
         return
     if folder.exists() and not folder.is_dir():
         raise kind.error(f"{folder} is a file: give a folder")
     folder.mkdir(parents=True, exist_ok=True)
     with alone_in(folder, kind.error):
-        ledger: Ledger[Any] = Ledger(words, folder, kind)
+        store: ResultsStore[Any] = ResultsStore(identity, folder, kind)
         try:
-            yield ledger
+            yield store
         finally:
-            ledger.write()
+            store.write()
 
 
 def keep_outcomes(
-    ledger: Ledger[Outcome],
+    store: ResultsStore[Outcome],
     function: Callable[[tuple[Task, int]], Outcome],
     task: Task,
     count: int,
@@ -109,36 +110,37 @@ def keep_outcomes(
     scheduler: str | None,
     progress: Callable[[TaskProgress], object] | None,
 ) -> dict[int, Outcome]:
-    """Outcomes of a task's numbers from 0 to `count` − 1; those that are in the ledger are not made again.
+    """Return the outcomes of a task for the numbers from 0 to `count` − 1, and compute those not in the store.
 
     Parameters
     ----------
-    ledger : Ledger
+    store : ResultsStore
     function : callable
-        Of the task and a number; of a module, not a local one.
+        Function of (task, number); a function of a module, not a local one.
     task
     count : int
+        Number of outcomes.
     workers, scheduler
         As in `run_tasks`.
     progress : callable, optional
-        Is given a `TaskProgress` after each.
+        Called with a `TaskProgress` after each outcome.
     """
     began = time.monotonic()
-    kept = {number: outcome for number, outcome in ledger.outcomes.items() if number < count}
+    kept = {number: outcome for number, outcome in store.outcomes.items() if number < count}
     tasks = [(task, number) for number in range(count) if number not in kept]
-    next_note, done = began, len(kept)
+    next_write, done = began, len(kept)
     with closing(run_tasks(function, tasks, workers=workers, scheduler=scheduler)) as results:
         for made, ((_, number), outcome) in enumerate(results, start=1):
-            ledger.outcomes[number] = kept[number] = outcome
-            if (now := time.monotonic()) >= next_note:
-                ledger.write()
-                next_note = time.monotonic() + (time.monotonic() - now) / _NOTING
+            store.outcomes[number] = kept[number] = outcome
+            if (now := time.monotonic()) >= next_write:
+                store.write()
+                next_write = time.monotonic() + (time.monotonic() - now) / _WRITING_SHARE
             if progress is not None:
                 progress(TaskProgress(done + made, count, made, time.monotonic() - began))
     return kept
 
 
-def _read(file: Path, words: Mapping[str, str], kind: Kind) -> dict[int, Any]:
+def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]:
     remedy = f"give another folder, or remove {file.name} from it to begin anew"
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
@@ -150,16 +152,16 @@ def _read(file: Path, words: Mapping[str, str], kind: Kind) -> dict[int, Any]:
         raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {remedy}") from error
-    differ = [name for name in {**there, **words} if there.get(name) != words.get(name)]
+    differ = [name for name in {**there, **identity} if there.get(name) != identity.get(name)]
     if outcomes and differ:
-        told = ", ".join(
-            f"{name} is {_short(there.get(name))} there and {_short(words.get(name))} here" for name in differ[:3]
+        named = ", ".join(
+            f"{name} is {_short(there.get(name))} there and {_short(identity.get(name))} here" for name in differ[:3]
         )
         more = f" and {len(differ) - 3} more" if len(differ) > 3 else ""
-        raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {told}{more}; {remedy}")
+        raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {named}{more}; {remedy}")
     return outcomes
 
 
 def _short(value: Any) -> str:
-    words = "left out" if value is None else str(value)
-    return words if len(words) <= 60 else f"{words[:57]}…"
+    text = "left out" if value is None else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"

@@ -9,7 +9,7 @@ from hypothesis import given
 
 from helpers.record_tables import refused
 from tactile_bayes.record import make_record, read_record, write_record
-from tactile_bayes.record.stroke import split_at_turns, turning_points
+from tactile_bayes.record.sweep_segments import split_at_turns, turning_points
 from tactile_bayes.record.table import Source, Table
 
 
