@@ -1,4 +1,4 @@
-"""Checks of arguments: each refuses what is none of a kind, and says what was given and what to give instead."""
+"""Checks of arguments: each raises ParameterError with the given value and a description of valid ones."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ __all__ = [
 ]
 
 TINY = math.ulp(0.0)
-"""The least positive number."""
+"""Least positive number."""
 
 _SHOWN = 120
-"""Characters of a value that a message shows."""
+"""Largest number of characters of a value in a message."""
 
 
 def shown(value: object) -> str:
-    """Return a value as a message shows it: as it is written, or its kind where that is long.
+    """Return the representation of a value for a message, or its type if that is long.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def refused(name: str, value: object, remedy: str) -> ParameterError:
 
 
 def as_number(value: Any) -> float | None:
-    """Return a real number as such; None of a truth value, of words, of complex numbers, and of several numbers.
+    """Return a real number as a float; None for a truth value, text, a complex number, or several numbers.
 
     Examples
     --------
@@ -84,7 +84,7 @@ def as_number(value: Any) -> float | None:
 
 
 def as_numbers(values: Any) -> NDArray[np.float64] | None:
-    """Return real numbers as an array of their shape; None if one of them is something else.
+    """Return real numbers as an array of their shape; None if one of them is not a real number.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def check_numbers(
     least: float = -math.inf,
     most: float = math.inf,
 ) -> NDArray[np.float64]:
-    """Return finite numbers from `least` to `most` as an array; a size None in its shape stands for one or more.
+    """Return finite numbers from `least` to `most` as an array; None in its shape stands for any size above 0.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def _is_of(shape: Sequence[int | None], sizes: Sequence[int]) -> bool:
 
 
 def check_pivots(name: str, values: Any) -> list[tuple[float, float]]:
-    """Return pivots: one, or several, as pairs of finite numbers.
+    """Return one or several pivots as pairs of finite numbers.
 
     Examples
     --------
@@ -179,12 +179,12 @@ def check_positive(name: str, value: Any, remedy: str = "give a positive number"
 def check_probability(
     name: str, value: Any, remedy: str = "give a number between 0 and 1, like 0.95", *, below: float = 1.0
 ) -> float:
-    """Return a number between 0 and `below`, neither of which it is."""
+    """Return a number between 0 and `below`, exclusive."""
     return check_number(name, value, remedy, least=TINY, most=math.nextafter(below, 0.0))
 
 
 def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, most: float = math.inf) -> int:
-    """Return a whole number from `least` to `most`, which no truth value is.
+    """Return a whole number from `least` to `most`; a truth value is refused.
 
     Examples
     --------
@@ -197,12 +197,12 @@ def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, m
 
 
 def check_seed(value: Any, remedy: str = "") -> int:
-    """Return a whole number from 0 up, by which random numbers are drawn."""
+    """Return a whole number from 0 up, the seed of random numbers."""
     return check_whole_number("seed", value, 0, remedy)
 
 
 def check_choice(name: str, value: Any, choices: Collection[str], remedy: str = "") -> str:
-    """Return one of several words.
+    """Return a word if it is one of the choices.
 
     Examples
     --------
@@ -218,13 +218,13 @@ def check_choice(name: str, value: Any, choices: Collection[str], remedy: str = 
 
 
 def check_kind(name: str, value: Any, kind: type, remedy: str) -> None:
-    """Refuse what is no object of a class."""
+    """Refuse a value that is not an instance of a class."""
     if not isinstance(value, kind):
         raise refused(name, value, remedy)
 
 
 def check_optional(name: str, value: Any, kind: type, remedy: str = "") -> None:
-    """Refuse what is neither an object of a class nor None."""
+    """Refuse a value that is neither an instance of a class nor None."""
     if value is not None:
         check_kind(name, value, kind, f"{remedy or f'give a {kind.__name__}'}, or None")
 
@@ -237,13 +237,13 @@ def check_switch(name: str, value: Any) -> bool:
 
 
 def check_function(name: str, value: Any) -> None:
-    """Refuse what cannot be called, except None."""
+    """Refuse a value that is neither callable nor None."""
     if value is not None and not callable(value):
         raise refused(name, value, "give a function, or None")
 
 
 def check_names(name: str, values: Any) -> list[str]:
-    """Return several names.
+    """Return a list of names.
 
     Examples
     --------
@@ -264,15 +264,15 @@ def check_names(name: str, values: Any) -> list[str]:
 
 
 def check_mapping(name: str, values: Any, remedy: str) -> None:
-    """Refuse what is no mapping from names, except None."""
-    is_dataset = hasattr(values, "data_vars")  # which maps names, too, but to columns
+    """Refuse a value that is neither a mapping with names as keys nor None."""
+    is_dataset = hasattr(values, "data_vars")  # a mapping too, but of columns
     is_mapping = isinstance(values, Mapping) and not is_dataset and all(isinstance(key, str) for key in values)
     if values is not None and not is_mapping:
         raise refused(name, values, remedy)
 
 
 def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.csv'") -> Path:
-    """Return what names a file or a folder.
+    """Return the path of a file or a folder.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Laws: how a number differs from record to record of a data set."""
+"""Distributions of the numbers that differ from record to record of a data set."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ __all__ = ["Distribution", "distribution_of"]
 
 
 class _Kind(NamedTuple):
-    """A law of two numbers."""
+    """A distribution with two parameters."""
 
     is_possible: Callable[[float, float], bool]
     rule: str
-    """What they must be."""
+    """Rule for the two numbers, for messages."""
     text: str
     at: Callable[[float, float, Floats], Any]
-    """The numbers at shares of the probability."""
+    """Quantile function."""
 
 
 _KINDS = {
@@ -59,23 +59,23 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Distribution:
-    """A number for each record: always the same, drawn, or one after the other of a list.
+    """A number for each record: constant, drawn, or from a list in turn.
 
     Parameters
     ----------
     kind : {"constant", "uniform", "log_uniform", "normal", "log_normal", "choice", "each"}
-        Constant: the number. Uniform and log_uniform: between two. Normal: mean and standard deviation; log_normal:
-        median, and standard deviation of the natural logarithm. Choice: one of a list, each as likely. Each: the
-        list's numbers in turn, every one together with every one of the specification's other lists, but for those on
-        the same axis, which advance in step.
+        Constant: the number. Uniform and log_uniform: the two limits. Normal: mean and standard deviation; log_normal:
+        median, and standard deviation of the natural logarithm. Choice: one of a list with equal probabilities. Each:
+        the numbers of the list in turn, in all combinations with the specification's other lists, except those on the
+        same axis, which advance in step.
     numbers : tuple of float
-        What the kind wants.
+        Parameters of the kind.
     """
 
     kind: str
     numbers: tuple[float, ...]
     axis: str | None = None
-    """Of lists only."""
+    """Axis of a list."""
 
     @property
     def is_drawn(self) -> bool:
@@ -83,14 +83,14 @@ class Distribution:
 
     @property
     def least(self) -> float:
-        """The least number that it may give; the median of a log_normal one, which is positive throughout."""
+        """Least possible number; for log_normal, which is always positive, the median."""
         if self.kind == "normal" and self.numbers[1]:
             return -math.inf
         return self.numbers[0] if self.kind in ("normal", "log_normal") else min(self.numbers)
 
     @property
     def text(self) -> str:
-        """For people."""
+        """Description of the distribution."""
         numbers = [f"{number:g}" for number in self.numbers]
         if self.kind == "choice":
             return f"one of {', '.join(numbers)}"
@@ -99,7 +99,7 @@ class Distribution:
         return _KINDS[self.kind].text.format(*numbers) if self.kind in _KINDS else numbers[0]
 
     def at(self, share: Floats, turn: NDArray[np.intp]) -> Floats:
-        """The numbers at shares of the probability, in [0, 1), of records whose turn in the list is given."""
+        """Return the quantiles at probabilities in [0, 1), for records with given positions in the list."""
         if self.kind == "choice":
             return np.array(self.numbers)[(share * len(self.numbers)).astype(np.intp)]
         if self.kind == "each":
@@ -111,12 +111,12 @@ class Distribution:
 
 
 def distribution_of(value: Any, key: str) -> Distribution:
-    """The law that a value of a specification states; `key` names it in refusals.
+    """Parse the distribution that a value of a specification states; messages name it by `key`.
 
     Raises
     ------
     SpecificationError
-        If it states none.
+        If the value is not a distribution.
 
     Examples
     --------
@@ -153,5 +153,5 @@ def _is_number(value: Any) -> bool:
 
 
 def _open(share: Floats) -> Floats:
-    """Shares away from 0, where a normal number would be infinite."""
+    """Bound probabilities away from 0, where a normal quantile would be infinite."""
     return np.maximum(share, 2.0**-54)

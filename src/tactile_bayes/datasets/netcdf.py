@@ -1,4 +1,4 @@
-"""NetCDF of plain numbers: what is around them is made once for all files that differ in the numbers alone."""
+"""NetCDF of plain numbers: the structure is made once for all files that differ in the numbers only."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
 
 
 def netcdf_of(dataset: xr.Dataset) -> list[memoryview]:
-    """Return a dataset of numbers as NetCDF 4: HDF5 with dimension scales, as the format's specification has it.
+    """Return a dataset of numbers as NetCDF 4: HDF5 with dimension scales, as the specification of the format defines.
 
-    It is made in memory: HDF5 that cannot write on, as when the disk is full, takes the process with it. The same
-    dataset gives the same bytes with the same libraries.
+    It is made in memory, since HDF5 aborts the process if it cannot write, as on a full disk. The same dataset gives
+    the same bytes with the same libraries.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def netcdf_of(dataset: xr.Dataset) -> list[memoryview]:
     Returns
     -------
     list of memoryview
-        What a file of it contains, one after the other. The numbers are not copied.
+        Parts of the file, in order. The numbers are not copied.
     """
     found = []
     for before, name in _frame(_Template(dataset)):
@@ -41,7 +41,7 @@ def netcdf_of(dataset: xr.Dataset) -> list[memoryview]:
 
 
 class _Template:
-    """A dataset without its numbers, equal to any other that differs in them alone."""
+    """A dataset without its numbers, equal to any other that differs in them only."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self.sizes, self.attrs = dict(dataset.sizes), dict(dataset.attrs)
@@ -58,8 +58,8 @@ class _Template:
 
 @lru_cache(maxsize=2)
 def _frame(template: _Template) -> Sequence[tuple[memoryview, str | None]]:
-    """Return what comes before the numbers of each variable, in the order of the file, and what comes at the end."""
-    name_in_memory = f"{id(template)}.nc"  # those that are made at a time by several threads need different ones
+    """Return the bytes before the numbers of each variable, in the order of the file, and the bytes at the end."""
+    name_in_memory = f"{id(template)}.nc"  # files made by several threads at a time need different names
     with h5py.File(name_in_memory, "w", driver="core", backing_store=False, block_size=2**20, track_order=True) as file:
         for name, size in template.sizes.items():
             if name not in template.variables:
