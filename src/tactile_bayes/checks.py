@@ -59,9 +59,9 @@ def shown(value: object) -> str:
     return f"a {type(value).__name__}" + (f" of shape {shape}" if isinstance(shape, tuple) else "")
 
 
-def refused(name: str, value: object, remedy: str) -> ParameterError:
+def refused(name: str, value: object, correction: str) -> ParameterError:
     """Return the error that refuses an argument."""
-    return ParameterError(f"{name} is {shown(value)}: {remedy}")
+    return ParameterError(f"{name} is {shown(value)}: {correction}")
 
 
 def as_number(value: Any) -> float | None:
@@ -105,7 +105,7 @@ def as_numbers(values: Any) -> NDArray[np.float64] | None:
 
 
 def check_number(
-    name: str, value: Any, remedy: str = "give a finite number", *, least: float = -math.inf, most: float = math.inf
+    name: str, value: Any, correction: str = "give a finite number", *, least: float = -math.inf, most: float = math.inf
 ) -> float:
     """Return a finite number from `least` to `most`.
 
@@ -118,14 +118,14 @@ def check_number(
     """
     number = as_number(value)
     if number is None or not (math.isfinite(number) and least <= number <= most):
-        raise refused(name, value, remedy)
+        raise refused(name, value, correction)
     return number
 
 
 def check_numbers(
     name: str,
     values: Any,
-    remedy: str = "give finite numbers",
+    correction: str = "give finite numbers",
     *,
     shape: Sequence[int | None] | None = None,
     least: float = -math.inf,
@@ -144,9 +144,9 @@ def check_numbers(
     """
     numbers = as_numbers(values)
     if numbers is None or not (np.isfinite(numbers) & (least <= numbers) & (numbers <= most)).all():
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
     if shape is not None and not _is_of(shape, numbers.shape):
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
     return numbers
 
 
@@ -164,26 +164,26 @@ def check_pivots(name: str, values: Any) -> list[tuple[float, float]]:
     >>> check_pivots("base", (0, 1)), check_pivots("base", [(0, 1), (2, 1)])
     ([(0.0, 1.0)], [(0.0, 1.0), (2.0, 1.0)])
     """
-    remedy = "give a pivot (x, y), or several: [(x, y), (x, y)]"
-    numbers = np.atleast_2d(check_numbers(name, values, remedy))
+    correction = "give a pivot (x, y), or several: [(x, y), (x, y)]"
+    numbers = np.atleast_2d(check_numbers(name, values, correction))
     if not _is_of((None, 2), numbers.shape):
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
     return [(float(x), float(y)) for x, y in numbers]
 
 
-def check_positive(name: str, value: Any, remedy: str = "give a positive number") -> float:
+def check_positive(name: str, value: Any, correction: str = "give a positive number") -> float:
     """Return a finite number above zero."""
-    return check_number(name, value, remedy, least=TINY)
+    return check_number(name, value, correction, least=TINY)
 
 
 def check_probability(
-    name: str, value: Any, remedy: str = "give a number between 0 and 1, like 0.95", *, below: float = 1.0
+    name: str, value: Any, correction: str = "give a number between 0 and 1, like 0.95", *, below: float = 1.0
 ) -> float:
     """Return a number between 0 and `below`, exclusive."""
-    return check_number(name, value, remedy, least=TINY, most=math.nextafter(below, 0.0))
+    return check_number(name, value, correction, least=TINY, most=math.nextafter(below, 0.0))
 
 
-def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, most: float = math.inf) -> int:
+def check_whole_number(name: str, value: Any, least: int, correction: str = "", *, most: float = math.inf) -> int:
     """Return a whole number from `least` to `most`; a truth value is refused.
 
     Examples
@@ -192,16 +192,16 @@ def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, m
     4
     """
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise refused(name, value, remedy or f"give a whole number from {least} up")
+        raise refused(name, value, correction or f"give a whole number from {least} up")
     return int(value)
 
 
-def check_seed(value: Any, remedy: str = "") -> int:
+def check_seed(value: Any, correction: str = "") -> int:
     """Return a whole number from 0 up, the seed of random numbers."""
-    return check_whole_number("seed", value, 0, remedy)
+    return check_whole_number("seed", value, 0, correction)
 
 
-def check_choice(name: str, value: Any, choices: Collection[str], remedy: str = "") -> str:
+def check_choice(name: str, value: Any, choices: Collection[str], correction: str = "") -> str:
     """Return a word if it is one of the choices.
 
     Examples
@@ -214,19 +214,19 @@ def check_choice(name: str, value: Any, choices: Collection[str], remedy: str = 
     if isinstance(value, str) and value in choices:
         return value
     *others, last = map(repr, choices)
-    raise refused(name, value, remedy or f"choose {', '.join(others)} or {last}")
+    raise refused(name, value, correction or f"choose {', '.join(others)} or {last}")
 
 
-def check_kind(name: str, value: Any, kind: type, remedy: str) -> None:
+def check_kind(name: str, value: Any, kind: type, correction: str) -> None:
     """Refuse a value that is not an instance of a class."""
     if not isinstance(value, kind):
-        raise refused(name, value, remedy)
+        raise refused(name, value, correction)
 
 
-def check_optional(name: str, value: Any, kind: type, remedy: str = "") -> None:
+def check_optional(name: str, value: Any, kind: type, correction: str = "") -> None:
     """Refuse a value that is neither an instance of a class nor None."""
     if value is not None:
-        check_kind(name, value, kind, f"{remedy or f'give a {kind.__name__}'}, or None")
+        check_kind(name, value, kind, f"{correction or f'give a {kind.__name__}'}, or None")
 
 
 def check_switch(name: str, value: Any) -> bool:
@@ -263,15 +263,15 @@ def check_names(name: str, values: Any) -> list[str]:
     return list(listed)
 
 
-def check_mapping(name: str, values: Any, remedy: str) -> None:
+def check_mapping(name: str, values: Any, correction: str) -> None:
     """Refuse a value that is neither a mapping with names as keys nor None."""
     is_dataset = hasattr(values, "data_vars")  # a mapping too, but of columns
     is_mapping = isinstance(values, Mapping) and not is_dataset and all(isinstance(key, str) for key in values)
     if values is not None and not is_mapping:
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
 
 
-def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.csv'") -> Path:
+def check_path(name: str, value: Any, correction: str = "give a path, like 'record.csv'") -> Path:
     """Return the path of a file or a folder.
 
     Examples
@@ -281,7 +281,7 @@ def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.c
     ...
     tactile_bayes.errors.ParameterError: path is 3: give a path, like 'record.csv'
     """
-    words = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
-    if not isinstance(words, str) or not words or "\0" in words:
-        raise refused(name, value, remedy)
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise refused(name, value, correction)
     return Path(value)

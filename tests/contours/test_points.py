@@ -326,7 +326,7 @@ X = np.linspace(-1.0, 1.0, 20)
         (X, 0.0 * X, None, "on a straight line"),
         (X, 0.1 + 0.3 * X, None, "on a straight line"),
         (X, 0.1 + 0.3 * X, 0.01, "on a straight line"),
-        (X, 0.01 * X**2, 0.1, "cannot be told from a straight line"),
+        (X, 0.01 * X**2, 0.1, "cannot be distinguished from a straight line"),
         (X, -(X**2), None, "upside down.* above the pivot; .* mirror y"),
         (X, -np.cosh(X), 0.01, "upside down"),
     ],

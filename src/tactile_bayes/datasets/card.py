@@ -158,8 +158,8 @@ def _not_in_the_files(spec: Specification) -> list[str]:
     lines = []
     if any(name.startswith(("bias_uncertainty", "random_walk", "ornstein_uhlenbeck")) for name in spec.load_cell):
         lines += [
-            "What a record's drift and its unknown bias came to is not kept: only readings minus true loads tell, with "
-            "the noise in them.",
+            "The drift and the unknown bias of a record are not stored: readings minus true loads contain them, with "
+            "the noise.",
             "",
         ]
     if spec.single and any(name.endswith("_range") for name in spec.load_cell):

@@ -72,7 +72,7 @@ _NO_CONTOUR = "no contour"
 
 _HIGHER = "raise the contours above the pivots, by a larger q or lower bases"
 _WIDER = "give wider contours, or bring the pivots nearer to them, or to their middle"
-_REMEDIES = {
+_CORRECTIONS = {
     "out of reach": "bring contours and pivots closer to one another (are contours, bases and rod in one unit?)",
     "cuts the pivot": _HIGHER,
     "first touched beyond its end": _WIDER,
@@ -191,10 +191,10 @@ def _shares(stream: np.random.Generator, count: int) -> Floats:
 def _hopeless(record: int, reasons: Counter[str]) -> SpecificationError:
     found = reasons.most_common()
     commonest = found[0][0]
-    remedy = next(remedy for reason, remedy in _REMEDIES.items() if commonest.startswith(reason))
+    correction = next(correction for reason, correction in _CORRECTIONS.items() if commonest.startswith(reason))
     return SpecificationError(
         f"record {record} was drawn {_MOST_DRAWS} times, and no contour was one that every sweep can reach "
-        f"({', '.join(f'{count} {why}' for why, count in found)}): {remedy}"
+        f"({', '.join(f'{count} {why}' for why, count in found)}): {correction}"
     )
 
 

@@ -23,7 +23,7 @@ MANIFEST = "manifest.json"
 
 _FORMAT = 2
 """Version of the format; version 1 had other random numbers for the same seed."""
-_REMEDY = (
+_CORRECTION = (
     "put a copy of it back, or run dataset generate with the same specification into another folder, which makes the "
     "same files again"
 )
@@ -118,7 +118,7 @@ def read_manifest(folder: Path) -> Manifest:
         table = json.loads(content)
         table.pop("sha256")
         if content != _content(table):
-            raise SpecificationError(f"{path} is not as it was written, its own checksum differs: {_REMEDY}")
+            raise SpecificationError(f"{path} is not as it was written, its own checksum differs: {_CORRECTION}")
         if table["format"] != _FORMAT:
             raise SpecificationError(
                 f"{path} has format {table['format']}, and this version reads format {_FORMAT}: take the version that "
@@ -128,12 +128,12 @@ def read_manifest(folder: Path) -> Manifest:
         rest = {name: table[name] for name in Manifest.__dataclass_fields__ if name != "shards"}
         return Manifest(**rest, shards=shards)
     except (FileNotFoundError, NotADirectoryError):
-        lost = f", but shards: {_REMEDY}" if any(folder.glob("shard-*.nc")) else ""
+        lost = f", but shards: {_CORRECTION}" if any(folder.glob("shard-*.nc")) else ""
         raise SpecificationError(f"{folder} holds no data set: there is no {MANIFEST}{lost}") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, SpecificationError):
             raise
-        raise SpecificationError(f"{path} is no manifest of a data set ({error}): {_REMEDY}") from error
+        raise SpecificationError(f"{path} is no manifest of a data set ({error}): {_CORRECTION}") from error
 
 
 def _content(table: Mapping[str, Any]) -> bytes:

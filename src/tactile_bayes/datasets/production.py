@@ -185,10 +185,12 @@ def _other(manifest: Manifest, spec: Specification, folder: Path) -> Specificati
     named = [f"{key} {_described(there)} there and {_described(here)} here" for key, there, here in found[:_MOST_NAMED]]
     named += [f"{len(found) - _MOST_NAMED} more"] if len(found) > _MOST_NAMED else []
     name = "" if manifest.name == UNNAMED else f" ({manifest.name!r})"
-    remedy = "choose another folder, or give the specification that its manifest states"
+    correction = "choose another folder, or give the specification that its manifest states"
     if [key for key, _, _ in found] == ["records"]:
-        remedy = "a data set does not grow: choose another folder, where the first records will be the same"
-    return SpecificationError(f"{folder} holds a data set of another specification{name}, {', '.join(named)}: {remedy}")
+        correction = "a data set does not grow: choose another folder, where the first records will be the same"
+    return SpecificationError(
+        f"{folder} holds a data set of another specification{name}, {', '.join(named)}: {correction}"
+    )
 
 
 def _described(value: Any) -> str:

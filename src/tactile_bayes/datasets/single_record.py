@@ -131,8 +131,8 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
         if variable.dims == ("sweep", "sample"):
             if truth or not name.startswith("truth_"):
                 values = variable.values.ravel()
-                words = str(variable.attrs.get("flag_meanings", "")).split()
-                columns[name] = np.array(words)[values] if words else values.astype(np.float64)
+                names = str(variable.attrs.get("flag_meanings", "")).split()
+                columns[name] = np.array(names)[values] if names else values.astype(np.float64)
         elif variable.dims == () and name.startswith(("truth_contour_", "load_cell_")) and np.isfinite(variable.values):
             attrs[name] = float(variable)
     if spec.single:

@@ -298,8 +298,8 @@ def left_out(family: Family) -> dict[str, Any]:
 
 def rule_of(error: ContourError) -> str:
     """Return the rule that an error states, without the values, so that errors can be counted by rule."""
-    words = str(error).partition("; found ")[0]
-    return words.partition(": ")[2] or words
+    message = str(error).partition("; found ")[0]
+    return message.partition(": ")[2] or message
 
 
 def _specification(table: Mapping[str, Any], text: str) -> Specification:
@@ -376,15 +376,15 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
 def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
     """Refuse parameters of earlier versions, and name the new ones."""
     for side, flank in sides_of(name).items():
-        old, new, remedy = _REPLACED.get(flank, ("", "", ""))
+        old, new, correction = _REPLACED.get(flank, ("", "", ""))
         if not old or side + old not in group:
             continue
         a, n = as_number(group[side + old]), as_number(group.get(f"{side}n"))
         if flank == "power-law" and a is not None and n is not None and a > 0.0 and n > 1.0:
-            remedy += f", here {a ** (1.0 / (1.0 - n)):.12g}"
+            correction += f", here {a ** (1.0 / (1.0 - n)):.12g}"
         raise SpecificationError(
             f"{key}.{side}{old} was a parameter of the family {flank} in earlier versions: write {side}{new} in its "
-            f"place, {remedy}"
+            f"place, {correction}"
         )
 
 

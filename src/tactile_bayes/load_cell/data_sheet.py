@@ -53,7 +53,7 @@ _SEVERAL: dict[str, tuple[str, ...]] = {
 """Names of the numbers of each entry with several numbers."""
 
 _OF_CHANNELS = f"give three finite numbers ({', '.join(CHANNELS)})"
-_REMEDIES = {
+_CORRECTIONS = {
     "bias": _OF_CHANNELS,
     "bias_uncertainty": _OF_CHANNELS,
     "gain": "give three rows of three numbers, ((1, 0, 0), (0, 1, 0), (0, 0, 1)) being that of an ideal cell",
@@ -99,7 +99,7 @@ class DataSheet:
             object.__setattr__(self, name, self._number(name))
         for name, names in _SEVERAL.items():
             shape = (3, 3) if name == "gain" else (len(names),)
-            numbers = check_numbers(f"the load cell's {name}", getattr(self, name), _REMEDIES[name], shape=shape)
+            numbers = check_numbers(f"the load cell's {name}", getattr(self, name), _CORRECTIONS[name], shape=shape)
             rows = map(tuple, numbers.tolist()) if name == "gain" else numbers.tolist()
             object.__setattr__(self, name, tuple(rows))
         self._refuse_the_impossible()
@@ -108,12 +108,12 @@ class DataSheet:
 
     def _number(self, name: str) -> float:
         """Return a scalar entry; only a range and degrees of freedom may be infinite."""
-        value, what, remedy = getattr(self, name), f"the load cell's {name}", _REMEDIES[name]
+        value, what, correction = getattr(self, name), f"the load cell's {name}", _CORRECTIONS[name]
         if as_number(value) is None:
             raise refused(what, value, "give a number")
         if name.endswith(("_range", "_freedom")):
-            return math.inf if value == math.inf else check_positive(what, value, remedy)
-        return check_number(what, value, remedy, least=-math.inf if remedy.startswith("give an angle") else 0.0)
+            return math.inf if value == math.inf else check_positive(what, value, correction)
+        return check_number(what, value, correction, least=-math.inf if correction.startswith("give an angle") else 0.0)
 
     def _refuse_the_impossible(self) -> None:
         for channel in ("force", "moment"):
@@ -124,15 +124,15 @@ class DataSheet:
                     "the step of a reading, and the largest reading, in the same unit"
                 )
         if min(self.bias_uncertainty) < 0.0:
-            remedy = "give three standard deviations, each zero or positive"
-            raise refused("the load cell's bias_uncertainty", self.bias_uncertainty, remedy)
+            correction = "give three standard deviations, each zero or positive"
+            raise refused("the load cell's bias_uncertainty", self.bias_uncertainty, correction)
         if np.linalg.eigvalsh(self.correlation_matrix)[0] <= 1e-9:
             between = ", ".join(" and ".join(pair) for pair in _PAIRS)
-            remedy = f"no noise has these coefficients between {between}: give smaller ones"
-            raise refused("the load cell's correlation", self.correlation, remedy)
+            correction = f"no noise has these coefficients between {between}: give smaller ones"
+            raise refused("the load cell's correlation", self.correlation, correction)
         if np.linalg.cond(np.array(self.gain)) > 1e9:
-            remedy = "such a cell cannot tell three loads apart: give rows that are independent, like (1, 0, 0)"
-            raise refused("the load cell's gain", self.gain, remedy)
+            correction = "such a cell cannot tell three loads apart: give rows that are independent, like (1, 0, 0)"
+            raise refused("the load cell's gain", self.gain, correction)
         if self.drift is not None and not isinstance(self.drift, RandomWalk | OrnsteinUhlenbeck):
             raise refused("the load cell's drift", self.drift, "give RandomWalk(...) or OrnsteinUhlenbeck(...)")
         if self.frame is not None:

@@ -243,14 +243,14 @@ def _labelled(
         "p_value": ("sweep", [of_sweep.p_value for of_sweep in bounds], {"long_name": "p-value of no contact"}),
         "unloaded": ("sample", unloaded, {"long_name": "whether the sample is unloaded"}),
     }
-    for name, words in (("onset", "first contact"), ("snap_off", "snap-off")):
+    for name, event in (("onset", "first contact"), ("snap_off", "snap-off")):
         inside = [getattr(of_sweep, name) for of_sweep in bounds]
         sample = np.array(
             [[-1 if i < 0 else int(rows[i]) for i in pair] for rows, pair in zip(sweeps, inside, strict=True)]
         )
         dims = ("sweep", "side")
-        variables[name] = (dims, sample, {"long_name": f"samples beside {words}"})
-        attrs = {"units": "rad", "long_name": f"drive angles beside {words}"}
+        variables[name] = (dims, sample, {"long_name": f"samples beside {event}"})
+        attrs = {"units": "rad", "long_name": f"drive angles beside {event}"}
         variables[f"{name}_drive_angle"] = (dims, np.where(sample < 0, np.nan, angle[sample]), attrs)
     for name, values in statistics.items():
         of_all = np.full(len(CHANNELS), np.nan)

@@ -53,8 +53,17 @@ class Samples(NamedTuple):
 def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: float = 0.0) -> Samples:
     """Samples of a valid record with all load channels.
 
-    With a compliance of the suspension [rad per unit of moment of the record] the pivot turns under the moment, so that
-    the rod's slope differs from the drive angle, with which the load cell may turn.
+    With a compliant suspension the pivot turns under the moment, so that the rod's slope differs from the drive angle,
+    with which the load cell may turn.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    cell : LoadCell
+        Load cell in the record's units.
+    suspension_compliance : float
+        Turn of the suspension per holding moment [rad per unit of moment of the record].
 
     Raises
     ------
@@ -83,7 +92,9 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         covariance = np.zeros((1, 3, 3))
         if has_noise:
             inverse = np.linalg.inv(cell.gain_matrix)
-            for_covariance = loads if cell.relative_noise or cell.drift is not None else loads[:1]  # or all are alike
+            for_covariance = (
+                loads if cell.relative_noise or cell.drift is not None else loads[:1]
+            )  # otherwise all are equal
             covariance = inverse @ cell.covariance(for_covariance) @ inverse.T
         leaning = np.zeros(loads.shape)
         if frame_of(measured) == "turning":

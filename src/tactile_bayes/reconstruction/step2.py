@@ -157,8 +157,8 @@ def reconstruct(
     measured = with_rod(validate(measured), rod)
     check_number("suspension_compliance", suspension_compliance, "give a number from 0 up", least=0.0)
     if suspension_compliance * float(np.abs(np.nan_to_num(measured.holding_moment.values)).max()) > 2.0 * np.pi:
-        remedy = "with such moments the pivot would give way by more than a turn: give radians per moment"
-        raise refused("suspension_compliance", suspension_compliance, remedy)
+        correction = "with such moments the pivot would give way by more than a turn: give radians per moment"
+        raise refused("suspension_compliance", suspension_compliance, correction)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     measured, doubtful = _with_likelier_sides(measured, cell, suspension_compliance, friction)
     samples = samples_of(measured, cell, suspension_compliance)

@@ -23,7 +23,7 @@ _BINARY = {
     ),
     b"PK\x03\x04": f"a workbook of a spreadsheet, or another zip archive: {_SAVE}",
 }
-_MARKS = {  # the longer one first, which begins like the shorter one
+_MARKS = {  # a longer mark precedes a shorter one with the same beginning
     codecs.BOM_UTF32_LE: "UTF-32",
     codecs.BOM_UTF32_BE: "UTF-32",
     codecs.BOM_UTF16_LE: "UTF-16",

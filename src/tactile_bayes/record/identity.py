@@ -62,6 +62,6 @@ def record_hash(record: xr.Dataset) -> str:
             add("\n".join(values.tolist()).encode())
         elif COLUMNS[name].kind == "integer":
             add(values.astype("<i8").tobytes())
-        else:  # one NaN for all, whatever its bits
+        else:  # all NaN have the same bits
             add(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
     return digest.hexdigest()

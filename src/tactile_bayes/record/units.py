@@ -45,7 +45,7 @@ def rod_of(record: xr.Dataset) -> Rod:
 
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
-    """Replace the rod that a record states.
+    """Replace the rod that a record states, without a change of its values.
 
     Parameters
     ----------
@@ -53,6 +53,10 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
         A record.
     rod : Rod, optional
         Rod in the units of the record; by default the record is returned unchanged.
+
+    Returns
+    -------
+    xr.Dataset
 
     Raises
     ------
@@ -79,6 +83,10 @@ def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
     ----------
     record : xr.Dataset
         A record. If it is dimensionless, it is returned unchanged.
+
+    Returns
+    -------
+    xr.Dataset
 
     Raises
     ------
@@ -107,6 +115,10 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
         A dimensionless record, or an SI record with the same rod.
     rod : Rod
         Rod with length [m] and flexural rigidity [N m²]; its diameter must be that of the record's rod.
+
+    Returns
+    -------
+    xr.Dataset
 
     Raises
     ------

@@ -84,10 +84,10 @@ def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod
     # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
     wrench = _at_rest_first(states, bool(to_tip[0]))
     columns = to_lab_frame(paths.sweep_frame, index, states._replace(wrench=wrench), rod)
-    words = ["tip" if tip else "tangential" for tip in to_tip]
+    phases = ["tip" if tip else "tangential" for tip in to_tip]
     kinds = [
-        words[0],
-        *(f"{before} → {after}" for before, after in pairwise(words)),
+        phases[0],
+        *(f"{before} → {after}" for before, after in pairwise(phases)),
         SnapOff(int(paths.snap_off[0])).name.lower(),
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]

@@ -108,5 +108,5 @@ def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direc
 def friction_angle_of(friction: float) -> float:
     """Friction angle arctan μ [rad]; ParameterError where the map of the rod would fold."""
     most = float(np.tan(MAX_FRICTION_ANGLE))
-    remedy = f"give Coulomb's coefficient, a number from 0 to {most:.2f}"
-    return float(np.arctan(check_number("friction", friction, remedy, least=0.0, most=most)))
+    correction = f"give Coulomb's coefficient, a number from 0 to {most:.2f}"
+    return float(np.arctan(check_number("friction", friction, correction, least=0.0, most=most)))

@@ -141,24 +141,24 @@ def keep_outcomes(
 
 
 def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]:
-    remedy = f"give another folder, or remove {file.name} from it to begin anew"
+    correction = f"give another folder, or remove {file.name} from it to begin anew"
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
         if table["format"] != _FORMAT:
-            raise kind.error(f"{file} has format {table['format']}, this version reads {_FORMAT}: {remedy}")
+            raise kind.error(f"{file} has format {table['format']}, this version reads {_FORMAT}: {correction}")
         there = dict(table["experiment"])
         outcomes = {int(row["number"]): kind.decode(row) for row in table[kind.what]}
     except TactileBayesError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {remedy}") from error
+        raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {correction}") from error
     differ = [name for name in {**there, **identity} if there.get(name) != identity.get(name)]
     if outcomes and differ:
         named = ", ".join(
             f"{name} is {_short(there.get(name))} there and {_short(identity.get(name))} here" for name in differ[:3]
         )
         more = f" and {len(differ) - 3} more" if len(differ) > 3 else ""
-        raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {named}{more}; {remedy}")
+        raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {named}{more}; {correction}")
     return outcomes
 
 
