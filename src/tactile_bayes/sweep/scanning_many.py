@@ -119,8 +119,8 @@ def scan_many(
     variables: dict[str, Any] = {"drive_angle": labelled(both, angles, "drive_angle")}
     variables |= {name: labelled(both, values, name) for name, values in samples.items()}
     variables["contact_phase"] = labelled(both, phase, "contact_phase")
-    fates = np.array([one.message for one in Reachability])
-    variables["status"] = ("contour", fates[paths.reach])
+    statuses = np.array([one.message for one in Reachability])
+    variables["status"] = ("contour", statuses[paths.reach])
     with np.errstate(invalid="ignore"):
         variables["clear"] = ("contour", paths.is_clear())
     variables["phases"] = ("contour", np.array(phases_of(paths), dtype=np.str_))
