@@ -108,14 +108,14 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     for lane, stroke in enumerate(likelihood.strokes):
         lanes[stroke.samples] = lane
     lane = lanes[samples]
-    mirrored = paths.seen.mirrored[lane]
+    mirrored = paths.sweep_frame.mirrored[lane]
     misread = cell.misread(record.direction.values) + likelihood.misread(rig)[0]
     angle = (record.drive_angle.values - misread)[samples]
     seen_angle = np.where(mirrored, np.pi - angle, angle)
     states = paths.states(lane, seen_angle)
     rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
-    world = to_lab_frame(paths.seen, lane, states, units)
+    world = to_lab_frame(paths.sweep_frame, lane, states, units)
     loaded = states.wrench.phase != NONE
     slope = np.where(loaded, states.wrench.drive_angle, seen_angle)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
@@ -126,14 +126,14 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
         contour=contour.take(np.array(0)),
         samples=samples,
         sweep=numbers[samples],
-        rod_x=paths.seen.base_x[lane][:, None] + sign[:, None] * x * rod.length_unit,
-        rod_y=paths.seen.base_y[lane][:, None] + y * rod.length_unit,
+        rod_x=paths.sweep_frame.base_x[lane][:, None] + sign[:, None] * x * rod.length_unit,
+        rod_y=paths.sweep_frame.base_y[lane][:, None] + y * rod.length_unit,
         contact_x=np.where(loaded, world["contact_x"], np.nan),
         contact_y=np.where(loaded, world["contact_y"], np.nan),
         phase=np.array(PHASE_NAMES)[states.wrench.phase],
         drive_angle=np.where(mirrored, np.pi - slope, slope),
         cell_angle=angle,
         loads=np.where(loaded[:, None], loads, 0.0),
-        pivots=np.unique(np.stack([paths.seen.base_x, paths.seen.base_y], axis=-1), axis=0),
+        pivots=np.unique(np.stack([paths.sweep_frame.base_x, paths.sweep_frame.base_y], axis=-1), axis=0),
         every=every,
     )

@@ -19,8 +19,8 @@ from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
-from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
 from tactile_bayes.sweep import to_lab_frame
 
@@ -194,7 +194,7 @@ def contacts_of(
         angles[:, : stroke.samples.size] = np.pi - of_stroke if stroke.backward else of_stroke
     paths = likelihood.paths(contours, rig, exact=exact, drive_angles=seen.reshape(-1, shape[1]))
     lane, rank, states = paths.loaded_states()
-    columns = to_lab_frame(paths.seen, lane, states, likelihood.rod)
+    columns = to_lab_frame(paths.sweep_frame, lane, states, likelihood.rod)
     columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
     out = {name: np.full(read.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}
     for name, values in out.items():
