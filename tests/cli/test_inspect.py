@@ -188,7 +188,7 @@ def test_contact_points_of_a_rigs_file(rig, tmp_path):
     result = call("reconstruct", rig, *READING, "--out", tmp_path)
     assert result.exit_code == 0, result.output
     assert "contact points by the constrained method; samples: " in result.stdout.splitlines()[0]
-    assert "they share an unknown bias, so that no probability is told" in result.stdout
+    assert "they share an unknown bias, so that no probability can be stated" in result.stdout
     assert "No noise is stated: bias and noise are taken from the unloaded samples." in result.stdout
     assert (tmp_path / "contacts.png").read_bytes().startswith(b"\x89PNG\r\n")
     contacts = pd.read_csv(tmp_path / "contacts.csv")

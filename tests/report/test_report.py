@@ -55,7 +55,7 @@ from tactile_bayes.report.page import page_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import hindrances
 from tactile_bayes.report.trust import contacts_words
-from tactile_bayes.runs.reconstruction import reconstruction_in_words
+from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 
@@ -235,7 +235,7 @@ def test_the_gap_is_told_as_far_as_convexity_confines_it_with_uncertain_ends(pag
 def test_the_force_along_the_rod_is_judged_as_by_reconstruct(findings, score):
     contacts = findings.contacts.assign_attrs(axial_score=score)
     said = contacts_words(dataclasses.replace(findings, contacts=contacts))[-1]
-    elsewhere = " ".join(reconstruction_in_words(contacts))
+    elsewhere = " ".join(reconstruction_messages(contacts))
     for words in ("agrees with the moment", "too small", "too large", "as friction makes it", "check the zero"):
         assert (words in said) == (words in elsewhere)
     assert "the friction that was stated" in said
@@ -337,7 +337,7 @@ def test_what_hinders_that_is_said(posterior):
 # --- The moving rod -----------------------------------------------------------------------------------------------
 
 
-def test_the_rod_moves_as_a_scan_of_the_likeliest_contour_has_it(posterior):
+def test_the_rod_moves_as_a_scan_of_the_most_probable_contour_has_it(posterior):
     motion = motion_of(posterior)
     record, rod = record_of(posterior), rod_of(record_of(posterior))
     for number_, direction in ((0, "forward"), (1, "backward")):
@@ -357,7 +357,7 @@ def test_the_rod_moves_as_a_scan_of_the_likeliest_contour_has_it(posterior):
     np.testing.assert_allclose(lengths, rod.length, rtol=2e-3)
 
 
-def test_the_rig_of_the_likeliest_draw_moves_it(posterior):
+def test_the_rig_of_the_most_probable_draw_moves_it(posterior):
     """Against the loads by which the likelihood judges that draw, which are interpolated."""
     rig = {
         "rigidity_scale": 1.05,
@@ -427,7 +427,7 @@ def with_rig(posterior, rig, **attrs):
 
 
 def predicted(tree, rig):
-    """Loads of the likeliest draw by which the likelihood judges the record, shape (samples, 3)."""
+    """Loads of the most probable draw by which the likelihood judges the record, shape (samples, 3)."""
     record = record_of(tree)
     best = posterior_draws(tree).isel(tree["sample_stats"]["lp"].argmax(("chain", "draw")))
     cell, rod = LoadCell.from_record(record), rod_of(record)

@@ -64,7 +64,7 @@ def inspect(
 
 
 def _words(found: Inspection, contents: list[str], again: str, files: Mapping[str, Path]) -> Iterator[Any]:
-    yield from (*found.words, "", *contents, "", _sweeps(found.sweeps), "", _channels(found.channels), "")
+    yield from (*found.messages, "", *contents, "", _sweeps(found.sweeps), "", _channels(found.channels), "")
     if found.statuses:
         yield "Raw Step 2: " + ", ".join(f"{count} {fate}" for fate, count in found.statuses.items())
     else:
@@ -86,7 +86,7 @@ def _as_options(reading: RecordOptions, friction: float) -> str:
 
 def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
     """What is in the file, except its sweeps and channels; origins are what the options say of columns."""
-    from tactile_bayes.diagnostics.inspection.words import quantity
+    from tactile_bayes.diagnostics.inspection.messages import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
     record, rod = found.record, rod_of(found.record)
@@ -149,7 +149,7 @@ def _place(beside: Any) -> str:
 
 def _channels(channels: xr.Dataset) -> Table:
     """Numbers of a channel all in one unit; the last is the correlation of unloaded neighbours."""
-    from tactile_bayes.diagnostics.inspection.words import prefix_of
+    from tactile_bayes.diagnostics.inspection.messages import prefix_of
 
     rows = []
     for row in columns_of(channels, "channel"):
@@ -176,7 +176,7 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
     ):
         row |= {"onset_drive_angle": onset, "snap_off_drive_angle": snap}
     return {
-        "words": found.words,
+        "words": found.messages,
         "is_suspect": found.is_suspect,
         "samples": record.sizes["sample"],
         "columns": [str(name) for name in record.data_vars],
