@@ -57,7 +57,6 @@ _HOMES = {
     "scan": "sweep",
     "scan_many": "sweep",
     "sensitivity": "planning.sensitivity",
-    "suspicions": "diagnostics.units_and_signs",
     "to_arviz": "inference.result",
     "verdicts": "diagnostics.verdicts",
     "write_record": "record",
@@ -81,7 +80,6 @@ if TYPE_CHECKING:
     from tactile_bayes.diagnostics.inspection import inspect_record as inspect_record
     from tactile_bayes.diagnostics.record_check import check_record as check_record
     from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs as check_units_and_signs
-    from tactile_bayes.diagnostics.units_and_signs import suspicions as suspicions
     from tactile_bayes.diagnostics.verdicts import verdicts as verdicts
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour

@@ -118,13 +118,13 @@ def test_json_has_the_same_in_numbers(rig):
     assert answer["files"] == {}
 
 
-def test_what_is_wrong_is_the_first_line_and_is_to_be_mended(rig):
+def test_what_is_wrong_is_the_first_line_and_is_to_be_corrected(rig):
     signs = [word.replace("=-Fx", "=Fx") if isinstance(word, str) else word for word in READING]
     result = call("inspect", rig, *signs)
     assert result.exit_code == 0
     first, *_, last = result.stdout.splitlines()
     assert first.endswith("fit no contact of such a rod: nearly all would if force_x had the other sign.")
-    assert last.startswith("Once that is mended: tactile-bayes infer ")
+    assert last.startswith("Once that is corrected: tactile-bayes infer ")
 
 
 def test_a_rig_that_measures_the_moment_only(measured, tmp_path):

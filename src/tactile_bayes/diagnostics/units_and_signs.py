@@ -11,7 +11,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
-__all__ = ["CHECK_UNITS", "check_units_and_signs", "suspicions"]
+__all__ = ["CHECK_UNITS", "check_units_and_signs"]
 
 _STRONGEST = 100.0
 """Force in EI/L² above which units are doubted: a tangential contact with more is within 0.37 L of the pivot."""
@@ -115,7 +115,3 @@ def _of_size(
 def _largest(values: Floats) -> float:
     """Return the 98 % quantile: the largest value, a few outliers left out."""
     return float(np.quantile(values, 0.98))
-
-
-suspicions = check_units_and_signs
-"""Former name of `check_units_and_signs`, kept for one release."""
