@@ -533,7 +533,7 @@ REFUSALS = {
         ["a", b"ab", {"a": 1}, ["a", 1], None, iter("ab")],
     ),
     "priors": (
-        functools.partial(check_mapping, remedy="give names"),
+        functools.partial(check_mapping, correction="give names"),
         [None, {}, {"q": 1}],
         [{1: 2.0}, [], "q", xr.Dataset()],
     ),

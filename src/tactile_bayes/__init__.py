@@ -7,7 +7,7 @@ Contour → scan → record → load cell → contact points and contour posteri
 >>> measured = tb.LoadCell(force_noise=0.05, moment_noise=0.02).measure(scan.record, seed=1)
 >>> contacts = tb.reconstruct(measured)
 
-Names load when they are first used, so that importing the package is quick.
+Names are loaded when they are first used, so that importing the package is quick.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The types of arrays that every room has."""
+"""Array types for the whole package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of arguments: each refuses what is none of a kind, and says what was given and what to give instead."""
+"""Checks of arguments: each raises ParameterError with the given value and a description of valid ones."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ __all__ = [
 ]
 
 TINY = math.ulp(0.0)
-"""The least positive number."""
+"""Least positive number."""
 
 _SHOWN = 120
-"""Characters of a value that a message shows."""
+"""Largest number of characters of a value in a message."""
 
 
 def shown(value: object) -> str:
-    """Return a value as a message shows it: as it is written, or its kind where that is long.
+    """Return the representation of a value for a message, or its type if that is long.
 
     Examples
     --------
@@ -59,13 +59,13 @@ def shown(value: object) -> str:
     return f"a {type(value).__name__}" + (f" of shape {shape}" if isinstance(shape, tuple) else "")
 
 
-def refused(name: str, value: object, remedy: str) -> ParameterError:
+def refused(name: str, value: object, correction: str) -> ParameterError:
     """Return the error that refuses an argument."""
-    return ParameterError(f"{name} is {shown(value)}: {remedy}")
+    return ParameterError(f"{name} is {shown(value)}: {correction}")
 
 
 def as_number(value: Any) -> float | None:
-    """Return a real number as such; None of a truth value, of words, of complex numbers, and of several numbers.
+    """Return a real number as a float; None for a truth value, text, a complex number, or several numbers.
 
     Examples
     --------
@@ -84,7 +84,7 @@ def as_number(value: Any) -> float | None:
 
 
 def as_numbers(values: Any) -> NDArray[np.float64] | None:
-    """Return real numbers as an array of their shape; None if one of them is something else.
+    """Return real numbers as an array of their shape; None if one of them is not a real number.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def as_numbers(values: Any) -> NDArray[np.float64] | None:
 
 
 def check_number(
-    name: str, value: Any, remedy: str = "give a finite number", *, least: float = -math.inf, most: float = math.inf
+    name: str, value: Any, correction: str = "give a finite number", *, least: float = -math.inf, most: float = math.inf
 ) -> float:
     """Return a finite number from `least` to `most`.
 
@@ -118,20 +118,20 @@ def check_number(
     """
     number = as_number(value)
     if number is None or not (math.isfinite(number) and least <= number <= most):
-        raise refused(name, value, remedy)
+        raise refused(name, value, correction)
     return number
 
 
 def check_numbers(
     name: str,
     values: Any,
-    remedy: str = "give finite numbers",
+    correction: str = "give finite numbers",
     *,
     shape: Sequence[int | None] | None = None,
     least: float = -math.inf,
     most: float = math.inf,
 ) -> NDArray[np.float64]:
-    """Return finite numbers from `least` to `most` as an array; a size None in its shape stands for one or more.
+    """Return finite numbers from `least` to `most` as an array; None in its shape stands for any size above 0.
 
     Examples
     --------
@@ -144,9 +144,9 @@ def check_numbers(
     """
     numbers = as_numbers(values)
     if numbers is None or not (np.isfinite(numbers) & (least <= numbers) & (numbers <= most)).all():
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
     if shape is not None and not _is_of(shape, numbers.shape):
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
     return numbers
 
 
@@ -157,34 +157,34 @@ def _is_of(shape: Sequence[int | None], sizes: Sequence[int]) -> bool:
 
 
 def check_pivots(name: str, values: Any) -> list[tuple[float, float]]:
-    """Return pivots: one, or several, as pairs of finite numbers.
+    """Return one or several pivots as pairs of finite numbers.
 
     Examples
     --------
     >>> check_pivots("base", (0, 1)), check_pivots("base", [(0, 1), (2, 1)])
     ([(0.0, 1.0)], [(0.0, 1.0), (2.0, 1.0)])
     """
-    remedy = "give a pivot (x, y), or several: [(x, y), (x, y)]"
-    numbers = np.atleast_2d(check_numbers(name, values, remedy))
+    correction = "give a pivot (x, y), or several: [(x, y), (x, y)]"
+    numbers = np.atleast_2d(check_numbers(name, values, correction))
     if not _is_of((None, 2), numbers.shape):
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
     return [(float(x), float(y)) for x, y in numbers]
 
 
-def check_positive(name: str, value: Any, remedy: str = "give a positive number") -> float:
+def check_positive(name: str, value: Any, correction: str = "give a positive number") -> float:
     """Return a finite number above zero."""
-    return check_number(name, value, remedy, least=TINY)
+    return check_number(name, value, correction, least=TINY)
 
 
 def check_probability(
-    name: str, value: Any, remedy: str = "give a number between 0 and 1, like 0.95", *, below: float = 1.0
+    name: str, value: Any, correction: str = "give a number between 0 and 1, like 0.95", *, below: float = 1.0
 ) -> float:
-    """Return a number between 0 and `below`, neither of which it is."""
-    return check_number(name, value, remedy, least=TINY, most=math.nextafter(below, 0.0))
+    """Return a number between 0 and `below`, exclusive."""
+    return check_number(name, value, correction, least=TINY, most=math.nextafter(below, 0.0))
 
 
-def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, most: float = math.inf) -> int:
-    """Return a whole number from `least` to `most`, which no truth value is.
+def check_whole_number(name: str, value: Any, least: int, correction: str = "", *, most: float = math.inf) -> int:
+    """Return a whole number from `least` to `most`; a truth value is refused.
 
     Examples
     --------
@@ -192,17 +192,17 @@ def check_whole_number(name: str, value: Any, least: int, remedy: str = "", *, m
     4
     """
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise refused(name, value, remedy or f"give a whole number from {least} up")
+        raise refused(name, value, correction or f"give a whole number from {least} up")
     return int(value)
 
 
-def check_seed(value: Any, remedy: str = "") -> int:
-    """Return a whole number from 0 up, by which random numbers are drawn."""
-    return check_whole_number("seed", value, 0, remedy)
+def check_seed(value: Any, correction: str = "") -> int:
+    """Return a whole number from 0 up, the seed of random numbers."""
+    return check_whole_number("seed", value, 0, correction)
 
 
-def check_choice(name: str, value: Any, choices: Collection[str], remedy: str = "") -> str:
-    """Return one of several words.
+def check_choice(name: str, value: Any, choices: Collection[str], correction: str = "") -> str:
+    """Return a word if it is one of the choices.
 
     Examples
     --------
@@ -214,19 +214,19 @@ def check_choice(name: str, value: Any, choices: Collection[str], remedy: str = 
     if isinstance(value, str) and value in choices:
         return value
     *others, last = map(repr, choices)
-    raise refused(name, value, remedy or f"choose {', '.join(others)} or {last}")
+    raise refused(name, value, correction or f"choose {', '.join(others)} or {last}")
 
 
-def check_kind(name: str, value: Any, kind: type, remedy: str) -> None:
-    """Refuse what is no object of a class."""
+def check_kind(name: str, value: Any, kind: type, correction: str) -> None:
+    """Refuse a value that is not an instance of a class."""
     if not isinstance(value, kind):
-        raise refused(name, value, remedy)
+        raise refused(name, value, correction)
 
 
-def check_optional(name: str, value: Any, kind: type, remedy: str = "") -> None:
-    """Refuse what is neither an object of a class nor None."""
+def check_optional(name: str, value: Any, kind: type, correction: str = "") -> None:
+    """Refuse a value that is neither an instance of a class nor None."""
     if value is not None:
-        check_kind(name, value, kind, f"{remedy or f'give a {kind.__name__}'}, or None")
+        check_kind(name, value, kind, f"{correction or f'give a {kind.__name__}'}, or None")
 
 
 def check_switch(name: str, value: Any) -> bool:
@@ -237,13 +237,13 @@ def check_switch(name: str, value: Any) -> bool:
 
 
 def check_function(name: str, value: Any) -> None:
-    """Refuse what cannot be called, except None."""
+    """Refuse a value that is neither callable nor None."""
     if value is not None and not callable(value):
         raise refused(name, value, "give a function, or None")
 
 
 def check_names(name: str, values: Any) -> list[str]:
-    """Return several names.
+    """Return a list of names.
 
     Examples
     --------
@@ -263,16 +263,16 @@ def check_names(name: str, values: Any) -> list[str]:
     return list(listed)
 
 
-def check_mapping(name: str, values: Any, remedy: str) -> None:
-    """Refuse what is no mapping from names, except None."""
-    is_dataset = hasattr(values, "data_vars")  # which maps names, too, but to columns
+def check_mapping(name: str, values: Any, correction: str) -> None:
+    """Refuse a value that is neither a mapping with names as keys nor None."""
+    is_dataset = hasattr(values, "data_vars")  # a mapping too, but of columns
     is_mapping = isinstance(values, Mapping) and not is_dataset and all(isinstance(key, str) for key in values)
     if values is not None and not is_mapping:
-        raise refused(name, values, remedy)
+        raise refused(name, values, correction)
 
 
-def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.csv'") -> Path:
-    """Return what names a file or a folder.
+def check_path(name: str, value: Any, correction: str = "give a path, like 'record.csv'") -> Path:
+    """Return the path of a file or a folder.
 
     Examples
     --------
@@ -281,7 +281,7 @@ def check_path(name: str, value: Any, remedy: str = "give a path, like 'record.c
     ...
     tactile_bayes.errors.ParameterError: path is 3: give a path, like 'record.csv'
     """
-    words = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
-    if not isinstance(words, str) or not words or "\0" in words:
-        raise refused(name, value, remedy)
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise refused(name, value, correction)
     return Path(value)

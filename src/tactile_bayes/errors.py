@@ -1,4 +1,4 @@
-"""The family of errors and warnings: each says what was wrong, where, and what to do."""
+"""Errors and warnings; each message says what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ __all__ = [
 
 
 class TactileBayesError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base of all errors that this package raises deliberately."""
 
 
 class ParameterError(TactileBayesError, ValueError):
-    """A parameter has a value that it cannot have."""
+    """A parameter has an invalid value."""
 
 
 class ContourError(TactileBayesError, ValueError):
-    """A contour is not strictly convex, cuts the base, or is asked for beyond its end."""
+    """A contour is not strictly convex, cuts the base, or is needed beyond its end."""
 
 
 class ReachError(ContourError):
@@ -45,27 +45,27 @@ class InferenceError(TactileBayesError, RuntimeError):
 
 
 class SpecificationError(TactileBayesError, ValueError):
-    """A specification of a data set is impossible, or a folder holds another data set."""
+    """The specification of a data set is invalid, or a folder contains another data set."""
 
 
 class CalibrationError(TactileBayesError, ValueError):
-    """A folder holds the replicates of another calibration."""
+    """A folder contains the replicates of another calibration."""
 
 
 class StudyError(TactileBayesError, ValueError):
-    """A folder holds the cells of another study, or the candidates of another design."""
+    """A folder contains the cells of another study, or the candidates of another design."""
 
 
 class TaskError(TactileBayesError, RuntimeError):
-    """Processes died over a task again and again."""
+    """Processes died repeatedly over a task."""
 
 
 class TactileBayesWarning(UserWarning):
-    """Base of every warning of this package."""
+    """Base of all warnings of this package."""
 
 
 class ClearanceWarning(TactileBayesWarning):
-    """After snap-off a straight rod would cut the object."""
+    """The straight rod would cut the object after snap-off."""
 
 
 class DriftWarning(TactileBayesWarning):

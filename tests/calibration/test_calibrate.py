@@ -323,7 +323,7 @@ def test_an_interrupt_keeps_what_is_done(noted, tmp_path):
 
 def test_what_is_done_is_noted_on_the_way(noted, tmp_path, monkeypatch):
     """A run that is killed without a word has lost little."""
-    monkeypatch.setattr("tactile_bayes.tasks.ledger._NOTING", 1e9)
+    monkeypatch.setattr("tactile_bayes.tasks.results_store._WRITING_SHARE", 1e9)
     there = []
     quickly(
         replicates=3,

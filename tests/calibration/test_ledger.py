@@ -11,7 +11,7 @@ from helpers.refusals import refused
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.errors import CalibrationError
-from tactile_bayes.tasks import Ledger, files, open_ledger
+from tactile_bayes.tasks import ResultsStore, files, open_results_store
 
 LEDGER = REPLICATES.file
 
@@ -39,7 +39,7 @@ def _values(outcome):
 
 
 def filled(folder, words=WORDS):
-    with open_ledger(words, folder, REPLICATES) as ledger:
+    with open_results_store(words, folder, REPLICATES) as ledger:
         ledger.outcomes.update(ROWS)
     return folder / LEDGER
 
@@ -47,7 +47,7 @@ def filled(folder, words=WORDS):
 def left_alone(folder, *named, words=WORDS):
     """It is refused, and nothing in the folder has changed."""
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    with refused(CalibrationError, *named), open_ledger(words, folder, REPLICATES):
+    with refused(CalibrationError, *named), open_results_store(words, folder, REPLICATES):
         raise AssertionError("the block began")
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
@@ -58,7 +58,7 @@ def left_alone(folder, *named, words=WORDS):
 def test_what_is_written_is_read(tmp_path):
     file = filled(tmp_path / "made" / "on the way")
     assert [path.name for path in file.parent.iterdir()] == [LEDGER]
-    with open_ledger(WORDS, file.parent, REPLICATES) as ledger:
+    with open_results_store(WORDS, file.parent, REPLICATES) as ledger:
         assert list(ledger.outcomes) == sorted(ROWS)
         assert all(equal(ledger.outcomes[number], row) for number, row in ROWS.items())
         assert all(type(rank) is int for row in ledger.outcomes.values() for rank in row.ranks.values())
@@ -81,21 +81,21 @@ def test_a_ledger_without_tracebacks_is_read(tmp_path):
     table = json.loads(file.read_text(encoding="utf-8"))
     assert [row.pop("traceback", None) is not None for row in table["replicates"]] == [True, False, False]
     file.write_text(json.dumps(table), encoding="utf-8")
-    outcomes = Ledger(WORDS, tmp_path, REPLICATES).outcomes
+    outcomes = ResultsStore(WORDS, tmp_path, REPLICATES).outcomes
     assert all(equal(outcomes[number], row._replace(traceback="")) for number, row in ROWS.items())
     assert [outcomes[number].is_lost for number in (0, 3, 11)] == [True, False, False]
 
 
 def test_new_ones_are_added_to_those_that_are_there(tmp_path):
     filled(tmp_path)
-    with open_ledger(WORDS, tmp_path, REPLICATES) as ledger:
+    with open_results_store(WORDS, tmp_path, REPLICATES) as ledger:
         ledger.outcomes[4] = Outcome({"a": 7}, {}, "new")
-    assert list(Ledger(WORDS, tmp_path, REPLICATES).outcomes) == [0, 3, 4, 11]
+    assert list(ResultsStore(WORDS, tmp_path, REPLICATES).outcomes) == [0, 3, 4, 11]
 
 
 def test_without_a_folder_it_is_kept_in_memory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with open_ledger(WORDS, None, REPLICATES) as ledger:
+    with open_results_store(WORDS, None, REPLICATES) as ledger:
         ledger.outcomes.update(ROWS)
         ledger.write()
     assert ledger.outcomes == ROWS
@@ -107,16 +107,16 @@ def test_without_a_folder_it_is_kept_in_memory(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_what_is_done_is_written_however_the_block_ends(tmp_path, error):
-    block = open_ledger(WORDS, tmp_path, REPLICATES)
+    block = open_results_store(WORDS, tmp_path, REPLICATES)
     block.__enter__().outcomes.update(ROWS)
     assert not block.__exit__(error, error(), None)  # which is not swallowed
-    assert len(Ledger(WORDS, tmp_path, REPLICATES).outcomes) == len(ROWS)
+    assert len(ResultsStore(WORDS, tmp_path, REPLICATES).outcomes) == len(ROWS)
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path):
     file = filled(tmp_path)
     before = file.read_bytes()
-    ledger = Ledger(WORDS, tmp_path, REPLICATES)
+    ledger = ResultsStore(WORDS, tmp_path, REPLICATES)
     ledger.outcomes[5] = Outcome({}, {}, object())  # which JSON cannot hold
     with pytest.raises(TypeError):
         ledger.write()
@@ -130,7 +130,7 @@ def test_what_a_killed_run_left_behind_is_removed(tmp_path):
     half.mkdir()
     (half / LEDGER).write_text('{"format": 1, "exper')
     (tmp_path / "notes.json").write_text("{}")
-    with open_ledger(WORDS, tmp_path, REPLICATES) as ledger:
+    with open_results_store(WORDS, tmp_path, REPLICATES) as ledger:
         assert len(ledger.outcomes) == len(ROWS)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.json", LEDGER]
 
@@ -138,10 +138,10 @@ def test_what_a_killed_run_left_behind_is_removed(tmp_path):
 def test_one_run_at_a_time(tmp_path):
     pytest.importorskip("fcntl")
     with (
-        open_ledger(WORDS, tmp_path, REPLICATES),
+        open_results_store(WORDS, tmp_path, REPLICATES),
         refused(CalibrationError, "another run", tmp_path),
     ):
-        open_ledger(WORDS, tmp_path, REPLICATES).__enter__()
+        open_results_store(WORDS, tmp_path, REPLICATES).__enter__()
     filled(tmp_path)
 
 
@@ -162,10 +162,10 @@ def test_another_experiment_is_refused(tmp_path):
 
 
 def test_of_another_experiment_without_replicates_nothing_is_lost(tmp_path):
-    with open_ledger(WORDS | {"seed": "2"}, tmp_path, REPLICATES):
+    with open_results_store(WORDS | {"seed": "2"}, tmp_path, REPLICATES):
         pass
     filled(tmp_path)
-    assert Ledger(WORDS, tmp_path, REPLICATES).outcomes
+    assert ResultsStore(WORDS, tmp_path, REPLICATES).outcomes
 
 
 GARBAGE = {
@@ -203,4 +203,4 @@ def test_another_format_is_refused(tmp_path):
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
     (tmp_path / "taken").touch()
     with refused(CalibrationError, tmp_path / "taken"):
-        open_ledger(WORDS, tmp_path / "taken", REPLICATES).__enter__()
+        open_results_store(WORDS, tmp_path / "taken", REPLICATES).__enter__()

@@ -129,7 +129,7 @@ def options_taken(text):
 
 def test_the_example_is_a_specification_with_every_law(example):
     spec = tb.datasets.read_specification(tomllib.loads(example))
-    kinds = {law.kind for _, law in spec.laws}
+    kinds = {distribution.kind for _, distribution in spec.distributions}
     assert kinds == {"constant", "uniform", "log_uniform", "normal", "log_normal", "choice", "each"}
     assert spec.units == "dimensionless"
 
@@ -232,7 +232,10 @@ def test_progress_is_shown_on_a_terminal_and_apart_from_the_result(specification
     [
         (("a = ", "b = "), "there is no key 'contours[0].b'"),
         (("seed = 1", "seed = -1"), "seed is -1: give a whole number from 0 to"),
-        (("uniform = [0.3, 0.7]", "unifrom = [0.3, 0.7]"), "contours[0].q has the law 'unifrom', which there is not"),
+        (
+            ("uniform = [0.3, 0.7]", "unifrom = [0.3, 0.7]"),
+            "contours[0].q has the distribution 'unifrom', which is unknown",
+        ),
         (("[0.3, 0.7]", "[1.3, 1.7]"), "was drawn 1000 times, and no contour was one that every sweep can reach"),
         (("[scan]", "[scan"), "small.toml: not TOML"),
     ],

@@ -1,4 +1,4 @@
-"""The numbers of data sets: truth against scans, readings against the load cell, draws against their laws."""
+"""The numbers of data sets: truth against scans, readings against the load cell, draws against their distributions."""
 
 from __future__ import annotations
 
@@ -93,9 +93,9 @@ def test_the_truth_is_what_a_scan_of_the_contour_says(spec):
             one = mine.isel(sample=mine["sweep"].values == number)
             assert set(one.direction.values) == {direction}
             pivot = (float(one.base_x[0]), float(one.base_y[0]))
-            law_x, law_y = said.bases[base]
-            assert law_x.is_drawn or pivot[0] == law_x.numbers[0]
-            assert law_y.is_drawn or pivot[1] == law_y.numbers[0]
+            distribution_x, distribution_y = said.bases[base]
+            assert distribution_x.is_drawn or pivot[0] == distribution_x.numbers[0]
+            assert distribution_y.is_drawn or pivot[1] == distribution_y.numbers[0]
             angles = (one["truth_drive_angle"] if "truth_drive_angle" in one else one["drive_angle"]).values
             assert np.all(np.diff(angles) * (1.0 if direction == "forward" else -1.0) > 0.0)
             scan = tb.scan(
@@ -245,7 +245,7 @@ def test_drift_goes_on_from_sweep_to_sweep():
 
 # ---- what is drawn
 
-LAWS = {
+DISTRIBUTIONS = {
     "bias_force_x": ({"uniform": [-1.0, 3.0]}, stats.uniform(-1.0, 4.0)),
     "force_noise": ({"log_uniform": [0.1, 10.0]}, stats.loguniform(0.1, 10.0)),
     "bias_force_y": ({"normal": [2.0, 0.5]}, stats.norm(2.0, 0.5)),
@@ -254,17 +254,19 @@ LAWS = {
 
 
 @pytest.mark.slow
-def test_numbers_are_drawn_by_their_laws():
+def test_numbers_follow_their_distributions():
     """Those of the load cell decide nothing about reach, so that none is drawn again for their sake."""
-    cell = {name: law for name, (law, _) in LAWS.items()}
+    cell = {name: distribution for name, (distribution, _) in DISTRIBUTIONS.items()}
     cell |= {"relative_noise": {"choice": [0.0, 0.1, 0.2]}, "drive_angle_offset": 0.25}
     groups = [drawn_from(family)["contours"][0] for family in ("circle", "parabola")]
     spec = drawn_from("circle", 2000, load_cell=cell, contours=[{**groups[0], "weight": 3}, groups[1]])
     data = generated({**spec, "scan": {"samples": 2}})
-    for name, (_, law) in LAWS.items():
-        assert stats.kstest(data[f"load_cell_{name}"].values, law.cdf).pvalue > FALSE_ALARM, name
-    shares = np.column_stack([law.cdf(data[f"load_cell_{name}"].values) for name, (_, law) in LAWS.items()])
-    correlation = np.corrcoef(shares, rowvar=False)[np.triu_indices(len(LAWS), 1)]
+    for name, (_, distribution) in DISTRIBUTIONS.items():
+        assert stats.kstest(data[f"load_cell_{name}"].values, distribution.cdf).pvalue > FALSE_ALARM, name
+    shares = np.column_stack(
+        [distribution.cdf(data[f"load_cell_{name}"].values) for name, (_, distribution) in DISTRIBUTIONS.items()]
+    )
+    correlation = np.corrcoef(shares, rowvar=False)[np.triu_indices(len(DISTRIBUTIONS), 1)]
     assert np.abs(correlation).max() < stats.norm.isf(FALSE_ALARM / 12) / np.sqrt(2000)
     chosen = [np.count_nonzero(data.load_cell_relative_noise.values == value) for value in (0.0, 0.1, 0.2)]
     assert sum(chosen) == 2000
@@ -290,7 +292,7 @@ def test_weights_of_shape_free_radii_are_standard_normal():
     assert np.abs(correlation).max() < stats.norm.isf(FALSE_ALARM / 2 / correlation.size) / np.sqrt(500)
 
 
-def test_a_weight_may_have_a_law_of_its_own():
+def test_a_weight_may_have_a_distribution_of_its_own():
     """Without weights the contour is a circle; a thousandth of a weight bends it as the family says."""
     plain = {"family": "shape-free", "r": 0.8, "amplitude": 0.5, "length_scale": 1.0, "q": 0.5}
     flat = dict.fromkeys(SHAPE_FREE.directions, 0.0)

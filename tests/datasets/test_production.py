@@ -376,7 +376,7 @@ CARDS = {
         {"load_cell__ornstein_uhlenbeck_force": 0.01},
         [
             "| load cell: ornstein_uhlenbeck_time | 100 |",
-            "What a record's drift and its unknown bias came to is not kept",
+            "drift and the unknown bias of a record are not stored",
         ],
         [],
     ),

@@ -188,10 +188,10 @@ REFUSED = [
     (contour(q=10**400), ["contours[0].q", 10**400]),
     (contour(q=True), ["contours[0].q is True"]),
     (contour(q={"uniform": [0.3, 0.5], "normal": [0, 1]}), ["contours[0].q is {"]),
-    (contour(q={"gamma": [1, 2]}), ["contours[0].q has the law 'gamma', which there is not"]),
+    (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma'"]),
     (
         contour(q={"uniform, log_uniform": [1, 2]}),
-        ["contours[0].q has the law 'uniform, log_uniform', which there is not"],
+        ["contours[0].q has the distribution 'uniform, log_uniform'"],
     ),
     (contour(q={"uniform": 0.3}), ["contours[0].q.uniform is 0.3"]),
     (contour(q={"choice": []}), ["contours[0].q.choice is []"]),
@@ -299,8 +299,8 @@ def test_a_key_of_no_table_is_refused_without_all_there_are():
 
 
 def test_the_time_of_a_drift_is_stated_though_it_is_left_out():
-    laws = read_specification(changed(PLAIN, load_cell={"ornstein_uhlenbeck_force": 0.1})).load_cell
-    assert laws["ornstein_uhlenbeck_time"].numbers == (OrnsteinUhlenbeck().time,)
+    distributions = read_specification(changed(PLAIN, load_cell={"ornstein_uhlenbeck_force": 0.1})).load_cell
+    assert distributions["ornstein_uhlenbeck_time"].numbers == (OrnsteinUhlenbeck().time,)
 
 
 def test_defaults():

@@ -95,7 +95,7 @@ def test_an_edited_manifest_is_found(folder, edit):
         verify(folder)
 
 
-def test_a_damaged_manifest_comes_with_a_remedy(folder):
+def test_a_damaged_manifest_comes_with_a_correction(folder):
     path = folder / "manifest.json"
     for content in (path.read_text().replace('"seed": 7', '"seed": 8'), "no JSON", path.read_text()[:-30]):
         path.write_text(content)

@@ -8,7 +8,6 @@ import pytest
 
 from tactile_bayes.checks import shown
 
-
 _NO_LETTER = r"(?!(?<=\w)\w)"
 """A place that is not inside a word or a number."""
 

@@ -98,7 +98,7 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 )
 def test_the_folder_of_another_study_is_refused(tmp_path_factory, other):
     folder = tmp_path_factory.mktemp("study")
-    with module.open_ledger(module._words(task_of(SMALL)), folder, CELLS) as ledger:
+    with module.open_results_store(module._words(task_of(SMALL)), folder, CELLS) as ledger:
         ledger.outcomes[0] = CellOutcome({"gap_width": 0.1}, "ok")
     before = (folder / "cells.json").read_bytes()
     with pytest.raises(StudyError, match=r"cells of another experiment: .* there and .* here.*give another folder"):

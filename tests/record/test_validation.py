@@ -73,7 +73,7 @@ def test_coordinates_stay_coordinates():
         ),
         (
             edited("direction", 1, "backward"),
-            "sweep 0 mixes two values of 'direction', 'forward' (sample 0) and 'backward' (sample 1): give each stroke",
+            "sweep 0 mixes two values of 'direction', 'forward' (sample 0) and 'backward' (sample 1): give each motion",
         ),
         (
             columns(base_x=[0.0, 0.0, 0.5, 1.0, 1.0, 1.0]),

@@ -35,7 +35,7 @@ from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.tasks import Ledger, TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
 
@@ -188,7 +188,7 @@ def calibrate(
         world=world,
     )
     folder = None if out is None else check_path("out", out).resolve()
-    with open_ledger(experiment.words, folder, REPLICATES) as ledger:
+    with open_results_store(experiment.words, folder, REPLICATES) as ledger:
         kept = keep_outcomes(
             ledger, replicate, experiment, int(replicates), workers=workers, scheduler=scheduler, progress=progress
         )
@@ -234,7 +234,7 @@ def calibration_replicate(
     number = check_whole_number("number of the replicate", number, 0)
     experiment = experiment_of(**options)
     folder = None if out is None else check_path("out", out)
-    Ledger(experiment.words, folder, REPLICATES)  # refuses that of another experiment
+    ResultsStore(experiment.words, folder, REPLICATES)  # refuses that of another experiment
     return make_replicate(experiment, number, throw=throw)
 
 

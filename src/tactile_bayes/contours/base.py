@@ -107,11 +107,33 @@ class Contour(ABC):
         return "where it is over"
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        """Contour's own parameter at a slope angle [rad], of the broadcast shape; NaN where there is no such slope."""
+        """Contour's own parameter at a slope angle.
+
+        Parameters
+        ----------
+        slope_angle : array_like
+            Slope angle α [rad]; broadcasts with the parameters of the family.
+
+        Returns
+        -------
+        ndarray
+            Of the broadcast shape; NaN where the contour has no such slope.
+        """
         return self._parameter_where(slope_angle, lambda locus: (locus.slope_angle, locus.slope_rate))
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        """Contour's own parameter at x [length], of the broadcast shape; NaN beyond the ends."""
+        """Contour's own parameter at a position.
+
+        Parameters
+        ----------
+        x : array_like
+            Position, in the contour's unit of length; broadcasts with the parameters of the family.
+
+        Returns
+        -------
+        ndarray
+            Of the broadcast shape; NaN beyond the ends.
+        """
         return self._parameter_where(x, lambda locus: (locus.x, locus.arclength_rate * np.cos(locus.slope_angle)))
 
     def height(self, x: ArrayLike) -> Floats:
@@ -281,7 +303,18 @@ class Graph(Contour):
 
     @abstractmethod
     def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """g(x) [length], g'(x) and g''(x) [1/length], for x between the ends, of the broadcast shape."""
+        """Values of g, g' and g''.
+
+        Parameters
+        ----------
+        x : ndarray
+            Positions between the ends [length]; they broadcast with the parameters of the family.
+
+        Returns
+        -------
+        (ndarray, ndarray, ndarray)
+            g(x) [length], g'(x), and g''(x) [1/length], of the broadcast shape.
+        """
 
     @property
     def domain(self) -> tuple[Floats, Floats]:

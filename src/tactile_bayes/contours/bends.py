@@ -93,7 +93,7 @@ def refuse_unless_convex(bends: Bends, freedom: float, place: Callable[[float], 
         )
     if bends.errors[-1] < _LEAST_BEND:
         raise ContourError(
-            f"from_points: the points cannot be told from a straight line: as a whole they bend upward by "
+            f"from_points: the points cannot be distinguished from a straight line: as a whole they bend upward by "
             f"{bends.errors[-1]:.1f} standard errors, and it takes {_LEAST_BEND:g} ({remark}){STRAIGHT}"
         )
 

@@ -134,7 +134,7 @@ class _Named:
 
     def __call__(self, x: Floats) -> Floats:
         try:
-            with np.errstate(all="ignore"):  # what is not finite is refused below
+            with np.errstate(all="ignore"):  # values that are not finite are refused below
                 values = np.asarray(self.function(x), dtype=float)
         except (TypeError, ValueError) as error:
             raise ContourError(

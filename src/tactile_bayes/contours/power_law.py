@@ -75,7 +75,19 @@ class PowerLaw(Vertexed):
 
     @classmethod
     def of_width(cls, w: Parameter, n: Parameter, q: Parameter, x_c: Parameter = 0.0) -> Self:
-        """Power law (y − q)/w = (|x − x_c|/w)ⁿ, which is as high above its vertex as it is wide at w > 0 [length].
+        """Power law (y − q)/w = (|x − x_c|/w)ⁿ, which is as high above its vertex as it is wide at w.
+
+        Parameters
+        ----------
+        w : array_like
+            Width, > 0 [length].
+        n, q, x_c : array_like
+            As in `PowerLaw`.
+
+        Raises
+        ------
+        ContourError
+            As in `PowerLaw`, and if w is not positive and finite.
 
         Examples
         --------

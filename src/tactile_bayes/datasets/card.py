@@ -1,4 +1,4 @@
-"""The data card: a page about a data set for those who have only its folder."""
+"""The data card: a description of a data set in its folder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CARD = "README.md"
 
 
 def card(spec: Specification, manifest: Manifest) -> str:
-    """The data card, in Markdown."""
+    """Return the data card, in Markdown."""
     size = sum(shard.bytes for shard in manifest.shards)
     files = len(manifest.shards)
     bases = len(spec.bases)
@@ -38,22 +38,24 @@ def card(spec: Specification, manifest: Manifest) -> str:
         "",
         "## What is drawn",
         "",
-        "| quantity | law |",
+        "| quantity | distribution |",
         "|---|---|",
     ]  # fmt: skip
     for name, group in zip(_names(spec), spec.groups, strict=True):
         share = "in turn" if spec.each_group else f"weight {group.weight:g}"
         lines.append(f"| **{name}** | {share if len(spec.groups) > 1 else 'always'} |")
-        # Weights of a shape-free contour, of which there are many, have one row where they have one law.
-        alike = groupby(group.laws.items(), lambda entry: entry[1].words if entry[0].startswith("z_") else entry[0])
+        # The many weights of a shape-free contour share a row if they have the same distribution.
+        alike = groupby(
+            group.distributions.items(), lambda entry: entry[1].text if entry[0].startswith("z_") else entry[0]
+        )
         for _, entries in alike:
-            (first, law), *others = entries
-            lines.append(f"| {name}: {f'{first} to {others[-1][0]}' if others else first} | {law.words} |")
-    lines += [f"| rod: {name} | {law.words} |" for name, law in spec.rod.items()]
+            (first, distribution), *others = entries
+            lines.append(f"| {name}: {f'{first} to {others[-1][0]}' if others else first} | {distribution.text} |")
+    lines += [f"| rod: {name} | {distribution.text} |" for name, distribution in spec.rod.items()]
     for number, pair in enumerate(spec.bases, start=1):
         pivot = "pivot" if bases == 1 else f"pivot {number}"
-        lines += [f"| {pivot}: {axis} | {law.words} |" for axis, law in zip("xy", pair, strict=True)]
-    lines += [f"| load cell: {name} | {law.words} |" for name, law in spec.load_cell.items()]
+        lines += [f"| {pivot}: {axis} | {distribution.text} |" for axis, distribution in zip("xy", pair, strict=True)]
+    lines += [f"| load cell: {name} | {distribution.text} |" for name, distribution in spec.load_cell.items()]
     drive = spec.drive
     if drive.begin is None:
         lines.append(f"| drive angles | from first contact to snap-off, and {drive.margin:g} of that on either side |")
@@ -91,7 +93,7 @@ def card(spec: Specification, manifest: Manifest) -> str:
 
 
 def _names(spec: Specification) -> list[str]:
-    """What to call each group of contours: its family, with a number where a family comes more than once."""
+    """Name each group of contours by its family, with a number if a family occurs more than once."""
     families = [group.family for group in spec.groups]
     return [
         f"{family} {families[: index + 1].count(family)}" if families.count(family) > 1 else family
@@ -100,7 +102,7 @@ def _names(spec: Specification) -> list[str]:
 
 
 def _in_turn(spec: Specification) -> list[str]:
-    """How the lists are gone through."""
+    """Describe the order in which the lists are used."""
     if not spec.lists:
         return []
     times = spec.records // spec.combinations
@@ -116,13 +118,13 @@ def _in_turn(spec: Specification) -> list[str]:
 
 
 def _of_axis(spec: Specification, name: str) -> str:
-    """The list of this name, or those on the axis of this name."""
-    together = [key for key, law in spec.laws if law.axis == name]
+    """Describe the list of this name, or those on the axis of this name."""
+    together = [key for key, distribution in spec.distributions if distribution.axis == name]
     return f"{name} ({' and '.join(together)} in step)" if together else name
 
 
 def _redrawn(spec: Specification, manifest: Manifest) -> str:
-    """How many draws came to nothing, and what that does to the laws."""
+    """Describe the number of rejected draws, and their effect on the distributions."""
     reached = "that every sweep reaches and that the rod is clear of after snap-off"
     if spec.drive.begin is not None:
         reached = (
@@ -132,11 +134,11 @@ def _redrawn(spec: Specification, manifest: Manifest) -> str:
     if not (total := sum(manifest.redrawn.values())):
         return f"Every contour drawn is one {reached}."
     why = ", ".join(f"{count} {reason}" for reason, count in sorted(manifest.redrawn.items()))
-    return f"{total} contours were drawn again ({why}), so the laws above hold among contours {reached}."
+    return f"{total} contours were drawn again ({why}), so the distributions above hold among contours {reached}."
 
 
 def _to_beware_of(spec: Specification, manifest: Manifest) -> list[str]:
-    """Records that are there, and may not be wanted."""
+    """Describe records that may not be suitable."""
     lines = []
     sweeps = spec.records * len(spec.sweeps)
     if manifest.untouched or spec.drive.begin is not None:
@@ -152,12 +154,12 @@ def _to_beware_of(spec: Specification, manifest: Manifest) -> list[str]:
 
 
 def _not_in_the_files(spec: Specification) -> list[str]:
-    """What the readings are made of and the files do not say, or say a little otherwise."""
+    """Describe parts of the readings that the files do not contain, or contain with rounding."""
     lines = []
     if any(name.startswith(("bias_uncertainty", "random_walk", "ornstein_uhlenbeck")) for name in spec.load_cell):
         lines += [
-            "What a record's drift and its unknown bias came to is not kept: only readings minus true loads tell, with "
-            "the noise in them.",
+            "The drift and the unknown bias of a record are not stored: readings minus true loads contain them, with "
+            "the noise.",
             "",
         ]
     if spec.single and any(name.endswith("_range") for name in spec.load_cell):

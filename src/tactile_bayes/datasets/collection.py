@@ -1,4 +1,4 @@
-"""A data set on disk as one, opened without reading it."""
+"""A data set on disk, opened as one without reading it."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ __all__ = ["open_dataset", "opened", "opened_shard"]
 
 
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
-    """A data set as one xarray Dataset with dimensions record, sweep and sample; nothing is read before it is used.
+    """Open a data set as one xarray Dataset with dimensions record, sweep and sample; values are read when used.
 
     Parameters
     ----------
     path : path-like
-        Its folder. It may still be in the making: then the shards that are there are opened.
+        Folder of the data set. If it is not complete, the existing shards are opened.
 
     Returns
     -------
     xr.Dataset
-        Select first, load then: `open(path).isel(record=slice(0, 100)).load()`. With Dask installed, `.chunk()` makes
+        Select first, then load: `open(path).isel(record=slice(0, 100)).load()`. With Dask installed, `.chunk()` makes
         it parallel.
 
     Raises
     ------
     SpecificationError
-        If the folder holds no data set, or none of its shards is there yet.
+        If the folder contains no data set, or no shard yet.
 
     Warns
     -----
     UserWarning
-        If not all of its shards are there yet.
+        If shards are still missing.
     """
     folder = Path(path)
     manifest = read_manifest(folder)
@@ -60,7 +60,7 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def opened(folder: Path, manifest: Manifest) -> xr.Dataset:
-    """What there is of a data set; see `open_dataset`."""
+    """Open the existing shards of a data set; see `open_dataset`."""
     if not manifest.shards:
         raise SpecificationError(f"{folder} holds no shard yet: run dataset generate again")
     with opened_shard(folder / manifest.shards[0].file) as first:
@@ -79,7 +79,7 @@ def opened(folder: Path, manifest: Manifest) -> xr.Dataset:
 
 
 class _Shards(BackendArray):
-    """A variable of all shards, one after the other; files are open while they are read from, and no longer."""
+    """A variable of all shards, concatenated; files are open only while they are read."""
 
     def __init__(
         self, folder: Path, manifest: Manifest, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]
@@ -105,7 +105,7 @@ class _Shards(BackendArray):
         return found.reshape([places.size for places in (wanted, *rest) if np.ndim(places)])
 
     def _of_shard(self, number: int, places: list[NDArray[np.intp]]) -> NDArray[Any]:
-        """What lies at the outer product of places: of their span, what is read in one piece."""
+        """Read values at the outer product of indices, from one contiguous piece."""
         path = self.folder / self.files[number]
         with _reading(path), h5py.File(path, "r") as file:
             span = file[self.name][tuple(slice(int(p.min()), int(p.max()) + 1) for p in places)]
@@ -113,7 +113,7 @@ class _Shards(BackendArray):
 
 
 def opened_shard(path: Path) -> xr.Dataset:
-    """A shard's file as a Dataset, to be closed; its numbers as they are stored.
+    """Open a shard's file as a Dataset, which the caller closes, with numbers as they are stored.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The numbers of a data set: contours drawn until the rod reaches them, swept, and measured."""
+"""The generation of a data set: contours are drawn until the rod reaches them, swept, and measured."""
 
 from __future__ import annotations
 
@@ -27,43 +27,43 @@ from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases
 __all__ = ["Records", "generate_records"]
 
 _MOST_DRAWS = 1000
-"""Draws of one record before the specification is given up."""
+"""Largest number of draws of one record."""
 
 _AT_ONCE = 500
-"""Draws that are tried together, while fewer records are left: what is drawn in vain costs less than to begin anew."""
+"""Number of draws that are tested together for the last records: superfluous draws cost less than another call."""
 
 _APART = 2**20
-"""Random numbers from where one draw of a record begins to where the next does: far more than there are laws, so that a
-contour is the same whatever is drawn after it."""
+"""Distance in the random stream between two draws of a record: far more than the number of distributions, so that a
+contour does not depend on what is drawn after it."""
 
 _GOOD = Reachability.TOUCHES.message
 
 
 @dataclass(frozen=True)
 class Records:
-    """Records of a data set, as arrays."""
+    """Records of a data set as arrays; lengths, forces and moments are in the units of the data set."""
 
     index: Index
     family: Index
-    """Which group of the specification each contour is from, shape (n,)."""
+    """Index of the group of the specification of each contour, shape (n,)."""
     drawn: dict[str, Floats]
-    """By the keys of the specification's laws, shape (n,); NaN where another family's."""
+    """Drawn numbers by the keys of the distributions, shape (n,); NaN for parameters of other families."""
     sweep: dict[str, NDArray[Any]]
-    """Of each sweep, shape (n, sweeps): base_x, base_y, phases, events, and the largest strain of a thick rod."""
+    """Columns of sweeps, shape (n, sweeps): base_x, base_y, phases, events, and the largest strain of a thick rod."""
     sample: dict[str, NDArray[Any]]
-    """Of each sample, shape (n, sweeps, samples): what was measured, and "truth_" columns."""
+    """Columns of samples, shape (n, sweeps, samples): readings, and "truth_" columns."""
     redrawn: Counter[str]
-    """Draws that came to nothing, by the reason."""
+    """Numbers of rejected draws by reason."""
 
     @property
     def strained(self) -> int:
-        """How many have a sweep in which the rod is strained beyond the model."""
+        """Number of records with a sweep in which the strain of the rod exceeds the model."""
         strain = self.sweep.get("largest_strain", np.zeros((1, 1)))
         return int(np.count_nonzero(np.any(strain > LARGEST_STRAIN, axis=1)))
 
     @property
     def untouched(self) -> int:
-        """How many sweeps have no sample in contact."""
+        """Number of sweeps without a sample in contact."""
         return int(np.count_nonzero(~np.any(self.sample["truth_contact_phase"], axis=2)))
 
 
@@ -72,7 +72,7 @@ _NO_CONTOUR = "no contour"
 
 _HIGHER = "raise the contours above the pivots, by a larger q or lower bases"
 _WIDER = "give wider contours, or bring the pivots nearer to them, or to their middle"
-_REMEDIES = {
+_CORRECTIONS = {
     "out of reach": "bring contours and pivots closer to one another (are contours, bases and rod in one unit?)",
     "cuts the pivot": _HIGHER,
     "first touched beyond its end": _WIDER,
@@ -80,28 +80,28 @@ _REMEDIES = {
     "still touched at its other end": _WIDER,
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the straight rod would still cut the object",
-    _NO_CONTOUR: "change the law of that parameter",
+    _NO_CONTOUR: "change the distribution of that parameter",
 }
 
 
 @threadpool_limits.wrap(limits=1)  # with more threads, products of matrices are rounded otherwise
 def generate_records(spec: Specification, begin: int, end: int) -> Records:
-    """Records from index `begin` to before `end`, by rejection sampling with look-ahead.
+    """Generate records from index `begin` to before `end`, by rejection sampling with look-ahead.
 
-    A record keeps the first of its draws that is a contour which every sweep reaches and leaves clear. Records that are
-    left draw twice as often ahead each time, since most of the cost is to begin, and later draws are thrown away.
+    A record keeps the first of its draws whose contour every sweep reaches and leaves clear. The number of draws ahead
+    doubles for the remaining records each time, since most of the cost is per call; later draws are discarded.
 
-    The random numbers of a record follow from the seed and its index alone, and those of its contour are drawn before
-    all others; rounding may depend on which records are made together, so that bit by bit only the same stretch gives
-    the same numbers.
+    The random numbers of a record depend on the seed and its index only, and those of its contour are drawn before all
+    others. Rounding may depend on the records that are generated together, so that only the same range of records gives
+    identical bits.
 
     Raises
     ------
     SpecificationError
-        If of 1000 draws of a record none is a contour that every sweep can reach.
+        If none of 1000 draws of a record is a contour that every sweep reaches.
     """
     index = np.arange(begin, end)
-    drawn = {key: np.full(index.size, np.nan) for key, _ in spec.laws}
+    drawn = {key: np.full(index.size, np.nan) for key, _ in spec.distributions}
     records = Records(index, np.zeros(index.size, dtype=np.intp), drawn, {}, {}, Counter())
     uniform, turns = streams(spec.seed, index, CONTOUR), _turns(spec, index)
     in_vain: list[tuple[Index, NDArray[Any]]] = []
@@ -125,21 +125,21 @@ def generate_records(spec: Specification, begin: int, end: int) -> Records:
 
 
 class _Candidates(NamedTuple):
-    """The next draws of some records."""
+    """Next draws of some records."""
 
     row: Index
-    """Of which record each is."""
+    """Row of the record of each draw."""
     group: Index
-    """From which group of the specification its contour is."""
+    """Index of the group of the specification of its contour."""
     values: dict[str, Floats]
-    """By the keys of all laws."""
+    """Numbers by the keys of all distributions."""
 
 
 def _drawn(
     spec: Specification, uniform: list[np.random.Generator], turns: Mapping[str, Index], row: Index
 ) -> _Candidates:
-    """The next draw of each of these records; one that is named more than once draws again."""
-    count = 1 + len(spec.laws)
+    """Draw the next candidate of each of these records; a repeated record has several draws."""
+    count = 1 + len(spec.distributions)
     shares = np.array([_shares(uniform[i], count) for i in row])
     if "contours" in turns:
         group = turns["contours"][row]
@@ -148,8 +148,10 @@ def _drawn(
         group = np.searchsorted(weights, shares[:, 0] * weights[-1], side="right")
         group = np.minimum(group, len(spec.groups) - 1)
     values = {
-        key: law.at(shares[:, 1 + k], turns[law.axis or key][row] if law.kind == "each" else row)
-        for k, (key, law) in enumerate(spec.laws)
+        key: distribution.at(
+            shares[:, 1 + k], turns[distribution.axis or key][row] if distribution.kind == "each" else row
+        )
+        for k, (key, distribution) in enumerate(spec.distributions)
     }
     return _Candidates(row, group, values)
 
@@ -161,7 +163,7 @@ def _keep(
     tried: Mapping[int, _Tried],
     is_kept: NDArray[np.bool_],
 ) -> None:
-    """Put candidates into their records."""
+    """Write accepted candidates to their records."""
     count, sweeps = records.index.size, len(spec.sweeps)
     for g, its in tried.items():
         taken = np.flatnonzero(is_kept[its.candidate])
@@ -180,7 +182,7 @@ def _keep(
 
 
 def _shares(stream: np.random.Generator, count: int) -> Floats:
-    """Uniform numbers of a record's next draw."""
+    """Return the uniform numbers of a record's next draw."""
     found = stream.random(count)
     stream.bit_generator.advance(_APART - count)  # type: ignore[attr-defined]
     return found
@@ -189,15 +191,15 @@ def _shares(stream: np.random.Generator, count: int) -> Floats:
 def _hopeless(record: int, reasons: Counter[str]) -> SpecificationError:
     found = reasons.most_common()
     commonest = found[0][0]
-    remedy = next(remedy for reason, remedy in _REMEDIES.items() if commonest.startswith(reason))
+    correction = next(correction for reason, correction in _CORRECTIONS.items() if commonest.startswith(reason))
     return SpecificationError(
         f"record {record} was drawn {_MOST_DRAWS} times, and no contour was one that every sweep can reach "
-        f"({', '.join(f'{count} {why}' for why, count in found)}): {remedy}"
+        f"({', '.join(f'{count} {why}' for why, count in found)}): {correction}"
     )
 
 
 def _turns(spec: Specification, index: Index) -> dict[str, Index]:
-    """Which entry of each list a record has, by the key of the list."""
+    """Return the position of each record in each list, by the key of the list."""
     turns, rest = {}, index
     for key, count in reversed(spec.lists):
         turns[key], rest = rest % count, rest // count
@@ -205,19 +207,19 @@ def _turns(spec: Specification, index: Index) -> dict[str, Index]:
 
 
 class _Tried(NamedTuple):
-    """Sweeps along the candidates of one group that are contours: a lane each, those of a candidate side by side."""
+    """Sweeps along the valid contours of one group, with the sweeps of a candidate side by side."""
 
     candidate: Index
-    """Which candidates these are."""
+    """Indices of the candidates."""
     paths: Paths
     drive: Floats
-    """Drive angles as seen in forward sweeps, shape (lanes, k); or shares of the way from first contact to snap-off,
-    shape (k,)."""
+    """Drive angles in the sweep frame, shape (n, k), or shares of the drive angle from first contact to snap-off, shape
+    (k,)."""
     units: ManyUnits
 
 
 def _tried(spec: Specification, candidates: _Candidates) -> tuple[NDArray[Any], dict[int, _Tried]]:
-    """Why each candidate comes to nothing, `_GOOD` if it does not, and sweeps along contours by group."""
+    """Test candidates: the reason for each rejection, `_GOOD` without one, and sweeps by group."""
     why, tried = np.full(candidates.row.size, _GOOD, dtype=object), dict[int, _Tried]()
     for g in np.unique(candidates.group).tolist():
         contours, built = _built(spec, g, candidates, why)
@@ -228,7 +230,7 @@ def _tried(spec: Specification, candidates: _Candidates) -> tuple[NDArray[Any], 
 
 
 def _built(spec: Specification, g: int, candidates: _Candidates, why: NDArray[Any]) -> tuple[Contour | None, Index]:
-    """The contours of a group, with all parameters arrays, and which candidates they are; why others are none."""
+    """Build the contours of a group with arrays of parameters, and their candidates; write reasons for the others."""
     family = FAMILIES[spec.groups[g].family]
     its = np.flatnonzero(candidates.group == g)
 
@@ -249,7 +251,7 @@ def _built(spec: Specification, g: int, candidates: _Candidates, why: NDArray[An
 
 
 def _swept(spec: Specification, contours: Contour, candidate: Index, values: Mapping[str, Floats]) -> _Tried:
-    """Every sweep along contours, of which the values of all laws are given."""
+    """Sweep along contours, given the values of all distributions."""
     sweeps = len(spec.sweeps)
     place = np.repeat(np.arange(candidate.size), sweeps)
     base_x, base_y = (
@@ -277,7 +279,7 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
 
 
 def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
-    """Why candidates come to nothing of which so many sweeps each are side by side."""
+    """Return the reasons for rejection of candidates with so many sweeps each, side by side."""
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
         clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
@@ -286,7 +288,7 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
 
 
 def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
-    """What is known of every sweep, shape (lanes,)."""
+    """Columns of every sweep, shape (n,)."""
     paths = tried.paths
     found = {
         "base_x": paths.sweep_frame.base_x,
@@ -304,7 +306,7 @@ def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
 
 
 def _of_samples(tried: _Tried, index: Index) -> dict[str, NDArray[Any]]:
-    """What sweeps on lanes record, shape (*lane.shape, k)."""
+    """Columns of the samples of sweeps, shape (*index.shape, k)."""
     paths, drive = tried.paths, tried.drive
     first, snap = paths.first_angle[index][..., None], paths.snap_angle[index][..., None]
     as_seen = first + drive * (snap - first) if drive.ndim == 1 else drive[index]
@@ -315,7 +317,7 @@ def _of_samples(tried: _Tried, index: Index) -> dict[str, NDArray[Any]]:
 
 
 def _put(place: dict[str, NDArray[Any]], found: Mapping[str, NDArray[Any]], rows: Index, count: int) -> None:
-    """Put what is found into rows of what is there of so many records."""
+    """Write arrays to rows of the arrays of all records."""
     for name, values in found.items():
         if name not in place:
             place[name] = np.empty((count, *values.shape[1:]), dtype=values.dtype)

@@ -1,4 +1,4 @@
-"""The manifest of a data set: what it was made from, and which of its files are whole."""
+"""The manifest of a data set: its specification, versions, and complete files."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ __all__ = ["MANIFEST", "Manifest", "read_manifest", "versions_here", "write_mani
 MANIFEST = "manifest.json"
 
 _FORMAT = 2
-"""1 had other random numbers of the same seed."""
-_REMEDY = (
+"""Version of the format; version 1 had other random numbers for the same seed."""
+_CORRECTION = (
     "put a copy of it back, or run dataset generate with the same specification into another folder, which makes the "
     "same files again"
 )
@@ -32,23 +32,24 @@ _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "xarray", "h5netcdf", "h5py")
 
 @dataclass(frozen=True)
 class Manifest:
-    """What lies beside the shards of a data set, as JSON.
+    """Manifest of a data set, a JSON file beside its shards.
 
     Attributes
     ----------
     name : str
+        Name of the data set.
     specification : str
-        Its text.
+        Text of the specification.
     specification_sha256 : str
-        Of what it says.
+        SHA-256 of its meaning.
     seed, records, shard_records : int
-        As the specification says.
+        As in the specification.
     versions : mapping of str to str
-        Of Python and the libraries that the numbers and the bytes of the files follow from.
+        Versions of Python and of the libraries on which numbers and bytes depend.
     shards : tuple of Written
-        Files that are whole, by number.
+        Complete files, by number.
     card_sha256 : str
-        Of the data card; "" as long as there is none.
+        SHA-256 of the data card; "" as long as there is none.
     """
 
     name: str
@@ -63,11 +64,11 @@ class Manifest:
 
     @classmethod
     def of(cls, spec: Specification) -> Manifest:
-        """The manifest of a data set of which nothing is there yet."""
+        """Return the manifest of a data set without files."""
         return cls(spec.name, spec.text, spec.sha256, spec.seed, spec.records, spec.shard_records, versions_here())
 
     def having(self, written: Iterable[Written]) -> Manifest:
-        """With more files."""
+        """Return the manifest with further files."""
         return replace(self, shards=tuple(sorted([*self.shards, *written], key=lambda shard: shard.first)))
 
     @property
@@ -76,17 +77,17 @@ class Manifest:
 
     @property
     def redrawn(self) -> Counter[str]:
-        """Draws that came to nothing, by the reason, in the files that are there."""
+        """Numbers of rejected draws by reason, in the existing files."""
         return sum((Counter(shard.redrawn) for shard in self.shards), Counter())
 
     @property
     def strained(self) -> int:
-        """Records in these files with a sweep in which the rod is strained beyond the model."""
+        """Number of records with a sweep in which the strain of the rod exceeds the model."""
         return sum(shard.strained for shard in self.shards)
 
     @property
     def untouched(self) -> int:
-        """Sweeps in these files without any sample in contact."""
+        """Number of sweeps without a sample in contact."""
         return sum(shard.untouched for shard in self.shards)
 
 
@@ -95,7 +96,7 @@ def versions_here() -> dict[str, str]:
 
 
 def write_manifest(manifest: Manifest, folder: Path) -> None:
-    """Write a manifest whole."""
+    """Write a manifest atomically."""
     table = {"format": _FORMAT, "complete": manifest.is_complete, "redrawn": dict(sorted(manifest.redrawn.items()))}
     table |= {"strained": manifest.strained, "untouched": manifest.untouched}
     table |= {**asdict(manifest), "shards": [shard._asdict() for shard in manifest.shards]}
@@ -104,12 +105,12 @@ def write_manifest(manifest: Manifest, folder: Path) -> None:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """The manifest in a folder.
+    """Read the manifest in a folder.
 
     Raises
     ------
     SpecificationError
-        If there is none, or it is not as it was written.
+        If there is none, or it has changed since it was written.
     """
     path = folder / MANIFEST
     try:
@@ -117,7 +118,7 @@ def read_manifest(folder: Path) -> Manifest:
         table = json.loads(content)
         table.pop("sha256")
         if content != _content(table):
-            raise SpecificationError(f"{path} is not as it was written, its own checksum differs: {_REMEDY}")
+            raise SpecificationError(f"{path} is not as it was written, its own checksum differs: {_CORRECTION}")
         if table["format"] != _FORMAT:
             raise SpecificationError(
                 f"{path} has format {table['format']}, and this version reads format {_FORMAT}: take the version that "
@@ -127,15 +128,15 @@ def read_manifest(folder: Path) -> Manifest:
         rest = {name: table[name] for name in Manifest.__dataclass_fields__ if name != "shards"}
         return Manifest(**rest, shards=shards)
     except (FileNotFoundError, NotADirectoryError):
-        lost = f", but shards: {_REMEDY}" if any(folder.glob("shard-*.nc")) else ""
+        lost = f", but shards: {_CORRECTION}" if any(folder.glob("shard-*.nc")) else ""
         raise SpecificationError(f"{folder} holds no data set: there is no {MANIFEST}{lost}") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, SpecificationError):
             raise
-        raise SpecificationError(f"{path} is no manifest of a data set ({error}): {_REMEDY}") from error
+        raise SpecificationError(f"{path} is no manifest of a data set ({error}): {_CORRECTION}") from error
 
 
 def _content(table: Mapping[str, Any]) -> bytes:
-    """The file, which ends with a checksum of what it says."""
+    """Return the bytes of the file, which ends with a checksum of its content."""
     digest = hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()
     return (json.dumps({**table, "sha256": digest}, indent=1, ensure_ascii=False) + "\n").encode()

@@ -1,4 +1,4 @@
-"""What load cells and encoders read of many records, each with random numbers of its own."""
+"""Readings of load cells and encoders for many records, each with its own random numbers."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ _HARMLESS: dict[str, tuple[str, int | None]] = {
     "lever_y": ("lever", 1),
     **{f"{stem}_{name}": (stem, k) for stem in ("bias", "bias_uncertainty") for k, name in enumerate(CHANNELS)},
 }
-"""Entries of a data sheet that are possible or not whatever the others are: field, and place in it."""
+"""Entries of a data sheet whose validity does not depend on the others: field, and position in it."""
 
 
 def measure(spec: Specification, index: Index, drawn: Mapping[str, Floats], sample: dict[str, NDArray[Any]]) -> None:
-    """Put what the load cell reads beside the truth."""
+    """Add the readings of the load cell to the true values."""
     cells, cell_of, scale = _cells(spec, drawn, index.size)
     noise = streams(spec.seed, index, NOISE)
     direction = np.array([direction for _, direction in spec.sweeps])[:, None]
@@ -65,7 +65,7 @@ def measure(spec: Specification, index: Index, drawn: Mapping[str, Floats], samp
 
 
 def _cells(spec: Specification, drawn: Mapping[str, Floats], count: int) -> tuple[list[LoadCell], Index, Floats]:
-    """Load cells, which of them each record is measured with, and by what factors its channels are noisier."""
+    """Return load cells, the index of the cell of each record, and factors on the noise of its channels."""
     columns, scale = {name: drawn[f"load_cell.{name}"] for name in spec.load_cell}, np.ones((count, 3))
     if not columns:
         return [LoadCell()], np.zeros(count, dtype=np.intp), scale
@@ -87,8 +87,8 @@ def _cells(spec: Specification, drawn: Mapping[str, Floats], count: int) -> tupl
 
 
 def _like(first: LoadCell, rows: list[dict[str, float]], differ: set[str]) -> list[LoadCell]:
-    """Load cells that differ from the first in entries that are possible by their laws: to check each takes longer than
-    to draw its noise."""
+    """Make load cells that differ from the first in valid entries, without a check, which would take longer than the
+    noise."""
     cells = []
     for row in rows:
         cell = object.__new__(LoadCell)

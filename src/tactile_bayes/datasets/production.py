@@ -1,4 +1,4 @@
-"""The production of a data set: shard after shard, by as many workers as there are, and on from where it stopped."""
+"""The production of a data set: shard by shard, on many workers, and resumable."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from tactile_bayes.tasks import alone_in, run_tasks, write_atomically
 
 __all__ = ["Production", "generate"]
 
-_NOTING = 0.05
-"""Share of the time that goes into notes of what is finished: what is not noted when all is killed is made again."""
+_WRITING_SHARE = 0.05
+"""Share of the time that is spent on the manifest: shards that it does not list when the run is killed are repeated."""
 
 
-_MOST_TOLD = 3
-"""Differences between two specifications that a refusal names."""
+_MOST_NAMED = 3
+"""Largest number of differences between two specifications that a message names."""
 
-_LONGEST_TOLD = 60
-"""Characters of a value in it."""
+_LONGEST_VALUE = 60
+"""Largest number of characters of a value in the message."""
 
 
 class Production(NamedTuple):
-    """How far a data set has come."""
+    """Progress of the production of a data set."""
 
     records: int
-    """Records that are there."""
+    """Number of existing records."""
     wanted: int
     made: int
-    """Of those, made in this run."""
+    """Number of records made in this run."""
     seconds: float
-    """Since this run began."""
+    """Time since the beginning of this run [s]."""
 
 
 def generate(
@@ -53,42 +53,42 @@ def generate(
     scheduler: str | None = None,
     progress: Callable[[Production], object] | None = None,
 ) -> Path:
-    """Make the data set that a specification describes, or go on with it.
+    """Make the data set that a specification describes, or continue it.
 
-    It may be killed at any moment and started again: files appear whole or not at all, and those that are there are
-    kept. The numbers do not depend on the workers, nor on the order of their work. In a script, call it under
-    `if __name__ == "__main__":`, as each process begins by importing the script; without, it raises TaskError.
+    The run may be killed at any moment and started again: files are written atomically, and existing ones are kept. The
+    numbers do not depend on the workers, nor on the order of their work. In a script, call it under
+    `if __name__ == "__main__":`, since each process begins by importing the script; otherwise it raises TaskError.
 
     Parameters
     ----------
     spec : path-like, mapping or Specification
-        A TOML file, or what it says.
+        A TOML file, its content as nested mappings, or a specification.
     out : path-like
-        Folder, made if it is not there: shards (NetCDF), manifest.json, and README.md, the data card.
+        Folder for the shards (NetCDF), manifest.json, and README.md, the data card; it is created if necessary.
     workers : int, optional
-        Processes on this machine; by default one for each core.
+        Number of processes on this machine; by default one for each core.
     scheduler : str, optional
-        Address of a Dask scheduler, in place of `workers`. Its workers need this package in the same version, and must
-        see the folder under the same path.
+        Address of a Dask scheduler, in place of `workers`. Its workers need this package in the same version, and
+        access to the folder under the same path.
     progress : callable, optional
-        Is given a `Production` after each shard.
+        Called with a `Production` after each shard.
 
     Returns
     -------
     Path
-        The manifest.
+        Path of the manifest.
 
     Raises
     ------
     SpecificationError
-        If the specification is impossible, no contour is reached in 1000 draws, or the folder holds another data set,
-        or one that was begun with other versions, whose numbers may differ, or is being worked on.
+        If the specification is invalid, no contour is reached in 1000 draws, or the folder contains another data set,
+        or one that was begun with other versions, whose numbers may differ, or another run uses it.
     ParameterError
-        If `workers` is no positive number, or the scheduler does not answer.
+        If `workers` is not a positive number, or the scheduler does not answer.
     TaskError
-        If processes died over a shard again and again, or cannot begin.
+        If processes die repeatedly over a shard, or cannot start.
     OSError
-        If a file cannot be written. What is finished is kept.
+        If a file cannot be written. Finished shards are kept.
 
     Examples
     --------
@@ -110,16 +110,16 @@ def generate(
         done = {shard.file for shard in manifest.shards}
         tasks = [(spec.text, n, str(folder)) for n in range(spec.shards) if shard_file(n) not in done]
         began, made, waiting = time.monotonic(), 0, list[Written]()
-        next_note = began
+        next_write = began
         before = sum(shard.records for shard in manifest.shards)
         try:
             with closing(run_tasks(write_shard, tasks, workers=workers, scheduler=scheduler)) as results:
                 for _, written in results:
                     waiting.append(written)
                     made += written.records
-                    if (now := time.monotonic()) >= next_note:
+                    if (now := time.monotonic()) >= next_write:
                         manifest, waiting = _noted(manifest, waiting, folder), []
-                        next_note = time.monotonic() + (time.monotonic() - now) / _NOTING
+                        next_write = time.monotonic() + (time.monotonic() - now) / _WRITING_SHARE
                     if progress is not None:
                         progress(Production(before + made, spec.records, made, time.monotonic() - began))
         finally:
@@ -135,7 +135,7 @@ def _noted(manifest: Manifest, written: list[Written], folder: Path) -> Manifest
 
 
 def _finish(spec: Specification, manifest: Manifest, folder: Path) -> None:
-    """Write the data card, and the manifest that vouches for it."""
+    """Write the data card, and the manifest with its checksum."""
     content = card(spec, manifest).encode()
     with write_atomically(folder / CARD) as temporary:
         temporary.write_bytes(content)
@@ -143,7 +143,7 @@ def _finish(spec: Specification, manifest: Manifest, folder: Path) -> None:
 
 
 def _begun(spec: Specification, folder: Path) -> Manifest:
-    """What there is of the data set in a folder, without the files that are not whole."""
+    """Return the manifest of the data set in a folder, without incomplete files."""
     if not (folder / MANIFEST).exists():
         strangers = [*folder.glob("shard-*.nc"), *folder.glob(CARD)]
         if strangers:
@@ -172,7 +172,7 @@ def _begun(spec: Specification, folder: Path) -> Manifest:
 
 
 def _first(spec: Specification, folder: Path) -> Manifest:
-    """The manifest of which nothing is there yet; files that no manifest came to state are of a run that ended."""
+    """Write the first manifest; shards without a manifest are from an interrupted run and removed."""
     for file in folder.glob("shard-*.nc"):
         file.unlink()
     manifest = Manifest.of(spec)
@@ -182,20 +182,22 @@ def _first(spec: Specification, folder: Path) -> Manifest:
 
 def _other(manifest: Manifest, spec: Specification, folder: Path) -> SpecificationError:
     found = differences(meaning(manifest.specification), meaning(spec.text))
-    told = [f"{key} {_said(there)} there and {_said(here)} here" for key, there, here in found[:_MOST_TOLD]]
-    told += [f"{len(found) - _MOST_TOLD} more"] if len(found) > _MOST_TOLD else []
+    named = [f"{key} {_described(there)} there and {_described(here)} here" for key, there, here in found[:_MOST_NAMED]]
+    named += [f"{len(found) - _MOST_NAMED} more"] if len(found) > _MOST_NAMED else []
     name = "" if manifest.name == UNNAMED else f" ({manifest.name!r})"
-    remedy = "choose another folder, or give the specification that its manifest states"
+    correction = "choose another folder, or give the specification that its manifest states"
     if [key for key, _, _ in found] == ["records"]:
-        remedy = "a data set does not grow: choose another folder, where the first records will be the same"
-    return SpecificationError(f"{folder} holds a data set of another specification{name}, {', '.join(told)}: {remedy}")
+        correction = "a data set does not grow: choose another folder, where the first records will be the same"
+    return SpecificationError(
+        f"{folder} holds a data set of another specification{name}, {', '.join(named)}: {correction}"
+    )
 
 
-def _said(value: Any) -> str:
+def _described(value: Any) -> str:
     if value is None:
         return "is left out"
     if isinstance(value, dict) and "family" in value:
         return f"is of family {value['family']!r}"
     is_whole = isinstance(value, float) and value.is_integer()
     text = str(int(value)) if is_whole else reprlib.repr(value)
-    return f"is {text if len(text) <= _LONGEST_TOLD else text[: _LONGEST_TOLD - 1] + '…'}"
+    return f"is {text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + '…'}"

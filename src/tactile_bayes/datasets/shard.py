@@ -27,7 +27,7 @@ from tactile_bayes.tasks import write_atomically
 __all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]
 
 _LONGEST = 9
-"""Phases in a sweep, at most."""
+"""Largest number of phases in a sweep."""
 
 PHASE_SEQUENCES = tuple(
     "-".join("AB"[(start + k) % 2] for k in range(length)) for length in range(1, _LONGEST + 1) for start in (0, 1)
@@ -35,7 +35,7 @@ PHASE_SEQUENCES = tuple(
 
 
 class Written(NamedTuple):
-    """A shard that lies on disk."""
+    """A shard on disk."""
 
     file: str
     first: int
@@ -44,18 +44,18 @@ class Written(NamedTuple):
     sha256: str
     redrawn: dict[str, int]
     strained: int
-    """Records with a sweep in which the rod is strained beyond the model."""
+    """Number of records with a sweep in which the strain of the rod exceeds the model."""
     untouched: int
-    """Sweeps without any sample in contact."""
+    """Number of sweeps without a sample in contact."""
 
 
 def shard_file(shard: int) -> str:
-    """Name of the file of a shard."""
+    """Return the name of the file of a shard."""
     return f"shard-{shard:06d}.nc"
 
 
 def write_shard(task: tuple[str, int, str]) -> Written:
-    """Generate a shard of the specification with this text, and write it whole into a folder.
+    """Generate a shard of a specification, and write it atomically to a folder.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def write_shard(task: tuple[str, int, str]) -> Written:
     SpecificationError
         If no contour is reached in 1000 draws of a record.
     OSError
-        If the file cannot be written; there is then none of its name.
+        If the file cannot be written; it does not exist then.
     """
     text, shard, folder = task
     spec = _parsed(text)
@@ -75,7 +75,7 @@ def write_shard(task: tuple[str, int, str]) -> Written:
     records = generate_records(spec, begin, min(begin + spec.shard_records, spec.records))
     content = netcdf_of(records_as_dataset(spec, records))
     path = Path(folder) / shard_file(shard)
-    with ThreadPoolExecutor(1) as beside:  # while the disk is waited for
+    with ThreadPoolExecutor(1) as beside:  # during the write to the disk
         digest = beside.submit(_sha256, content)
         try:
             with write_atomically(path) as temporary, open(temporary, "wb") as file:
@@ -108,7 +108,7 @@ def _parsed(text: str) -> Specification:
 
 
 def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
-    """Records with dimensions record, sweep and sample, as they lie in a shard."""
+    """Convert records to the dataset of a shard, with dimensions record, sweep and sample."""
     variables: dict[str, Any] = {}
     families = [group.family for group in spec.groups]
     variables["truth_family"] = ("record", records.family.astype(np.int16), _flags("family of the contour", families))
@@ -140,16 +140,16 @@ def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
 
 
 def _flags(long_name: str, meanings: list[str] | tuple[str, ...], kind: Any = np.int16) -> dict[str, Any]:
-    """Attributes of numbers that stand for words, as the CF conventions have them."""
+    """Attributes of numbers that stand for words, by the CF conventions."""
     words = " ".join(meaning.replace(" ", "_") for meaning in meanings)
     return {"long_name": long_name, "flag_values": np.arange(len(meanings), dtype=kind), "flag_meanings": words}
 
 
 def _parameters(spec: Specification, records: Records) -> dict[str, tuple[str, Floats, dict[str, str]]]:
-    """Parameters of the contours by name, NaN where a family has no such."""
+    """Parameters of the contours by name; NaN for families without the parameter."""
     found = {}
-    for name in dict.fromkeys(name for group in spec.groups for name in group.laws):
-        having = [g for g, group in enumerate(spec.groups) if name in group.laws]
+    for name in dict.fromkeys(name for group in spec.groups for name in group.distributions):
+        having = [g for g, group in enumerate(spec.groups) if name in group.distributions]
         values = np.full(records.index.size, np.nan)
         for g in having:
             drawn = records.drawn[f"contours[{g}].{name}"]
@@ -162,7 +162,7 @@ def _parameters(spec: Specification, records: Records) -> dict[str, tuple[str, F
 
 
 def _unit(spec: Specification, name: str, entries: list[FamilyParameter]) -> str:
-    """Unit of a parameter of several families, "see family" where they differ; and of a flank's a, as it always was."""
+    """Unit of a parameter of several families; "see family" if they differ, and for a flank's a, as in older files."""
     powers = {1: "m", -1: "1/m"} if spec.units == "SI" else {}
     units = {powers.get(entry.length_power, entry.unit) for entry in entries}
     return units.pop() if len(units) == 1 and not (powers and name.endswith("_a")) else "see family"

@@ -1,4 +1,4 @@
-"""One record of a data set, read or made again."""
+"""One record of a data set, read or regenerated."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ __all__ = ["contour_of", "record"]
 def record(
     source: str | os.PathLike[str] | Mapping[str, Any] | Specification, index: int, *, truth: bool = True
 ) -> xr.Dataset:
-    """One record of a data set, as `infer_contour`, `reconstruct` and `write_record` take it.
+    """Return one record of a data set, as `infer_contour`, `reconstruct` and `write_record` take it.
 
     Parameters
     ----------
     source : path-like, mapping or Specification
-        A folder, from which it is read; or a specification (a TOML file, or what it says), from which it is made
-        again, together with its shard: the same to the last bit.
+        A folder, from which the record is read; or a specification (a TOML file, or its content), from which it is
+        generated with its shard, identical to the last bit.
     index : int
-        Its number.
+        Number of the record.
     truth : bool
-        Whether the `truth_` columns are kept.
+        Whether the `truth_` columns are included.
 
     Returns
     -------
     xr.Dataset
-        With the contour's family and parameters, the rod and the data sheet as attributes.
+        The record, with the contour's family and parameters, the rod and the data sheet as attributes.
 
     Raises
     ------
     SpecificationError
-        If the source is no data set and no specification, or the record is not there yet.
+        If the source is neither a data set nor a specification, or the record does not exist yet.
     ParameterError
         If there is no record of that number.
     OSError
@@ -87,12 +87,17 @@ def contour_of(record: xr.Dataset) -> Contour:
     Parameters
     ----------
     record : xr.Dataset
-        As `record` gives it; in metres if the record is SI, else in rod lengths.
+        A record from `record`.
+
+    Returns
+    -------
+    Contour
+        In metres if the record is SI, else in rod lengths.
 
     Raises
     ------
     ParameterError
-        If its attributes name no contour.
+        If its attributes do not name a contour.
 
     Examples
     --------
@@ -126,8 +131,8 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
         if variable.dims == ("sweep", "sample"):
             if truth or not name.startswith("truth_"):
                 values = variable.values.ravel()
-                words = str(variable.attrs.get("flag_meanings", "")).split()
-                columns[name] = np.array(words)[values] if words else values.astype(np.float64)
+                names = str(variable.attrs.get("flag_meanings", "")).split()
+                columns[name] = np.array(names)[values] if names else values.astype(np.float64)
         elif variable.dims == () and name.startswith(("truth_contour_", "load_cell_")) and np.isfinite(variable.values):
             attrs[name] = float(variable)
     if spec.single:
@@ -146,7 +151,7 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
 
 
 def _restore_limits(columns: dict[str, Any], cell: LoadCell) -> None:
-    """Put readings at the end of the range back there, from where 32 bits have moved them."""
+    """Move readings at the end of the range, which 32 bits have rounded, back to it."""
     for name, limit in zip(CHANNELS, cell.limit, strict=True):
         with np.errstate(over="ignore"):
             at_limit = np.abs(columns[name]) == np.float32(limit)

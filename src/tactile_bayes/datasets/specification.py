@@ -1,4 +1,4 @@
-"""The specification of a data set: what is drawn, how it is swept and measured, and how many times."""
+"""The specification of a data set: contours, sweeps, load cell, and the number of records."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tactile_bayes.checks import as_number, check_choice, check_kind, check_number, check_whole_number, refused
 from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
 from tactile_bayes.contours.family import Family
-from tactile_bayes.datasets.laws import Law, law_of
+from tactile_bayes.datasets.distributions import Distribution, distribution_of
 from tactile_bayes.datasets.specification_text import canonical, toml_of, without
 from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
@@ -42,12 +42,12 @@ UNNAMED = "unnamed"
 
 _MOST_SHARDS = 1_000_000
 _MOST_NAMED = 8
-"""Keys in a refusal of one that there is not."""
+"""Largest number of keys that the message about an unknown key lists."""
 
 _LARGEST_SEED = 2**63 - 1
 
 _AT_HAND = 2**14
-"""Samples in a block: a column of them is 128 kB."""
+"""Number of samples in a block: a column of them takes 128 kB."""
 
 _SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1, "friction": 0.0}
 _DEFAULTS = {
@@ -60,7 +60,7 @@ _DEFAULTS = {
     "load_cell": {"frame": "fixed"},
     "rod": {"diameter": 0.0},
 }
-"""What is meant where a key is left out; written out it says the same."""
+"""Default values of keys; a specification with an explicit default is the same."""
 
 _TABLES: Mapping[str, Iterable[str]] = {
     "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour"),
@@ -68,37 +68,36 @@ _TABLES: Mapping[str, Iterable[str]] = {
     "scan.": ("bases", "directions", "samples", "from_degrees", "to_degrees", "margin", "friction"),
     "load_cell.": ("frame", *LOAD_CELL_UNITS),
 }
-"""The keys of each table."""
+"""Keys of each table."""
 
 _REPLACED = {
     "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
     "shape-free": ("radius", "r", "its mean (geometric) over slope angles"),
 }
-"""By family: a parameter of earlier versions, the one in its place, and what that is."""
+"""Parameters of earlier versions by family: the old one, the new one, and its meaning."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """Contours of one family, with a law for each parameter."""
+    """Contours of one family, with a distribution for each parameter."""
 
     family: str
     weight: float
-    laws: Mapping[str, Law]
+    distributions: Mapping[str, Distribution]
 
 
 @dataclass(frozen=True)
 class Drive:
-    """The drive angles of a sweep: between two of them, or about the contact.
+    """Drive angles of a sweep: between two angles, or about the contact.
 
     Parameters
     ----------
     samples : int
-        In each sweep, evenly spaced.
+        Number of evenly spaced samples in each sweep.
     begin, end : float, optional
         Least and greatest angle [rad]; backward sweeps go from the greatest to the least.
     margin : float
-        Where those are left out: unloaded samples before first contact and after snap-off, each as a share of the
-        angle between them.
+        Without these angles: range before first contact and after snap-off, each as a share of the angle between them.
     """
 
     samples: int
@@ -109,31 +108,38 @@ class Drive:
 
 @dataclass(frozen=True)
 class Specification:
-    """All that the numbers of a data set follow from; `read_specification` makes one.
+    """Complete description of a data set; `read_specification` makes one.
 
     Attributes
     ----------
     text : str
-        What was read.
+        Text of the specification.
     name, description : str
+        Name and description of the data set.
     records, shard_records : int
-        How many in all, and in each file.
+        Number of records in all, and in each file.
     seed : int
+        Seed of the random numbers.
     groups : tuple of Group
+        Families of contours.
     each_group : bool
-        Whether the groups come one after the other, and are not drawn.
-    rod : mapping of str to Law
-        length, flexural_rigidity and diameter; empty where everything is in rod lengths.
-    bases : tuple of (Law, Law)
+        Whether the groups are used in turn, and not drawn.
+    rod : mapping of str to Distribution
+        length [m], flexural_rigidity [N m²] and diameter [m]; empty for a dimensionless data set.
+    bases : tuple of (Distribution, Distribution)
+        Pivots (x, y) [m, or rod lengths].
     directions : tuple of str
+        Directions of the sweeps about each pivot.
     drive : Drive
+        Drive angles.
     friction : float
-    load_cell : mapping of str to Law
-        Entries of a data sheet.
+        Coulomb's coefficient μ.
+    load_cell : mapping of str to Distribution
+        Entries of a data sheet, in the units of the data set.
     frame : {"fixed", "turning"}
-        Of the load cell.
+        Frame of the load cell.
     single : bool
-        Whether files hold numbers of 32 bits.
+        Whether files contain numbers of 32 bits.
     """
 
     text: str
@@ -144,12 +150,12 @@ class Specification:
     seed: int
     groups: tuple[Group, ...]
     each_group: bool
-    rod: Mapping[str, Law]
-    bases: tuple[tuple[Law, Law], ...]
+    rod: Mapping[str, Distribution]
+    bases: tuple[tuple[Distribution, Distribution], ...]
     directions: tuple[str, ...]
     drive: Drive
     friction: float
-    load_cell: Mapping[str, Law]
+    load_cell: Mapping[str, Distribution]
     frame: Frame
     single: bool
 
@@ -160,12 +166,12 @@ class Specification:
 
     @property
     def sha256(self) -> str:
-        """Of what the specification means; see `meaning`."""
+        """SHA-256 of the meaning of the specification; see `meaning`."""
         return hashlib.sha256(json.dumps(meaning(self.text), sort_keys=True).encode()).hexdigest()
 
     @property
     def has_thickness(self) -> bool:
-        """Whether the rod has a diameter, or may have one."""
+        """True if the rod has, or may have, a diameter."""
         return bool(self.rod) and (self.rod["diameter"].is_drawn or any(self.rod["diameter"].numbers))
 
     @property
@@ -178,45 +184,55 @@ class Specification:
         return tuple((base, direction) for base in range(len(self.bases)) for direction in self.directions)
 
     def blocks(self, records: int) -> list[NDArray[np.intp]]:
-        """Indices of so many records in blocks, each with no more samples than a processor has at hand at once."""
+        """Split the indices of records into blocks whose samples fit into a processor's cache."""
         samples = records * len(self.sweeps) * self.drive.samples
         return np.array_split(np.arange(records), max(1, -(-samples // _AT_HAND)))
 
     @property
-    def laws(self) -> tuple[tuple[str, Law], ...]:
-        """Every law with its key, in the order in which numbers are drawn."""
+    def distributions(self) -> tuple[tuple[str, Distribution], ...]:
+        """All distributions with their keys, in the order in which numbers are drawn."""
         tables = {
-            **{f"contours[{g}].": group.laws for g, group in enumerate(self.groups)},
+            **{f"contours[{g}].": group.distributions for g, group in enumerate(self.groups)},
             "rod.": self.rod,
             **{f"scan.bases[{b}]": {"[0]": x, "[1]": y} for b, (x, y) in enumerate(self.bases)},
             "load_cell.": self.load_cell,
         }
-        return tuple((prefix + name, law) for prefix, laws in tables.items() for name, law in laws.items())
+        return tuple(
+            (prefix + name, distribution)
+            for prefix, distributions in tables.items()
+            for name, distribution in distributions.items()
+        )
 
     @property
     def combinations(self) -> int:
-        """Of the entries of all lists."""
+        """Number of combinations of the entries of all lists."""
         return math.prod(count for _, count in self.lists)
 
     @property
     def lists(self) -> tuple[tuple[str, int], ...]:
-        """What comes one after the other, with the number of turns: the last changes fastest."""
+        """Keys of the lists that are used in turn, with their lengths: the last changes fastest."""
         found = {"contours": len(self.groups)} if self.each_group else {}
-        for key, law in self.laws:
-            if law.kind == "each" and found.setdefault(law.axis or key, len(law.numbers)) != len(law.numbers):
+        for key, distribution in self.distributions:
+            axis, count = distribution.axis or key, len(distribution.numbers)
+            if distribution.kind == "each" and found.setdefault(axis, count) != count:
                 raise SpecificationError(
-                    f"{key} has {len(law.numbers)} numbers, and another list on the axis {law.axis!r} has "
-                    f"{found[law.axis or key]}: lists that advance in step are equally long"
+                    f"{key} has {count} numbers, and another list on the axis {distribution.axis!r} has {found[axis]}: "
+                    "lists that advance in step are equally long"
                 )
         return tuple(found.items())
 
 
 def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Specification:
-    """The specification in a TOML file, or in a mapping of the same form.
+    """Read the specification in a TOML file, or in a mapping of the same form.
 
     Parameters
     ----------
     source : path-like or mapping
+        File, or its content as nested mappings.
+
+    Returns
+    -------
+    Specification
 
     Raises
     ------
@@ -247,8 +263,9 @@ def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Sp
 
 
 def meaning(text: str) -> dict[str, Any]:
-    """What the text of a specification says; comments, layout, whether a number is written 1 or 1.0, and whether a key
-    is left out or written with the value that it has then, do not count."""
+    """Return the meaning of the text of a specification.
+
+    It does not depend on comments, layout, the notation of numbers (1 or 1.0), or explicit default values."""
     said = without(_DEFAULTS, tomllib.loads(text))
     said["contours"] = [
         without({"weight": 1.0, **left_out(FAMILIES[group["family"]])}, group) for group in said["contours"]
@@ -257,7 +274,7 @@ def meaning(text: str) -> dict[str, Any]:
 
 
 def read_text(text: str) -> Specification:
-    """The specification that a TOML text states; see `read_specification`."""
+    """Read the specification in a TOML text; see `read_specification`."""
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -271,7 +288,7 @@ def read_text(text: str) -> Specification:
 
 
 def left_out(family: Family) -> dict[str, Any]:
-    """What is meant where a parameter of a family is left out: the middle, and what is standard normal."""
+    """Default values of the parameters of a family: x_c = 0, and standard normal weights."""
     standard = {"normal": [0.0, 1.0]}
     return {
         "x_c": 0.0,
@@ -280,9 +297,9 @@ def left_out(family: Family) -> dict[str, Any]:
 
 
 def rule_of(error: ContourError) -> str:
-    """The rule that parameters have broken, without their values, so that many breaches of it count as one."""
-    words = str(error).partition("; found ")[0]
-    return words.partition(": ")[2] or words
+    """Return the rule that an error states, without the values, so that errors can be counted by rule."""
+    message = str(error).partition("; found ")[0]
+    return message.partition(": ")[2] or message
 
 
 def _specification(table: Mapping[str, Any], text: str) -> Specification:
@@ -346,96 +363,101 @@ def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
     values = {"weight": 1.0, **left_out(family), **group}
     missing = [parameter for parameter in names if parameter not in values]
     if missing:
-        raise SpecificationError(f"{key} is a {name} and has no {missing[0]}: give a number or a law")
+        raise SpecificationError(f"{key} is a {name} and has no {missing[0]}: give a number or a distribution")
     weight = _number(values["weight"], f"{key}.weight", 0.0, 1e9)
     if weight == 0.0 or (each and "weight" in group):
         why = "it must be positive" if not each else "with each_contour every family comes as often"
         raise SpecificationError(f"{key}.weight is {weight!r}: {why}")
-    laws = {parameter: law_of(values[parameter], f"{key}.{parameter}") for parameter in names}
-    _refuse_no_contour(family, laws, key)
-    return Group(name, weight, laws)
+    distributions = {parameter: distribution_of(values[parameter], f"{key}.{parameter}") for parameter in names}
+    _refuse_no_contour(family, distributions, key)
+    return Group(name, weight, distributions)
 
 
 def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
-    """Refuse parameters that families had in earlier versions, and say what to write instead."""
+    """Refuse parameters of earlier versions, and name the new ones."""
     for side, flank in sides_of(name).items():
-        old, new, remedy = _REPLACED.get(flank, ("", "", ""))
+        old, new, correction = _REPLACED.get(flank, ("", "", ""))
         if not old or side + old not in group:
             continue
         a, n = as_number(group[side + old]), as_number(group.get(f"{side}n"))
         if flank == "power-law" and a is not None and n is not None and a > 0.0 and n > 1.0:
-            remedy += f", here {a ** (1.0 / (1.0 - n)):.12g}"
+            correction += f", here {a ** (1.0 / (1.0 - n)):.12g}"
         raise SpecificationError(
             f"{key}.{side}{old} was a parameter of the family {flank} in earlier versions: write {side}{new} in its "
-            f"place, {remedy}"
+            f"place, {correction}"
         )
 
 
-def _refuse_no_contour(family: Family, laws: Mapping[str, Law], key: str) -> None:
-    """Refuse parameters that no contour has, whatever the others are, by what a law may give at its ends; draws of laws
-    without end are tried as they come."""
+def _refuse_no_contour(family: Family, distributions: Mapping[str, Distribution], key: str) -> None:
+    """Refuse parameters that are impossible for any values of the others, by the ends of the distributions; draws from
+    unbounded distributions are tested later."""
     possible = {name: np.full(1, 2.0 if name.endswith("n") else 1.0) for name in family.parameters}
-    for name, law in laws.items():
-        numbers = law.numbers
-        if law.kind in ("normal", "log_normal"):
-            numbers = () if law.numbers[1] else law.numbers[:1]
+    for name, distribution in distributions.items():
+        numbers = distribution.numbers
+        if distribution.kind in ("normal", "log_normal"):
+            numbers = () if distribution.numbers[1] else distribution.numbers[:1]
         for number in numbers:
             try:
                 family.contour(possible | {name: np.full(1, number)})
             except ContourError as error:
-                verb = "is" if law.kind == "constant" else "may be"
+                verb = "is" if distribution.kind == "constant" else "may be"
                 raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
 
 
-def _rod(rod: Mapping[str, Any]) -> dict[str, Law]:
+def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
     if not rod:
         return {}
     if "length" not in rod or "flexural_rigidity" not in rod:
         raise SpecificationError(
             "rod needs length [m] and flexural_rigidity [N m²]; without [rod] lengths are in rod lengths"
         )
-    laws = {name: law_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
-    _refuse_negative(laws, "rod.", or_zero={"diameter"})
+    distributions = {name: distribution_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
+    _refuse_negative(distributions, "rod.", or_zero={"diameter"})
     try:
-        Rod(*_at_share(laws, 0.5).values())
+        Rod(*_at_share(distributions, 0.5).values())
     except ParameterError as error:
         raise SpecificationError(f"rod: {error}") from error
-    return laws
+    return distributions
 
 
-def _load_cell(table: Mapping[str, Any]) -> dict[str, Law]:
-    laws = {name: law_of(value, f"load_cell.{name}") for name, value in table.items()}
-    if any(name.startswith("ornstein_uhlenbeck") for name in laws):
-        laws.setdefault("ornstein_uhlenbeck_time", Law("constant", (OrnsteinUhlenbeck().time,)))
+def _load_cell(table: Mapping[str, Any]) -> dict[str, Distribution]:
+    distributions = {name: distribution_of(value, f"load_cell.{name}") for name, value in table.items()}
+    if any(name.startswith("ornstein_uhlenbeck") for name in distributions):
+        distributions.setdefault("ornstein_uhlenbeck_time", Distribution("constant", (OrnsteinUhlenbeck().time,)))
     for share in (0.05, 0.5, 0.95):
         try:
-            LoadCell.from_entries(_at_share(laws, share))
+            LoadCell.from_entries(_at_share(distributions, share))
         except ParameterError as error:
             raise SpecificationError(f"load_cell: {error}") from error
     signed = ("bias_holding", "bias_force", "gain_", "lever_", "correlation_", "drive_angle_o", "drive_angle_b")
-    unsigned = {name: law for name, law in laws.items() if not name.startswith(signed)}
+    unsigned = {name: distribution for name, distribution in distributions.items() if not name.startswith(signed)}
     _refuse_negative(unsigned, "load_cell.", or_zero=set(unsigned))
-    return laws
+    return distributions
 
 
-def _at_share(laws: Mapping[str, Law], share: float) -> dict[str, float]:
-    """The numbers of laws at a share of their probability."""
+def _at_share(distributions: Mapping[str, Distribution], share: float) -> dict[str, float]:
+    """Return the quantiles of distributions at a probability."""
     turn = np.zeros(1, dtype=np.intp)
-    return {name: float(law.at(np.full(1, share), turn)[0]) for name, law in laws.items()}
+    return {name: float(distribution.at(np.full(1, share), turn)[0]) for name, distribution in distributions.items()}
 
 
-def _refuse_negative(laws: Mapping[str, Law], prefix: str, or_zero: Container[str]) -> None:
-    for name, law in laws.items():
-        low = law.least
+def _refuse_negative(distributions: Mapping[str, Distribution], prefix: str, or_zero: Container[str]) -> None:
+    for name, distribution in distributions.items():
+        low = distribution.least
         if low < 0.0 or (low == 0.0 and name not in or_zero):
             what = "negative" if low < 0.0 else "0"
-            raise SpecificationError(f"{prefix}{name} may be {what}: choose a law of positive numbers, as log_normal")
+            raise SpecificationError(
+                f"{prefix}{name} may be {what}: choose a distribution of positive numbers, as log_normal"
+            )
 
 
-def _bases(value: Any) -> tuple[tuple[Law, Law], ...]:
+def _bases(value: Any) -> tuple[tuple[Distribution, Distribution], ...]:
     if not isinstance(value, list) or not value or not all(isinstance(pair, list) and len(pair) == 2 for pair in value):
         raise refused("scan.bases", value, "give a list of pivots, each [x, y]")
-    return tuple((law_of(x, f"scan.bases[{i}][0]"), law_of(y, f"scan.bases[{i}][1]")) for i, (x, y) in enumerate(value))
+    return tuple(
+        (distribution_of(x, f"scan.bases[{i}][0]"), distribution_of(y, f"scan.bases[{i}][1]"))
+        for i, (x, y) in enumerate(value)
+    )
 
 
 def _directions(value: Any) -> tuple[str, ...]:
@@ -463,7 +485,7 @@ def _drive(scan: Mapping[str, Any]) -> Drive:
 
 
 def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
-    """One of the tables inside, with keys that there are."""
+    """Return one of the inner tables, and refuse unknown keys."""
     value = table.get(key, {})
     check_kind(key, value, dict, f"write it as a table, [{key}]")
     _refuse_unknown(value, _TABLES[f"{key}."], f"{key}.")

@@ -1,4 +1,4 @@
-"""The text of a specification: TOML of a mapping, and what a text says whatever its layout."""
+"""The text of a specification: TOML from a mapping, and a canonical form."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["canonical", "differences", "toml_of", "without"]
 
 
 def canonical(value: Any) -> Any:
-    """What a TOML value says, with one kind of number."""
+    """Return a TOML value with one kind of number."""
     if isinstance(value, dict):
         return {key: canonical(inner) for key, inner in value.items()}
     if isinstance(value, list):
@@ -26,7 +26,7 @@ def canonical(value: Any) -> Any:
 
 
 def without(defaults: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said, without the keys that have their default, and without tables that have no other."""
+    """Remove keys with default values, and tables that contain no others."""
     found = {}
     for key, value in said.items():
         default = defaults.get(key)
@@ -39,9 +39,9 @@ def without(defaults: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, A
 
 
 def differences(one: Any, other: Any, key: str = "") -> list[tuple[str, Any, Any]]:
-    """Where two canonical specifications differ: the key, and both values, None where there is none.
+    """Find the differences of two canonical specifications: the key and both values, None for a missing one.
 
-    A law is one value, and so is a whole table of contours that the other does not have.
+    A distribution is one value, and so is a whole table of contours that the other specification lacks.
     """
     if key == "contours":
         tables = zip_longest(one or [], other or [])
@@ -58,7 +58,7 @@ def differences(one: Any, other: Any, key: str = "") -> list[tuple[str, Any, Any
 
 
 def toml_of(table: Mapping[str, Any]) -> str:
-    """A mapping of numbers, words, lists and mappings as TOML, each value in line."""
+    """Convert a mapping of numbers, words, lists and mappings to TOML, with inline values."""
 
     def inline(value: Any) -> str:
         if isinstance(value, bool | str):

@@ -1,4 +1,4 @@
-"""The verification of a data set: every byte against its manifest, and numbers made again."""
+"""The verification of a data set: its bytes against the manifest, and regenerated numbers."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ __all__ = ["Verification", "verify"]
 
 
 class Verification(NamedTuple):
-    """How far a data set is verified."""
+    """Progress of a verification."""
 
     files: int
-    """Files that are as they were written, or came out the same when they were made again."""
+    """Number of files that are verified, unchanged or identical when regenerated."""
     wanted: int
 
 
@@ -40,24 +40,25 @@ def verify(
     Parameters
     ----------
     path : path-like
-        Its folder.
+        Folder of the data set.
     regenerate : int
-        How many shards, evenly spread, are made again and compared number by number: with other versions of the
-        libraries they may differ in the last digit.
+        Number of shards, evenly spread, that are generated again and compared number by number; with other versions of
+        the libraries they may differ in the last digit.
     progress : callable, optional
-        Is given a `Verification` after each file, and after each that was made again.
+        Called with a `Verification` after each file, and after each regenerated file.
 
     Returns
     -------
     Manifest
+        Manifest of the data set.
 
     Raises
     ------
     SpecificationError
-        If a file is missing, too many, or not as it was written, the data set is not complete, or a number comes out
-        otherwise; the message names the first such file.
+        If a file is missing, not listed, or changed, the data set is not complete, or a regenerated number differs; the
+        message names the first such file.
     ParameterError
-        If `regenerate` is no number of shards.
+        If `regenerate` is not a number of shards.
     """
     if not isinstance(regenerate, int) or regenerate < 0:
         raise ParameterError(f"regenerate is {regenerate!r}: give a number of shards, 0 for none")

@@ -1,4 +1,4 @@
-"""The load cell: what a sensor does to a record, and how likely what it measured is."""
+"""The load cell: a model of the sensor, which corrupts records and gives the likelihood of readings."""
 
 from tactile_bayes.load_cell.cell import LoadCell
 from tactile_bayes.load_cell.drift import OrnsteinUhlenbeck, RandomWalk

@@ -1,4 +1,4 @@
-"""The load cell: what a sensor does to a record, and how likely what it measured is."""
+"""The load cell: a model of the sensor, which corrupts records and gives the likelihood of readings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_seed
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
-from tactile_bayes.load_cell.covariance import covariance, surprise
+from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.likelihood import (
     approximations,
@@ -32,72 +32,71 @@ __all__ = ["LoadCell"]
 
 @dataclass(frozen=True)
 class LoadCell(DataSheet):
-    """A load cell and an encoder at the pivot: one description, to corrupt a record and to say how likely one is.
+    """A load cell and an encoder at the pivot: one description for the corruption of records and their likelihood.
 
-    With h the loads (holding moment and support reaction, zero out of contact) at the true drive angle φ, it reads
+    With the loads h (holding moment and support reaction, zero out of contact) at the true drive angle φ, it reads
 
         y = gain · lever(h) + bias + drift + ε, cut off at ± range, rounded to steps of the resolution,
-        drive_angle = φ + offset ± backlash/2 + noise, rounded likewise,
+        drive_angle = φ + offset ± backlash/2 + noise, rounded in the same way,
 
-    where the lever makes the moment m0 − x·force_y + y·force_x, and + is for forward motion, − for backward.
+    where the lever changes the moment to m0 − x·force_y + y·force_x, and + holds for forward motion, − for backward.
 
-    The default is an ideal sensor; every entry adds one flaw. Quantities are in the unit of the record that the cell is
-    used on: N and N m, or EI/L² and EI/L (a rod of 0.1 m and 1e-5 N m² has EI/L² = 1 mN, EI/L = 0.1 mN m). Entries in
-    threes are for holding_moment, force_x and force_y.
+    The default is an ideal sensor; every entry adds one flaw. Quantities are in the units of the record with which the
+    cell is used: N and N m, or EI/L² and EI/L (a rod of 0.1 m and 1e-5 N m² has EI/L² = 1 mN, EI/L = 0.1 mN m). Entries
+    of three numbers are for holding_moment, force_x and force_y.
 
     Parameters
     ----------
     force_noise, moment_noise : float
-        Scale of the white noise ε on each force and on the moment: its standard deviation if it is normal. What a data
-        sheet calls noise floor at the sampling rate. A good six-axis cell has some mN and 0.1 mN m; one that suits the
-        rod has 0.001 to 0.05 of EI/L² and EI/L. If bands come out too narrow, they are too small.
+        Scale of the white noise ε on each force and on the moment: its standard deviation if it is normal. A data sheet
+        calls it noise floor at the sampling rate. A good six-axis cell has some mN and 0.1 mN m; a cell that suits the
+        rod has 0.001 to 0.05 of EI/L² and EI/L. If bands are too narrow, these values are too small.
     degrees_of_freedom : float
-        Of Student's t, which ε follows, channel by channel: ∞ is normal; 3 to 10 for knocks and sparks, which give a
-        sample in a hundred far out. The scale is then force_noise and moment_noise all the same.
+        Degrees of freedom of Student's t, the distribution of ε in each channel: ∞ for normal noise; 3 to 10 for knocks
+        and sparks, which make one sample in a hundred an outlier. The scale stays force_noise and moment_noise.
     relative_noise : float
         Noise in proportion to the load, standard deviation (or scale) over reading, added in squares: 0.001 to 0.01 for
-        a bridge whose supply is not steady.
+        a bridge with an unsteady supply.
     correlation : (float, float, float)
-        Coefficients between the noises of moment and force_x, moment and force_y, force_x and force_y: of amplifiers
-        and vibrations that are shared, 0 to ± 0.9.
+        Correlation coefficients of the noise of moment and force_x, moment and force_y, force_x and force_y, due to
+        shared amplifiers and vibrations: 0 to ± 0.9.
     bias : (float, float, float)
-        What is read without load: weight of the rod, some 0.01 of EI/L² of a light one; anything at all where a tare
-        was forgotten.
+        Reading without load: the weight of the rod, some 0.01 of EI/L² for a light one, or any value without a tare.
     bias_uncertainty : (float, float, float)
-        Standard deviation of what is not known of the bias, constant in a record: it is drawn once for each that is
-        measured, and integrated out of the likelihood. After taring on n samples, noise/√n;
-        `from_zero_load` finds it.
+        Standard deviation of the unknown part of the bias, which is constant in a record: it is drawn once for each
+        record, and the likelihood integrates over it. After taring on n samples it is noise/√n; `from_zero_load`
+        estimates it.
     drift : RandomWalk or OrnsteinUhlenbeck, optional
-        Wandering of the zero from sample to sample, through all sweeps of a record; the two say of what size. One of
-        no size is None.
+        Drift of the zero from sample to sample through all sweeps of a record; the two classes state typical sizes. A
+        drift of size zero is None.
     gain : three rows of (float, float, float)
-        Readings (rows) by loads (columns): errors of the calibration on the diagonal, 1 ± 0.005, cross-talk beside it,
-        1 to 2 % of full scale. Between moment and force it has units of length.
+        Readings (rows) by loads (columns): calibration errors on the diagonal, 1 ± 0.005, and cross-talk beside it,
+        1 to 2 % of full scale. Between moment and force it has a unit of length or its inverse.
     lever : (float, float)
-        Where the cell takes its moment, from the pivot, along the axes that it measures along [length]: what is beside
-        the axle reads a force as a moment. 0.005 of the rod's length where nobody has measured it. Axes that turn are
-        those along the rod at the pivot, and across it.
+        Position of the cell's reference point for moments relative to the pivot, along the axes of the cell [length]:
+        beside the axle a force contributes to the moment. Typically 0.005 of the rod's length if not measured. The axes
+        of a turning cell are those along the rod at the pivot and across it.
     force_range, moment_range : float
-        Largest size of a reading: what is beyond is cut off (with a resolution at the last step in the range). A bridge
-        is rated to about twice what is wanted of it.
+        Largest size of a reading, at which readings are cut off (with a resolution, at the last step in the range). A
+        bridge is typically rated to twice the largest expected load.
     force_resolution, moment_resolution : float
-        Step of the reading: of a 16 bit converter, range/32768; mostly below the noise.
+        Step of the reading: range/32768 for a 16 bit converter; mostly below the noise.
     drive_angle_offset : float
-        What the encoder reads in zero position [rad]; 0.01 (about 0.5°) after aligning by eye.
+        Encoder offset: its reading in zero position [rad]; 0.01 (about 0.5°) after alignment by eye.
     drive_angle_backlash : float
-        What the encoder reads more while the drive moves forward than while it moves backward [rad], half of it too
-        much and half too little: 0.003 (about 0.2°) of a gear; less where the encoder sits on the axle itself.
+        Difference of the encoder's readings in forward and backward motion [rad]: half of it is added forward, and half
+        subtracted backward. 0.003 (about 0.2°) for a gear; less if the encoder sits on the axle itself.
     drive_angle_noise, drive_angle_resolution : float
         Standard deviation of the encoder's noise [rad], mostly below a step, and its step [rad]: 2π/4096 = 0.0015 for
-        one of 1024 lines. The rod follows the true angle, which is in order all the same, and contact ends once.
+        one of 1024 lines. The rod follows the true angle, which is monotonic, and contact ends once.
     frame : {"fixed", "turning"}, optional
-        Whether the cell measures forces along the axes of the world, or turns with the drive; all the above is in its
-        own frame. By default that of the record that it measures.
+        Whether the cell measures forces along the axes of the laboratory, or turns with the drive; all entries are in
+        its own frame. By default the frame of the record that it measures.
 
     Raises
     ------
     ParameterError
-        If an entry is impossible, with what would be possible.
+        If an entry is impossible; the message says what is possible.
 
     Examples
     --------
@@ -107,13 +106,17 @@ class LoadCell(DataSheet):
 
     @classmethod
     def from_record(cls, record: xr.Dataset) -> LoadCell | None:
-        """The load cell whose data sheet a record carries, in the record's units, or None if it carries none.
+        """Load cell from the data sheet in a record's attributes, in the record's units; None if there is none.
 
         Parameters
         ----------
         record : xr.Dataset
-            A record; its attributes that begin with "load_cell_" and are numbers are the data sheet; what they
-            leave out is ideal. The frame is the record's.
+            A record. Its numeric attributes that begin with "load_cell_" are the data sheet; missing entries are ideal.
+            The frame is the record's.
+
+        Returns
+        -------
+        LoadCell or None
 
         Raises
         ------
@@ -133,26 +136,26 @@ class LoadCell(DataSheet):
 
     @classmethod
     def from_zero_load(cls, record: xr.Dataset, *, false_alarm: float = 1e-3) -> LoadCell:
-        """The load cell that a record's unloaded stretches tell of: bias, its uncertainty, and white noise.
+        """Load cell with bias, its uncertainty, and white noise estimated from a record's unloaded stretches.
 
         Parameters
         ----------
         record : xr.Dataset
-            A record with samples before first contact or after snap-off, which need not be labelled; see `zero_load`.
+            A record with samples before first contact or after snap-off, without labels; see `zero_load`.
         false_alarm : float
-            As in `zero_load`.
+            Error probability, as in `zero_load`.
 
         Returns
         -------
         LoadCell
-            In the record's units and frame. The noise of the forces is the root mean square of both, or the larger
-            where they differ more than noise explains. A missing channel has neither bias nor noise. What else is
-            known of the cell can be added with `dataclasses.replace`.
+            In the record's units and frame. The noise of the forces is the root mean square of both, or the larger one
+            if they differ significantly. A missing channel has neither bias nor noise. Further entries can be added
+            with `dataclasses.replace`.
 
         Raises
         ------
         RecordError
-            If fewer than 3 samples are unloaded for certain.
+            If fewer than 3 samples are certainly unloaded.
         ParameterError
             If `false_alarm` is not a probability below a half.
 
@@ -176,7 +179,7 @@ class LoadCell(DataSheet):
     def standard_deviations(self) -> Mapping[str, float]:
         """Standard deviation of the white noise on each channel without load, in the order of `CHANNELS`.
 
-        Infinite for Student's t with 2 degrees of freedom and fewer.
+        They are in the units of the cell, and infinite for Student's t with 2 degrees of freedom or fewer.
         """
         nu = self.degrees_of_freedom
         widening = 1.0 if math.isinf(nu) else math.sqrt(nu / (nu - 2.0)) if nu > 2.0 else math.inf
@@ -184,11 +187,11 @@ class LoadCell(DataSheet):
 
     @property
     def approximations(self) -> tuple[str, ...]:
-        """In words, where `log_likelihood` is not exact for this load cell; infer_contour notes it in its result.
+        """Descriptions of approximations in `log_likelihood` for this load cell; infer_contour puts them in its result.
 
-        Taking the steps of the reading for noise is wrong by little: with an unknown bias as large as the noise, and
-        10 samples, steps of 0.5, 1 and 2 standard deviations of the noise change the log-likelihood by 0.00003, 0.0004
-        and 0.004 per sample (standard deviation over records; the mean is less), and what it says between two loads one
+        Steps of the reading that count as noise cause small errors: with an unknown bias as large as the noise, and 10
+        samples, steps of 0.5, 1 and 2 standard deviations of the noise change the log-likelihood by 0.00003, 0.0004 and
+        0.004 per sample (standard deviation over records; the mean is less), and its difference between two loads one
         standard error apart by 0.0002, 0.003 and 0.03.
 
         Examples
@@ -199,31 +202,31 @@ class LoadCell(DataSheet):
         return approximations(self)
 
     def measure(self, record: xr.Dataset, *, seed: int | np.random.Generator) -> xr.Dataset:
-        """The record as this load cell gives it.
+        """Measure a record with this load cell.
 
         Parameters
         ----------
         record : xr.Dataset
             A record without noise, in the units of the load cell. It is not changed.
         seed : int or np.random.Generator
-            Where the random numbers come from: the same seed, the same numbers. A channel has the same white noise
-            whether or not others are missing.
+            Seed, or generator of the random numbers. A channel has the same white noise whether or not others are
+            missing.
 
         Returns
         -------
         xr.Dataset
-            The record with noise, in the frame of the cell. What was there before is kept in columns
-            truth_drive_angle (if the encoder is not ideal), truth_holding_moment, truth_force_x and truth_force_y,
-            unless the record has them already. The data sheet is kept in attributes that begin with "load_cell_"; of
-            white noise that was there before, by the sum of variances.
+            The record with noise, in the frame of the cell. The true values are stored in columns truth_drive_angle (if
+            the encoder is not ideal), truth_holding_moment, truth_force_x and truth_force_y, unless the record has them
+            already. The data sheet is stored in attributes that begin with "load_cell_"; the variance of white noise
+            from an earlier measurement is added.
 
         Raises
         ------
         RecordError
-            If `record` is not a record, or the encoder's errors are such that the result is none.
+            If `record` is not a record, or the encoder's errors make it invalid.
         ParameterError
-            If `seed` is neither a nonnegative integer nor a generator; if there is cross-talk from a channel that is
-            missing; if the record has been measured before, by a cell with more than white noise.
+            If `seed` is neither a nonnegative integer nor a generator; if there is cross-talk from a missing channel;
+            if a cell with more than white noise has measured the record before.
 
         Examples
         --------
@@ -237,10 +240,10 @@ class LoadCell(DataSheet):
         return measured(self, record, _generator(seed))
 
     def corrected(self, record: xr.Dataset) -> xr.Dataset:
-        """The record with what is known of this cell's errors taken out: bias, gain, lever, offset and backlash.
+        """Correct a record for the known errors of this cell: bias, gain, lever, offset and backlash.
 
-        For points of contact, sample by sample. A likelihood wants the record as it is: of what has been taken out, the
-        ends of the range can no longer be told.
+        Use it for contact points, sample by sample. A likelihood takes the record as measured, since a corrected record
+        no longer shows the ends of the range.
 
         Parameters
         ----------
@@ -250,13 +253,13 @@ class LoadCell(DataSheet):
         Returns
         -------
         xr.Dataset
-            The record itself, if there is nothing to take out. Noise, steps and range are no longer what the data
-            sheet says where the gain has been taken out.
+            The corrected record, or the record itself if there is nothing to correct. After a correction of the gain,
+            noise, steps and range differ from the data sheet.
 
         Raises
         ------
         ParameterError
-            If the frame is another; if there is cross-talk, or a lever, from a channel that the record misses.
+            If the frames differ; if there is cross-talk, or a lever, from a missing channel.
 
         Examples
         --------
@@ -272,7 +275,7 @@ class LoadCell(DataSheet):
         return corrected(self, record)
 
     def refuse_other_frame(self, record: xr.Dataset) -> None:
-        """Raise ParameterError if a record is in another frame than this cell measures in."""
+        """Raise ParameterError if a record is not in the frame of this cell."""
         if self.frame is not None and frame_of(record) != self.frame:
             raise ParameterError(
                 f"the load cell is {self.frame}, but the record's forces are {frame_of(record)}: give the cell without "
@@ -280,12 +283,12 @@ class LoadCell(DataSheet):
             )
 
     def simulate(self, loads: ArrayLike, *, seed: int | np.random.Generator, noise_scale: ArrayLike = 1.0) -> Floats:
-        """Readings of loads, as arrays.
+        """Simulate the readings of loads, as arrays.
 
         Parameters
         ----------
         loads : array_like, shape (..., samples, 3)
-            Channels in the order of `CHANNELS`, in the units and the frame of the load cell.
+            Loads in the order of `CHANNELS`, in the units and the frame of the load cell.
         seed : int or np.random.Generator
             As in `measure`.
         noise_scale : array_like, broadcastable to shape (..., 3)
@@ -315,21 +318,21 @@ class LoadCell(DataSheet):
         return corrupted_loads(self, np.broadcast_to(given, (*batch, *given.shape[-2:])), _generator(seed), scale)
 
     def covariance(self, loads: ArrayLike) -> Floats:
-        """Covariance of the errors of readings, each sample looked at by itself: what samples share counts as noise.
+        """Covariance of the errors of readings for each sample by itself: errors that samples share count as noise.
 
-        White noise in proportion to the loads too, correlations, drift and what is not known of the bias, and steps
-        (as a twelfth of their square).
+        It includes white noise, in proportion to the loads too, correlations, drift, the uncertainty of the bias, and
+        steps (a twelfth of their square).
 
         Parameters
         ----------
         loads : array_like, shape (n_samples, 3)
-            Samples from the first of a record on, since drift may grow. Only noise in proportion to the load asks how
-            large they are.
+            Loads of the samples, beginning with the first of a record, since drift may grow. Their values matter only
+            for noise in proportion to the load.
 
         Returns
         -------
         ndarray, shape (n_samples, 3, 3)
-            Infinite for Student's t with 2 degrees of freedom and fewer.
+            In the squared units of the cell; infinite for Student's t with 2 degrees of freedom or fewer.
 
         Examples
         --------
@@ -344,19 +347,20 @@ class LoadCell(DataSheet):
         """Standard deviation of the encoder's error [rad]: noise, and steps as a twelfth of their square."""
         return math.hypot(self.drive_angle_noise, self.drive_angle_resolution / math.sqrt(12.0))
 
-    def surprise(self, readings: ArrayLike) -> Floats:
-        """How far readings are from those of no load: a χ² number with as many degrees of freedom as channels.
+    def squared_mahalanobis_distance(self, readings: ArrayLike) -> Floats:
+        """Squared Mahalanobis distance of readings from zero load.
 
-        Squares in standard deviations, correlations heeded, what steps, drift and an unknown bias can do counted as
-        noise; of Student's t the squares of normal numbers that are as rare. It is χ² exactly without steps, and
-        without outliers beside drift or an unknown bias. What is exceeded once in 1000 samples then becomes rarer: at
-        most by a factor of 3 for steps of up to two standard deviations of the noise, by some 50 for outliers beside a
-        bias that is three times the noise.
+        Without load it follows a χ² distribution with as many degrees of freedom as channels. Steps, drift and an
+        unknown bias count as noise; a deviation under Student's t is replaced by the normal deviation of the same
+        probability. The distribution is exact without steps, and without outliers beside drift or an unknown bias.
+        Otherwise the quantile of 1 in 1000 samples is exceeded less often: by a factor of at most 3 for steps of up to
+        two standard deviations of the noise, and of some 50 for outliers beside a bias of three times the noise.
 
         Parameters
         ----------
         readings : array_like, shape (n_samples, 3)
-            As in `log_likelihood`. A channel without noise, steps or drift must not be present.
+            As in `log_likelihood`, in the units and the frame of the cell. A channel without noise, steps or drift must
+            be missing.
 
         Returns
         -------
@@ -364,35 +368,35 @@ class LoadCell(DataSheet):
 
         Examples
         --------
-        >>> LoadCell(moment_noise=0.02).surprise([[0.04, np.nan, np.nan]]).round(6)
+        >>> LoadCell(moment_noise=0.02).squared_mahalanobis_distance([[0.04, np.nan, np.nan]]).round(6)
         array([4.])
         """
-        return surprise(self, np.asarray(readings, dtype=np.float64))
+        return squared_mahalanobis_distance(self, np.asarray(readings, dtype=np.float64))
 
     def log_likelihood(
         self, measured: ArrayLike, predicted: ArrayLike, *, noise_scale: ArrayLike = 1.0, pointwise: bool = False
     ) -> Floats:
-        """Log-density of what was measured, for one or many predictions; drive angles are taken to be exact.
+        """Log-likelihood of readings, for one or many predictions; drive angles count as exact.
 
-        Independent normal or Student's t noise is exact, with steps and cut-offs, too: the density of a reading is then
-        the probability of its step (of all that is beyond, at the end of the range). So is normal noise that is
-        correlated between channels, or has a drift or an unknown bias beside it, whatever wanders being integrated
-        out; with steps, `approximations` says what is not. What has no such form is refused.
+        It is exact for independent normal or Student's t noise, also with steps and cut-offs: the density of a reading
+        is then the probability of its step (at the end of the range, of all values beyond). It is also exact for normal
+        noise that is correlated between channels, or accompanied by drift or an unknown bias, which are integrated out;
+        with steps, `approximations` describes the error. Combinations without a closed form are refused.
 
         Parameters
         ----------
         measured : array, shape (n_samples, 3)
-            Channels in the order of `CHANNELS`, in the units of the load cell, samples in the order in which they were
-            taken. A missing channel is NaN throughout.
+            Readings in the order of `CHANNELS`, in the units of the load cell, samples in the order of measurement. A
+            missing channel is NaN throughout.
         predicted : array, shape (..., n_samples, 3)
-            What an ideal sensor would have given, in the same frame. Missing channels are ignored, unless they have
+            Readings of an ideal sensor, in the same frame and units. Missing channels are ignored, unless they have
             cross-talk on others; NaN elsewhere gives NaN.
         noise_scale : array, broadcastable to shape (..., 3)
-            Factor on the white noise of each channel, positive; for a cell that is noisier than its data sheet. It
-            does not apply to drift and bias_uncertainty.
+            Positive factor on the white noise of each channel, for a cell that is noisier than its data sheet. It does
+            not apply to drift and bias_uncertainty.
         pointwise : bool
-            Whether to keep the samples apart instead of summing over them; where samples know of one another, each is
-            given those before it.
+            Whether to return the terms of the samples instead of their sum; a term of dependent samples is conditional
+            on the samples before it.
 
         Returns
         -------
@@ -402,10 +406,10 @@ class LoadCell(DataSheet):
         Raises
         ------
         ParameterError
-            If a present channel has no noise, or misses some of its samples; if a reading is beyond the range, a noise
-            scale is not positive, or the shapes do not fit; if drift, an unknown bias or correlation come together with
-            outliers, or with a sample at the end of the range, or three of drift, unknown bias, correlation and
-            relative_noise.
+            If a present channel has no noise, or lacks some of its samples; if a reading is beyond the range, a noise
+            scale is not positive, or the shapes do not fit; if drift, an unknown bias or correlation is combined with
+            outliers, or with a sample at the end of the range; if three of drift, unknown bias, correlation and
+            relative_noise are combined.
 
         Examples
         --------
@@ -419,10 +423,10 @@ class LoadCell(DataSheet):
     def log_density_left_out(
         self, measured: ArrayLike, predicted: ArrayLike, *, noise_scale: ArrayLike = 1.0
     ) -> Floats:
-        """Log-density of each sample given all the others: what leave-one-out cross-validation asks for.
+        """Log-density of each sample given all others, for leave-one-out cross-validation.
 
-        The channels of a sample are taken together. Independent samples know nothing of one another, and this is the
-        pointwise `log_likelihood`; of drift and an unknown bias the samples before and after tell, exactly.
+        The channels of a sample are taken together. For independent samples this is the pointwise `log_likelihood`;
+        with drift or an unknown bias it is conditional on the samples before and after, exactly.
 
         Parameters
         ----------
@@ -436,8 +440,8 @@ class LoadCell(DataSheet):
         Returns
         -------
         array, shape (..., n_samples)
-            Normalised; 0 where every channel is missing. They do not sum to the log-likelihood where samples know of
-            one another.
+            Normalised log-densities; 0 where every channel is missing. For dependent samples they do not sum to the
+            log-likelihood.
 
         Raises
         ------

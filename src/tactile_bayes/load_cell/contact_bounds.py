@@ -1,4 +1,4 @@
-"""The bounds of contact in one sweep: where load began and ended, from readings alone."""
+"""Bounds of the onset and the end of contact in one sweep, from readings alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactile_bayes.arrays import Floats
 __all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
 
 FEWEST = 3
-"""Fewest samples that tell bias and noise."""
+"""Least number of samples for an estimate of bias and noise."""
 
 _CLIP = 3.0
 _DOUBT = 0.05
@@ -24,18 +24,18 @@ _TINY = 1e-290
 
 @dataclass(frozen=True)
 class ContactBounds:
-    """Where contact began and ended in one sweep; the samples are [0, n).
+    """Bounds of contact in one sweep of the samples [0, n).
 
     Attributes
     ----------
     p_value : float
-        Bound on the probability that a sweep without contact looks so much like one with contact.
+        Upper bound of the p-value of the hypothesis of no contact.
     found : bool
-        Whether there was contact.
+        Whether contact is significant.
     onset, snap_off : (int, int)
-        Last sample before the event and first one after it that are told apart from noise; -1 where there is none.
+        Last sample before the event and first sample after it that are certain; -1 where there is none.
     before, after : int
-        How many samples at the start and at the end of the sweep are unloaded.
+        Numbers of unloaded samples at the start and at the end of the sweep.
     """
 
     p_value: float
@@ -52,27 +52,27 @@ def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> Conta
     Parameters
     ----------
     readings : ndarray, shape (samples, channels)
-        In the order of measurement, without NaN.
+        Readings in the order of measurement, without NaN.
     false_alarm : float
         Probability of each of the errors that `zero_load` names.
     floor : ndarray, shape (channels,)
-        Least variance that a channel can have: of its rounding.
+        Least possible variance of each channel, that of its rounding.
     """
     n = len(readings)
     readings = readings - readings[0]
     p_value, before, after = _contact(readings, floor)
-    if p_value < false_alarm:  # nor is it a few outliers that make it
+    if p_value < false_alarm:  # a few outliers must not cause it
         p_value = max(p_value, _contact(_clipped(readings, floor), floor)[0])
     if not p_value < false_alarm:
         parts = readings, readings[: n // 2], readings[n // 2 :]
         doubtful = p_value < _DOUBT or any(_trend(part, _DOUBT / len(parts)) for part in parts)
         return ContactBounds(p_value, False, (-1, -1), (-1, -1), 0 if doubtful else n, 0)
     onset, snap_off = (-1, -1), (-1, -1)
-    # Long ends reach into weak loads, which shift their mean by more than its error: start from the half of them.
+    # Long ends include weak loads, which shift their mean by more than its error: start from half of them.
     before, after = (max(min(end, _SHORT), end // 2) for end in (before, after))
     for _ in range(_ROUNDS):
         bounds = _refined(readings, before, after, false_alarm, floor)
-        if bounds is None:  # no sample or block is loaded for certain: keep away from what is between
+        if bounds is None:  # no sample or block is certainly loaded: keep away from the samples between
             before, after = before // 2, after // 2
             onset, snap_off = (before - 1, n - after - 1), (before, n - after if after else -1)
             break
@@ -91,11 +91,11 @@ def contact_bounds(readings: Floats, false_alarm: float, floor: Floats) -> Conta
     return ContactBounds(p_value, True, onset, snap_off, before, after)
 
 
-# ---- whether there is contact
+# ---- the test for contact
 
 
 def _contact(readings: Floats, floor: Floats) -> tuple[float, int, int]:
-    """Bound on the p-value of no contact, and how many samples at each end make it."""
+    """Upper bound of the p-value of no contact, and the numbers of samples at both ends that give it."""
     n = len(readings)
     ends = [k for k in _grid(n) if k < n]
     before, after = (k.ravel() for k in np.meshgrid(ends, ends))
@@ -113,16 +113,16 @@ def _contact(readings: Floats, floor: Floats) -> tuple[float, int, int]:
     share[~np.isfinite(share)] = 1.0
     share[np.broadcast_to(total <= floor * n, share.shape)] = 1.0
     log_p = _log_beta_cdf(share, 0.5 * (size - 1.0)[:, None], 0.5 * (n - size)[:, None])
-    # The ends are those that all channels together prefer: one of them may end at zero load in contact. Without noise,
-    # where several are impossible, it is the longest.
+    # The ends maximise the joint evidence of all channels: one of them may end at zero load in contact. Without noise,
+    # where several have probability zero, the longest is taken.
     pair = np.lexsort((size, -log_p.sum(axis=1)))[-1]
     return float(min(1.0, np.exp(min(log_p.min() + np.log(log_p.size), 0.0)))), int(before[pair]), int(after[pair])
 
 
 def _clipped(readings: Floats, floor: Floats) -> Floats:
-    """Readings that stand out from their neighbours cut off, at three deviations from the median or at the neighbour.
+    """Clip readings that exceed both neighbours, at three deviations from the median or at the neighbour.
 
-    Nothing is cut off where half of the readings are the same.
+    Nothing is clipped where half of the readings are equal.
     """
     off = readings - np.median(readings, axis=0)
     deviation = 1.4826 * np.median(np.abs(off), axis=0)
@@ -133,7 +133,7 @@ def _clipped(readings: Floats, floor: Floats) -> Floats:
 
 
 def _grid(n: int) -> list[int]:
-    """0, and steps of a half octave: 1, 2, 3, 4, 6, 8, 12, ..."""
+    """Return 0, and steps of half an octave: 1, 2, 3, 4, 6, 8, 12, ..."""
     return [0, 1, *sorted(factor << k for k in range(n.bit_length()) for factor in (2, 3) if factor << k < n)]
 
 
@@ -142,7 +142,7 @@ def _sums(values: Floats) -> Floats:
 
 
 def _log_beta_cdf(x: Floats, a: Floats, b: Floats) -> Floats:
-    """Logarithm of the regularised incomplete beta function, below the smallest number by its first term."""
+    """Logarithm of the regularised incomplete beta function; where it underflows, by its first term."""
     a, b = np.broadcast_to(a, x.shape), np.broadcast_to(b, x.shape)
     p = betainc(a, b, x)
     with np.errstate(divide="ignore"):
@@ -150,13 +150,13 @@ def _log_beta_cdf(x: Floats, a: Floats, b: Floats) -> Floats:
         return np.where(p > _TINY, np.log(p), first_term)
 
 
-# ---- where it begins and ends
+# ---- onset and end
 
 
 def _refined(
     readings: Floats, before: int, after: int, false_alarm: float, floor: Floats
 ) -> tuple[tuple[int, int], tuple[int, int]] | None:
-    """Bounds of onset and snap-off, with bias and noise from the ends; None if no load is certain."""
+    """Bounds of onset and snap-off, with bias and noise from the ends; None if no sample is certainly loaded."""
     n, channels = readings.shape
     ends = np.concatenate([readings[:before], readings[n - after :]])
     freedom = len(ends) - 1
@@ -164,7 +164,7 @@ def _refined(
     z = (readings - ends.mean(axis=0)) / deviation
     scales = [1 << k for k in range(max(1, (n // 2).bit_length()))]
     limit = -stdtrit(freedom, 0.5 * false_alarm / (channels * n * len(scales)))
-    # An outlier alone is no load: a sample needs a neighbour, and no sample may make a block by itself.
+    # A single outlier is no load: a sample needs a neighbour, and no sample may make a block significant by itself.
     first, last, width = n, -1, 1
     limit_one = limit * np.sqrt(1.0 + 1.0 / len(ends))
     sums = _sums(np.clip(z, -limit_one, limit_one))
@@ -173,7 +173,7 @@ def _refined(
             certain = (np.abs(z) > limit_one) & _neighboured(z)
         else:
             certain = np.abs(sums[m:] - sums[:-m]) / m > limit * np.sqrt(1.0 / m + 1.0 / len(ends))
-        flat = certain.ravel()  # only the first and the last sample that is loaded in any channel are asked for
+        flat = certain.ravel()  # only the first and the last sample that is loaded in any channel matter
         begin = int(flat.argmax())
         if flat[begin]:
             first = min(first, begin // channels + m - 1)
@@ -184,21 +184,21 @@ def _refined(
         return None
     begin = _last_before_ramp(readings, first, after, false_alarm, floor)
     end = _first_after_drop(z, last, width, float(fdtri(1, freedom, 1.0 - 2.0 * false_alarm)))
-    # Contact may begin between two samples, and of a load that only a block shows, neither may lie beyond the block.
+    # Contact may begin between two samples. If only a block shows a load, neither bound may lie beyond the block.
     begin, end = max(min(begin - 1, last - 1), -1), max(end, first + 1)
     return (begin, first), (last, end if end < n else -1)
 
 
 def _neighboured(z: Floats) -> NDArray[np.bool_]:
-    """Whether the sample before or after lies off to the same side, by more than three deviations."""
+    """Return whether the sample before or after deviates to the same side by more than three deviations."""
     padded = np.concatenate([np.zeros((1, z.shape[1])), z, np.zeros((1, z.shape[1]))])
     return np.asarray(np.maximum(padded[:-2] * np.sign(z), padded[2:] * np.sign(z)) > _CLIP)
 
 
 def _last_before_ramp(readings: Floats, loaded: int, after: int, false_alarm: float, floor: Floats) -> int:
-    """Lower limit of the last unloaded sample, if the load grows straight from zero up to the loaded one.
+    """Lower limit of the last unloaded sample, for a load that grows linearly from zero up to the loaded sample.
 
-    Least squares of bias and slope for every place at which a ramp can start, the samples after contact counted in.
+    Bias and slope are fitted by least squares for every possible start of the ramp; samples after contact are included.
     """
     n, channels = readings.shape
     known = np.concatenate([readings[: loaded + 1], readings[max(n - after, loaded + 1) :]])
@@ -221,18 +221,18 @@ def _last_before_ramp(readings: Floats, loaded: int, after: int, false_alarm: fl
 
 
 def _first_after_drop(z: Floats, loaded: int, width: int, limit: float) -> int:
-    """Upper limit of the first sample after a load that is as it was around a loaded sample drops to nothing."""
+    """Upper limit of the first sample after the drop of a load that stays as it was around a loaded sample."""
     z = z[max(0, loaded - width + 1) :]
     known = min(loaded + 1, width)
     count = np.arange(1, len(z) + 1)[:, None]
-    # Relative to no load at all: of a load as constant up to sample i, the squares that it explains.
+    # Sum of squares that a constant load up to sample i explains, relative to zero load.
     explained = (np.cumsum(z, axis=0) ** 2 / count).sum(axis=1)[known - 1 :]
     likely = explained >= explained.max() - limit
     return loaded + 1 + int(np.flatnonzero(likely)[-1])
 
 
 def _trend(stretch: Floats, false_alarm: float) -> bool:
-    """Whether a stretch has a slope that noise does not explain."""
+    """Return whether a stretch has a significant slope."""
     n, channels = stretch.shape
     if n <= FEWEST:
         return False

@@ -15,23 +15,23 @@ __all__ = ["Draws", "corrupted_angles", "corrupted_loads"]
 
 
 class Draws(Protocol):
-    """What random numbers are drawn with: a `Generator`, or many side by side."""
+    """Source of random numbers: a `Generator`, or many side by side."""
 
     def standard_normal(self, size: tuple[int, ...], /) -> Any: ...
     def chisquare(self, df: float, size: tuple[int, ...], /) -> Any: ...
 
 
 def corrupted_loads(sheet: DataSheet, loads: Floats, rng: Draws, noise_scale: ArrayLike = 1.0) -> Floats:
-    """Readings of loads: lever, gain and bias, drift and noise, then the range, then the steps of the reading.
+    """Simulate readings of loads: lever, gain and bias, drift and noise, then the range, then the steps.
 
     Parameters
     ----------
     sheet : DataSheet
-        In the units of the loads.
+        Data sheet in the units of the loads.
     loads : ndarray, shape (..., samples, 3)
-        In the order of `CHANNELS`; one record's samples in the order in which they are taken. NaN stays NaN.
+        Loads in the order of `CHANNELS`, samples of a record in the order of measurement. NaN stays NaN.
     rng : Draws
-        White noise is drawn first, and each part for all three channels, whatever of it is needed.
+        Source of random numbers. White noise is drawn first, and each part for all three channels.
     noise_scale : array_like, broadcastable to shape (..., 3)
         Factor on the white noise of each channel.
 
@@ -57,13 +57,13 @@ def corrupted_loads(sheet: DataSheet, loads: Floats, rng: Draws, noise_scale: Ar
 
 
 def corrupted_angles(sheet: DataSheet, angles: Floats, direction: ArrayLike, rng: Draws) -> Floats:
-    """Readings of drive angles, of any shape: offset, backlash by the drive's direction, noise, then the steps."""
+    """Simulate readings of drive angles of any shape: offset, backlash by the direction, noise, then the steps."""
     noise = sheet.drive_angle_noise * rng.standard_normal(angles.shape)
     return rounded(angles + sheet.misread(direction) + noise, np.array(sheet.drive_angle_resolution))
 
 
 def rounded(values: Floats, step: Floats) -> Floats:
-    """Values to the nearest multiple of a step, as they are where it is 0."""
+    """Round values to the nearest multiple of a step; a step of 0 leaves them unchanged."""
     if not np.any(step):
         return values
     with np.errstate(over="ignore"):

@@ -1,4 +1,4 @@
-"""The covariance of a sensor's errors, each sample looked at by itself, and how far readings are from no load by it."""
+"""Covariance of a sensor's errors for each sample by itself, and the distance of readings from zero load by it."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from scipy.special import ndtri, stdtr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell.data_sheet import DataSheet
 
-__all__ = ["covariance", "surprise", "wandering_deviation"]
+__all__ = ["covariance", "squared_mahalanobis_distance", "wandering_deviation"]
 
 _BEYOND_ALL = 1e100
-"""Standard deviations that make no difference any more, and of which sums of products are still numbers."""
+"""Bound on deviations in standard deviations, whose products do not overflow."""
 
 
 def covariance(sheet: DataSheet, loads: Floats) -> Floats:
-    """Of the readings of loads, shape (samples, 3), shape (samples, 3, 3); see `LoadCell.covariance`."""
+    """Covariance of readings, shape (samples, 3, 3), for loads of shape (samples, 3); see `LoadCell.covariance`."""
     nu = sheet.degrees_of_freedom
     widening = 1.0 if math.isinf(nu) else nu / (nu - 2.0) if nu > 2.0 else math.inf
     deviation = np.broadcast_to(sheet.deviation(loads), loads.shape)
@@ -35,14 +35,14 @@ def wandering_deviation(sheet: DataSheet, samples: int) -> Floats:
     if sheet.drift is None:
         return bias
     gone = np.arange(samples)
-    kept = sheet.drift.kept ** (2 * gone)
-    growth = gone if sheet.drift.kept == 1.0 else (1.0 - kept) / (1.0 - sheet.drift.kept**2)
-    share = np.sqrt(sheet.drift.first * kept + sheet.drift.step * growth)
+    decay = sheet.drift.decay ** (2 * gone)
+    growth = gone if sheet.drift.decay == 1.0 else (1.0 - decay) / (1.0 - sheet.drift.decay**2)
+    share = np.sqrt(sheet.drift.initial_variance * decay + sheet.drift.step_variance * growth)
     return np.hypot(bias, share[:, None] * sheet.drift.sizes)
 
 
-def surprise(sheet: DataSheet, readings: Floats) -> Floats:
-    """Squared distance of readings, shape (samples, 3), from no load, shape (samples,); see `LoadCell.surprise`."""
+def squared_mahalanobis_distance(sheet: DataSheet, readings: Floats) -> Floats:
+    """Squared Mahalanobis distance, shape (samples,), of readings, shape (samples, 3), from zero load."""
     present = np.flatnonzero(~np.isnan(readings).all(axis=0))
     noise, step = sheet.noise[present], sheet.resolution[present] / math.sqrt(12.0)
     scale = np.hypot(np.hypot(noise, step), wandering_deviation(sheet, len(readings))[:, present])

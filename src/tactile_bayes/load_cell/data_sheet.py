@@ -1,4 +1,4 @@
-"""The data sheet of a load cell: everything that is known of the sensor, and its form in a record's attributes."""
+"""The data sheet of a load cell: its properties, and their form in a record's attributes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["CERTAIN", "DataSheet"]
 Triple = tuple[float, float, float]
 
 CERTAIN = ("bias", "gain", "lever", "drive_angle_offset", "drive_angle_backlash")
-"""Entries without chance: errors that are known, and can be taken out."""
+"""Deterministic entries: known errors, for which a record can be corrected."""
 
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _SCALARS = (
@@ -41,7 +41,7 @@ _SCALARS = (
     "drive_angle_noise",
     "drive_angle_resolution",
 )
-_LAWS: dict[type[Drift], str] = {RandomWalk: "random_walk", OrnsteinUhlenbeck: "ornstein_uhlenbeck"}
+_DRIFTS: dict[type[Drift], str] = {RandomWalk: "random_walk", OrnsteinUhlenbeck: "ornstein_uhlenbeck"}
 _PAIRS = tuple(combinations(CHANNELS, 2))
 _SEVERAL: dict[str, tuple[str, ...]] = {
     "bias": tuple(f"bias_{name}" for name in CHANNELS),
@@ -50,10 +50,10 @@ _SEVERAL: dict[str, tuple[str, ...]] = {
     "lever": ("lever_x", "lever_y"),
     "correlation": tuple(f"correlation_{one}_{other}" for one, other in _PAIRS),
 }
-"""Names of the numbers of each entry that has several."""
+"""Names of the numbers of each entry with several numbers."""
 
 _OF_CHANNELS = f"give three finite numbers ({', '.join(CHANNELS)})"
-_REMEDIES = {
+_CORRECTIONS = {
     "bias": _OF_CHANNELS,
     "bias_uncertainty": _OF_CHANNELS,
     "gain": "give three rows of three numbers, ((1, 0, 0), (0, 1, 0), (0, 0, 1)) being that of an ideal cell",
@@ -72,7 +72,7 @@ _REMEDIES = {
 
 @dataclass(frozen=True)
 class DataSheet:
-    """What is known of a load cell; `LoadCell` says what each entry means."""
+    """Properties of a load cell; `LoadCell` describes the entries."""
 
     force_noise: float = 0.0
     moment_noise: float = 0.0
@@ -99,7 +99,7 @@ class DataSheet:
             object.__setattr__(self, name, self._number(name))
         for name, names in _SEVERAL.items():
             shape = (3, 3) if name == "gain" else (len(names),)
-            numbers = check_numbers(f"the load cell's {name}", getattr(self, name), _REMEDIES[name], shape=shape)
+            numbers = check_numbers(f"the load cell's {name}", getattr(self, name), _CORRECTIONS[name], shape=shape)
             rows = map(tuple, numbers.tolist()) if name == "gain" else numbers.tolist()
             object.__setattr__(self, name, tuple(rows))
         self._refuse_the_impossible()
@@ -107,13 +107,13 @@ class DataSheet:
             object.__setattr__(self, "drift", None)
 
     def _number(self, name: str) -> float:
-        """A number that stands alone; none is infinite but one of which that says that there is no end."""
-        value, what, remedy = getattr(self, name), f"the load cell's {name}", _REMEDIES[name]
+        """Return a scalar entry; only a range and degrees of freedom may be infinite."""
+        value, what, correction = getattr(self, name), f"the load cell's {name}", _CORRECTIONS[name]
         if as_number(value) is None:
             raise refused(what, value, "give a number")
         if name.endswith(("_range", "_freedom")):
-            return math.inf if value == math.inf else check_positive(what, value, remedy)
-        return check_number(what, value, remedy, least=-math.inf if remedy.startswith("give an angle") else 0.0)
+            return math.inf if value == math.inf else check_positive(what, value, correction)
+        return check_number(what, value, correction, least=-math.inf if correction.startswith("give an angle") else 0.0)
 
     def _refuse_the_impossible(self) -> None:
         for channel in ("force", "moment"):
@@ -124,15 +124,15 @@ class DataSheet:
                     "the step of a reading, and the largest reading, in the same unit"
                 )
         if min(self.bias_uncertainty) < 0.0:
-            remedy = "give three standard deviations, each zero or positive"
-            raise refused("the load cell's bias_uncertainty", self.bias_uncertainty, remedy)
+            correction = "give three standard deviations, each zero or positive"
+            raise refused("the load cell's bias_uncertainty", self.bias_uncertainty, correction)
         if np.linalg.eigvalsh(self.correlation_matrix)[0] <= 1e-9:
             between = ", ".join(" and ".join(pair) for pair in _PAIRS)
-            remedy = f"no noise has these coefficients between {between}: give smaller ones"
-            raise refused("the load cell's correlation", self.correlation, remedy)
+            correction = f"no noise has these coefficients between {between}: give smaller ones"
+            raise refused("the load cell's correlation", self.correlation, correction)
         if np.linalg.cond(np.array(self.gain)) > 1e9:
-            remedy = "such a cell cannot tell three loads apart: give rows that are independent, like (1, 0, 0)"
-            raise refused("the load cell's gain", self.gain, remedy)
+            correction = "such a cell cannot tell three loads apart: give rows that are independent, like (1, 0, 0)"
+            raise refused("the load cell's gain", self.gain, correction)
         if self.drift is not None and not isinstance(self.drift, RandomWalk | OrnsteinUhlenbeck):
             raise refused("the load cell's drift", self.drift, "give RandomWalk(...) or OrnsteinUhlenbeck(...)")
         if self.frame is not None:
@@ -147,26 +147,26 @@ class DataSheet:
 
     @property
     def noise(self) -> Floats:
-        """Scale of the white noise, shape (3,)."""
+        """Scale of the white noise of each channel, shape (3,)."""
         return np.array([self.moment_noise, self.force_noise, self.force_noise])
 
     @property
     def has_variances(self) -> bool:
-        """Whether the white noise of every channel has a variance: what weighs the channels beside one another.
+        """True if the white noise of every channel has a positive, finite variance, which weights the channels.
 
-        It has none where no noise is stated, nor with 2 degrees of freedom and fewer.
+        It has none without a stated noise, nor with 2 degrees of freedom or fewer.
         """
         return self.degrees_of_freedom > 2.0 and bool(np.all(self.noise > 0.0))
 
     @property
     def unrest(self) -> NDArray[np.bool_]:
-        """Which channels move without load, shape (3,)."""
+        """True for channels whose readings vary without load, shape (3,)."""
         drift = 0.0 if self.drift is None else self.drift.sizes
         return np.asarray(self.noise + self.resolution + np.array(self.bias_uncertainty) + drift > 0.0)
 
     @property
     def resolution(self) -> Floats:
-        """Steps of the reading, shape (3,); 0 where it is continuous."""
+        """Steps of the readings, shape (3,); 0 for continuous readings."""
         return np.array([self.moment_resolution, self.force_resolution, self.force_resolution])
 
     @property
@@ -176,29 +176,29 @@ class DataSheet:
         whole = (self.resolution > 0.0) & np.isfinite(limit)
         with np.errstate(over="ignore"):
             steps = limit[whole] / self.resolution[whole]
-        # A range of so many steps is one in other units, too, where it is less by a rounding.
+        # A range of a whole number of steps stays so in other units, where rounding may reduce it.
         limit[whole] = np.where(np.isinf(steps), limit[whole], np.floor(steps + 1e-9) * self.resolution[whole])
         return limit
 
     @property
     def gain_matrix(self) -> Floats:
-        """Reading of each channel (rows) by each load at the pivot (columns), shape (3, 3): gains, and the lever."""
+        """Reading of each channel (rows) by each load at the pivot (columns), shape (3, 3), with gains and lever."""
         x, y = self.lever
         return np.array(self.gain) @ [[1.0, y, -x], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
     @property
     def correlation_matrix(self) -> Floats:
-        """Of the white noise of the channels, shape (3, 3)."""
+        """Correlation matrix of the white noise of the channels, shape (3, 3)."""
         matrix = np.eye(3)
         for (i, j), value in zip(combinations(range(3), 2), self.correlation, strict=True):
             matrix[i, j] = matrix[j, i] = value
         return matrix
 
     def expected(self, loads: Floats) -> Floats:
-        """What the cell reads of loads, shape (..., 3), without noise: lever, gain and bias.
+        """Readings of loads, shape (..., 3), without noise: lever, gain and bias.
 
-        A channel that was not measured is NaN throughout, and is felt by the others only if they have cross-talk, or
-        the moment by its lever.
+        A channel that was not measured is NaN throughout; it affects others only through cross-talk, or the moment
+        through its lever.
         """
         if self.gain == _IDENTITY and not any(self.lever):
             return loads + np.array(self.bias) if any(self.bias) else loads
@@ -207,13 +207,13 @@ class DataSheet:
         return np.stack(np.broadcast_arrays(*read), axis=-1) + np.array(self.bias)
 
     def deviation(self, loads: Floats) -> Floats:
-        """Scale of the white noise on the readings of loads, shape (..., 3); (3,) where it is the same for all."""
+        """Scale of the white noise on the readings of loads, shape (..., 3), or (3,) if it is the same for all."""
         if not self.relative_noise:
             return self.noise
         return np.hypot(self.noise, self.relative_noise * (self.expected(loads) - np.array(self.bias)))
 
     def misread(self, direction: ArrayLike) -> Floats:
-        """What the encoder reads too much while the drive moves "forward" or "backward", without noise [rad].
+        """Encoder offset, including backlash, while the drive moves "forward" or "backward", without noise [rad].
 
         Examples
         --------
@@ -224,18 +224,18 @@ class DataSheet:
         return np.asarray(self.drive_angle_offset + self.drive_angle_backlash * sense)
 
     def cuts_off(self, readings: Floats, present: slice | NDArray[np.intp] = slice(None)) -> NDArray[np.bool_]:
-        """Which readings of the channels present are at the end of the range, and stand for anything beyond."""
+        """Return which readings of the present channels are at the end of the range, and stand for values beyond."""
         return np.asarray(np.abs(readings) >= (self.limit * (1.0 - 1e-9) - 0.5 * self.resolution)[present])
 
     # ---- units and attributes
 
     def dimensionless(self, rod: Rod) -> Self:
-        """The same load cell in the units of a rod: forces in EI/L², moments in EI/L.
+        """Load cell in the units of a rod: forces in EI/L², moments in EI/L, lengths in L.
 
         Parameters
         ----------
         rod : Rod
-            The rod that the cell is used with.
+            Rod with which the cell is used.
 
         Examples
         --------
@@ -250,7 +250,7 @@ class DataSheet:
         return self.from_entries(entries)
 
     def entries(self) -> dict[str, float | str]:
-        """What differs from an ideal sensor, by the names in `LOAD_CELL_UNITS` and "frame"; see `from_entries`.
+        """Entries that differ from an ideal sensor, by the names in `LOAD_CELL_UNITS` and "frame"; see `from_entries`.
 
         Examples
         --------
@@ -266,19 +266,19 @@ class DataSheet:
         for name, names in _SEVERAL.items():
             yield from zip(names, np.ravel(getattr(self, name)).tolist(), strict=True)
             if name == "bias_uncertainty" and self.drift is not None:
-                law = _LAWS[type(self.drift)]
-                yield from ((f"{law}_{field.name}", getattr(self.drift, field.name)) for field in fields(self.drift))
+                prefix = _DRIFTS[type(self.drift)]
+                yield from ((f"{prefix}_{field.name}", getattr(self.drift, field.name)) for field in fields(self.drift))
         if self.frame is not None:
             yield "frame", self.frame
 
     @classmethod
     def from_entries(cls, entries: Mapping[str, Any]) -> Self:
-        """The load cell with these entries, ideal in everything else.
+        """Build a load cell from entries; missing ones are ideal.
 
         Parameters
         ----------
         entries : mapping of str to float or str
-            Names are those of `LOAD_CELL_UNITS`, and "frame".
+            Entries by the names in `LOAD_CELL_UNITS`, in the units of the record, and "frame".
 
         Raises
         ------
@@ -299,10 +299,10 @@ class DataSheet:
         for name, names in _SEVERAL.items():
             numbers = [entries.get(one, ideal[one]) for one in names]
             options[name] = [numbers[:3], numbers[3:6], numbers[6:]] if name == "gain" else numbers
-        laws = [kind for kind, law in _LAWS.items() if any(name.startswith(f"{law}_") for name in entries)]
-        if len(laws) > 1:
+        processes = [kind for kind, prefix in _DRIFTS.items() if any(name.startswith(f"{prefix}_") for name in entries)]
+        if len(processes) > 1:
             raise ParameterError("a load cell drifts by a random walk or an Ornstein-Uhlenbeck process, not by both")
-        for kind in laws:
-            named = {field.name: f"{_LAWS[kind]}_{field.name}" for field in fields(kind)}
+        for kind in processes:
+            named = {field.name: f"{_DRIFTS[kind]}_{field.name}" for field in fields(kind)}
             options["drift"] = kind(**{name: entries[entry] for name, entry in named.items() if entry in entries})
         return cls(**options)

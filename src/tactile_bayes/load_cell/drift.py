@@ -1,4 +1,4 @@
-"""Drift: the slow wandering of a sensor's zero from sample to sample."""
+"""Drift: slow stochastic changes of a sensor's zero from sample to sample."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ __all__ = ["Drift", "OrnsteinUhlenbeck", "RandomWalk"]
 
 
 @dataclass(frozen=True)
-class _Law:
-    """d of the first sample is normal; then d(i+1) = kept · d(i) + a normal step, channel by channel."""
+class _DriftProcess:
+    """Process d(i+1) = decay · d(i) + a normal step, with a normal d at the first sample, channel by channel."""
 
     moment: float = 0.0
     force: float = 0.0
@@ -30,37 +30,37 @@ class _Law:
 
     @property
     def sizes(self) -> Floats:
-        """`moment`, `force`, `force`: a size for each channel, shape (3,)."""
+        """Size for each channel, shape (3,): `moment`, `force`, `force`."""
         return np.array([self.moment, self.force, self.force])
 
     @property
-    def kept(self) -> float:
-        """What is left of a drift after one sample."""
+    def decay(self) -> float:
+        """Factor on the drift from one sample to the next."""
         raise NotImplementedError
 
     @property
-    def first(self) -> float:
-        """Variance of the drift at the first sample, over the square of its size."""
+    def initial_variance(self) -> float:
+        """Variance of the drift at the first sample, over the square of the size."""
         raise NotImplementedError
 
     @property
-    def step(self) -> float:
+    def step_variance(self) -> float:
         """Variance of a step, over the square of the size."""
         raise NotImplementedError
 
     def draw(self, normal: Floats) -> Floats:
-        """Drift made from independent standard normal numbers, shape (..., samples, 3)."""
-        steps = math.sqrt(self.step) * normal
-        steps[..., :1, :] = math.sqrt(self.first) * normal[..., :1, :]
-        return np.asarray(lfilter([1.0], [1.0, -self.kept], steps, axis=-2)) * self.sizes
+        """Draw drift from independent standard normal numbers, shape (..., samples, 3)."""
+        steps = math.sqrt(self.step_variance) * normal
+        steps[..., :1, :] = math.sqrt(self.initial_variance) * normal[..., :1, :]
+        return np.asarray(lfilter([1.0], [1.0, -self.decay], steps, axis=-2)) * self.sizes
 
 
 @dataclass(frozen=True)
-class RandomWalk(_Law):
-    """A zero that walks away without end, from nothing at the first sample of the record.
+class RandomWalk(_DriftProcess):
+    """Drift of the zero by a random walk, from zero at the first sample of the record.
 
-    It is what warming up looks like after the cell was tared. After n samples the drift has the standard deviation
-    √n · step, and it does not forget: typically 1e-3 to 1e-1 of the white noise per sample.
+    It describes the warming-up of a cell after taring. After n samples the drift has the standard deviation √n · step,
+    without bound; a typical step is 1e-3 to 1e-1 of the white noise.
 
     Parameters
     ----------
@@ -81,24 +81,24 @@ class RandomWalk(_Law):
     """
 
     @property
-    def kept(self) -> float:
+    def decay(self) -> float:
         return 1.0
 
     @property
-    def first(self) -> float:
+    def initial_variance(self) -> float:
         return 0.0
 
     @property
-    def step(self) -> float:
+    def step_variance(self) -> float:
         return 1.0
 
 
 @dataclass(frozen=True)
-class OrnsteinUhlenbeck(_Law):
-    """A zero that wanders about its mean and forgets where it was in about `time` samples.
+class OrnsteinUhlenbeck(_DriftProcess):
+    """Drift of the zero about its mean by an Ornstein–Uhlenbeck process with a correlation time of `time` samples.
 
-    It is what draughts and a switching temperature control look like. It is stationary: the first sample
-    drifts as much as any. Two samples k apart have the correlation exp(−k/time), exactly.
+    It describes draughts and a switching temperature control. The process is stationary: the first sample drifts as
+    much as any. Two samples k apart have exactly the correlation exp(−k/time).
 
     Parameters
     ----------
@@ -129,15 +129,15 @@ class OrnsteinUhlenbeck(_Law):
             raise ParameterError("OrnsteinUhlenbeck: time is 0: give a positive number of samples")
 
     @property
-    def kept(self) -> float:
+    def decay(self) -> float:
         return math.exp(-1.0 / self.time)
 
     @property
-    def first(self) -> float:
+    def initial_variance(self) -> float:
         return 1.0
 
     @property
-    def step(self) -> float:
+    def step_variance(self) -> float:
         return -math.expm1(-2.0 / self.time)
 
 

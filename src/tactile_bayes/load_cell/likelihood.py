@@ -1,4 +1,4 @@
-"""How likely the readings of a sensor are, given the loads."""
+"""Likelihood of a sensor's readings, given the loads."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ __all__ = [
 ]
 
 Given = Callable[[Floats, Floats, Floats, float, Floats, Floats], tuple[Floats, Floats]]
-"""What is new in each sample given others, and its variance, as `_given_before`."""
+"""Type of `_given_before`: innovations given other samples, and their variances."""
 
 _LOG_2PI = math.log(2.0 * math.pi)
 
 _NARROW = 1e-5
-"""Width of a step of the reading, in scales of the noise, below which the density is the same all over it."""
+"""Width of a step of the reading, in scales of the noise, below which the density is constant on it."""
 
 _FAR = -600.0
-"""Logarithm of the probabilities that are too small to be numbers, or soon will be."""
+"""Logarithm of a probability below which it may underflow."""
 
 _AT_LIMIT = 1e-9
-"""Share of the range by which a reading may differ from its end and still be at it."""
+"""Share of the range by which a reading at its end may differ from it."""
 
 
 def log_likelihood(
@@ -49,7 +49,7 @@ def log_likelihood(
     pointwise: bool = False,
     given: Given | None = None,
 ) -> Floats:
-    """Log-density of readings; see `LoadCell.log_likelihood`. Samples that know of others are `given` those before."""
+    """Log-density of readings; see `LoadCell.log_likelihood`. Dependent samples are conditional on those before."""
     given = given or _given_before
     readings, loads, scale = _checked(measured, predicted, noise_scale)
     present = _present(sheet, readings)
@@ -97,7 +97,7 @@ def log_density_left_out(
 
 
 def _is_plain(sheet: DataSheet) -> bool:
-    """Whether noise is normal and white, and readings as they are: what is called in inner loops."""
+    """Return whether noise is normal and white and readings are continuous, the case of inner loops."""
     limits = sheet.force_range, sheet.moment_range, sheet.degrees_of_freedom
     return all(map(math.isinf, limits)) and not (
         sheet.drift
@@ -109,7 +109,7 @@ def _is_plain(sheet: DataSheet) -> bool:
 
 
 def approximations(sheet: DataSheet) -> tuple[str, ...]:
-    """In words, where the likelihood of a sensor's readings is not exact."""
+    """Descriptions of the approximations in the likelihood of a sensor's readings."""
     wanders = bool(np.any(_wandering_sizes(sheet)))
     if np.any(sheet.resolution) and (wanders or any(sheet.correlation)):
         beside = "drift or an unknown bias" if wanders else "correlated noise"
@@ -118,7 +118,7 @@ def approximations(sheet: DataSheet) -> tuple[str, ...]:
 
 
 def checked_noise_scale(noise_scale: ArrayLike, loads: tuple[int, ...]) -> Floats:
-    """Factors on the white noise for loads of a shape, or why they are none."""
+    """Return factors on the white noise for loads of a shape, or refuse them."""
     scale = np.asarray(noise_scale, dtype=np.float64)
     if not (scale > 0).all():
         raise ParameterError(f"a noise_scale is {float(np.min(scale))!r}: give positive factors")
@@ -136,8 +136,8 @@ def checked_noise_scale(noise_scale: ArrayLike, loads: tuple[int, ...]) -> Float
 
 
 def _white(readings: Floats, expected: Floats, deviation: Floats, pointwise: bool) -> Floats:
-    """Normal, independent samples and channels."""
-    # Samples and channels as one axis, and a product for the sum: an axis of three is several times slower.
+    """Log-density of normal, independent samples and channels."""
+    # Samples and channels are one axis, and a product forms the sum: an axis of three is several times slower.
     squares = expected.reshape(*expected.shape[:-2], readings.size) - readings.ravel()
     squares *= squares
     squares = squares.reshape(expected.shape)
@@ -153,7 +153,7 @@ def _white(readings: Floats, expected: Floats, deviation: Floats, pointwise: boo
 
 
 def correlated_density(residual: Floats, deviation: Floats, steps: Floats, correlation: Floats) -> Floats:
-    """Log-density of independent samples, whose channels share noise; NaN where a residual is."""
+    """Log-density of independent samples with correlated channels; NaN where a residual is NaN."""
     if np.any(steps):
         between = _covariance(deviation, steps, correlation)
         known = np.isfinite(between).all(axis=(-2, -1), keepdims=True)
@@ -168,7 +168,7 @@ def correlated_density(residual: Floats, deviation: Floats, steps: Floats, corre
 
 
 def _covariance(deviation: Floats, steps: Floats, correlation: Floats) -> Floats:
-    """Between the channels of a reading: noise that they may share, and steps that they do not."""
+    """Covariance of the channels of a reading: correlated noise and independent steps."""
     own = steps[..., None] * np.eye(correlation.shape[0])
     return np.asarray(deviation[..., :, None] * correlation * deviation[..., None, :] + own)
 
@@ -176,7 +176,7 @@ def _covariance(deviation: Floats, steps: Floats, correlation: Floats) -> Floats
 def _channel(
     readings: Floats, expected: Floats, scale: Floats, step: float, limit: float, degrees_of_freedom: float
 ) -> Floats:
-    """One channel, whose readings may be steps, and those at the end of its range anything beyond."""
+    """Log-density of one channel, whose readings may have steps; those at the end of the range stand for all beyond."""
     residual = (readings - expected) / scale
     half = 0.5 * step / scale
     if step > 0.0:
@@ -207,7 +207,7 @@ def _log_below(z: Floats, degrees_of_freedom: float) -> Floats:
         logs = np.asarray(np.log(stdtr(degrees_of_freedom, z)))
     far = logs < _FAR
     if far.any():
-        # The incomplete beta function, as a hypergeometric one: DLMF 8.17.8.
+        # The incomplete beta function as a hypergeometric function: DLMF 8.17.8.
         half, log_x = 0.5 * degrees_of_freedom, -np.log1p(z[far] ** 2 / degrees_of_freedom)
         x = np.exp(log_x)
         series = hyp2f1(half + 0.5, 1.0, half + 1.0, x)
@@ -219,7 +219,7 @@ def _log_below(z: Floats, degrees_of_freedom: float) -> Floats:
 
 def _log_between(place: Floats, half: Floats, degrees_of_freedom: float) -> Floats:
     """Logarithm of the probability within half a step of a place, standardised."""
-    place = -np.abs(place)  # in the tail in which probabilities have their digits
+    place = -np.abs(place)  # the tail in which probabilities keep their digits
     high = _log_below(place + half, degrees_of_freedom)
     with np.errstate(divide="ignore", invalid="ignore"):
         wide = high + np.log1p(-np.exp(_log_below(place - half, degrees_of_freedom) - high))
@@ -227,23 +227,30 @@ def _log_between(place: Floats, half: Floats, degrees_of_freedom: float) -> Floa
     return np.where((2.0 * half < _NARROW) | ~np.isfinite(wide), narrow, wide)
 
 
-# ---- samples that know of one another
+# ---- dependent samples
 
 
 def _wandering_sizes(sheet: DataSheet) -> Floats:
-    """Sizes of what is not known of the zero, shape (3,)."""
+    """Standard deviations of the unknown zero: bias and drift, shape (3,)."""
     bias = np.array(sheet.bias_uncertainty)
     return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
 
 
 def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: NDArray[np.intp], given: Given) -> Floats:
-    """Log-density of each sample given others, the noise of the channels being independent."""
+    """Log-density of each sample given others, for independent noise of the channels."""
     bias = np.array(sheet.bias_uncertainty)[present] ** 2
     if sheet.drift is None:
         return normal_density(*given(residual, noise, np.zeros_like(bias), 1.0, np.zeros_like(bias), bias))
     drift = sheet.drift.sizes[present] ** 2
     return normal_density(
-        *given(residual, noise, sheet.drift.first * drift, sheet.drift.kept, sheet.drift.step * drift, bias)
+        *given(
+            residual,
+            noise,
+            sheet.drift.initial_variance * drift,
+            sheet.drift.decay,
+            sheet.drift.step_variance * drift,
+            bias,
+        )
     )
 
 
@@ -256,73 +263,79 @@ def _wandering_together(
     correlation: Floats,
     given: Given,
 ) -> Floats:
-    """The same for noise that is correlated between the channels, and the same in all samples."""
-    # Coordinates in which white noise is one, and the wandering of each is independent of the others'.
+    """Log-density of each sample given others, for noise that is correlated between channels and stationary."""
+    # Coordinates in which the white noise has unit covariance and the drifts are independent.
     deviation = deviation[..., 0, :] if deviation.ndim > 1 else deviation
     root = np.linalg.cholesky(_covariance(deviation, steps, correlation))
     inverse = np.linalg.inv(root)
     share, axes = np.linalg.eigh(inverse * _wandering_sizes(sheet)[present] ** 2 @ np.swapaxes(inverse, -1, -2))
     residual = residual @ np.swapaxes(np.swapaxes(axes, -1, -2) @ inverse, -1, -2)
     volume = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)[..., None]
-    first, kept, step = (
-        (1.0, 1.0, 0.0) if sheet.drift is None else (sheet.drift.first, sheet.drift.kept, sheet.drift.step)
+    initial_variance, decay, step_variance = (
+        (1.0, 1.0, 0.0)
+        if sheet.drift is None
+        else (sheet.drift.initial_variance, sheet.drift.decay, sheet.drift.step_variance)
     )
     ones, none = np.ones(present.size), np.zeros(present.size)
-    return normal_density(*given(residual, ones, first * share, kept, step * share, none)) - volume
+    return normal_density(*given(residual, ones, initial_variance * share, decay, step_variance * share, none)) - volume
 
 
 def _given_before(
-    residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats, bias: Floats
+    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats, bias: Floats
 ) -> tuple[Floats, Floats]:
-    """What is new in each sample given those before it, shape (..., samples, channels), and its variance.
+    """Innovations given the samples before, shape (..., samples, channels), and their variances.
 
-    What wanders is the zero of `_filtered`, with a constant of variance `bias` beside it.
+    The unknown zero is the drift of `_filtered` plus a constant of variance `bias`.
     """
-    if kept == 1.0 or not np.any(bias):
-        return _filtered(residual, noise, bias + first, kept, step)
-    # A bias beside a drift that forgets is regressed on: what the filter makes of 1 in every sample, it has that often.
+    if decay == 1.0 or not np.any(bias):
+        return _filtered(residual, noise, bias + initial_variance, decay, step_variance)
+    # A bias beside a decaying drift is a regression on the filter's response to 1 in every sample.
     residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-    (new, of_one), total = _filtered(np.stack([residual, ones]), noise, first, kept, step)
+    (new, of_one), total = _filtered(np.stack([residual, ones]), noise, initial_variance, decay, step_variance)
     with np.errstate(divide="ignore"):
         known = 1.0 / bias + _sum_before(of_one**2 / total)
     new = new - of_one * _sum_before(of_one * new / total) / known
     return new, total + of_one**2 / known
 
 
-def _filtered(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
-    """What is new in each sample, shape (..., samples, channels), and its variance: Kalman's filter by channel.
+def _filtered(
+    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats
+) -> tuple[Floats, Floats]:
+    """Innovations, shape (..., samples, channels), and their variances, by a Kalman filter for each channel.
 
-    What is filtered is a zero of variance `first` at the first sample, with white noise on top of it.
+    The state is a drift with `initial_variance` at the first sample, observed with white noise.
     """
     residual = np.moveaxis(residual, -2, 0)
     noise = np.atleast_2d(noise)
     white = np.broadcast_to(np.moveaxis(noise, -2, 0), (len(residual), *noise.shape[:-2], noise.shape[-1]))
-    total = np.empty((len(residual), *np.broadcast_shapes(white.shape[1:], first.shape)))
+    total = np.empty((len(residual), *np.broadcast_shapes(white.shape[1:], initial_variance.shape)))
     new = np.empty((len(residual), *np.broadcast_shapes(residual.shape[1:], total.shape[1:])))
     place: Floats | float = 0.0
-    variance = first
+    variance = initial_variance
     for i in range(len(residual)):
         total[i] = variance + white[i]
         new[i] = residual[i] - place
         share = variance / total[i]
-        place = kept * (place + share * new[i])
-        variance = kept * kept * share * white[i] + step
+        place = decay * (place + share * new[i])
+        variance = decay * decay * share * white[i] + step_variance
     return np.moveaxis(new, 0, -2), np.moveaxis(total, 0, -2)
 
 
 def _given_others(
-    residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats, bias: Floats
+    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats, bias: Floats
 ) -> tuple[Floats, Floats]:
-    """What is new in each sample given all the others, and its variance; arguments as of `_given_before`.
+    """Residuals of each sample given all others, and their variances; arguments as in `_given_before`.
 
-    With Q the inverse of the covariance of all samples r, they are (Q r)_i / Q_ii and 1 / Q_ii.
+    With the inverse Q of the covariance of all samples r, they are (Q r)_i / Q_ii and 1 / Q_ii.
     """
-    if kept == 1.0 or not np.any(bias):
-        weighed, precision = _weighed(residual, noise, bias + first, kept, step)
+    if decay == 1.0 or not np.any(bias):
+        weighed, precision = _weighed(residual, noise, bias + initial_variance, decay, step_variance)
     else:
-        # A bias beside a drift that forgets takes its share of one dimension from Q: Sherman and Morrison.
+        # A bias beside a decaying drift is a change of rank one of Q: the Sherman–Morrison formula.
         residual, ones, _ = np.broadcast_arrays(residual, 1.0, noise)
-        (weighed, of_one), precision = _weighed(np.stack([residual, ones]), noise, first, kept, step)
+        (weighed, of_one), precision = _weighed(
+            np.stack([residual, ones]), noise, initial_variance, decay, step_variance
+        )
         with np.errstate(divide="ignore"):
             known = 1.0 / bias + of_one.sum(axis=-2, keepdims=True)
         weighed = weighed - of_one * weighed.sum(axis=-2, keepdims=True) / known
@@ -330,19 +343,23 @@ def _given_others(
     return weighed / precision, 1.0 / precision
 
 
-def _weighed(residual: Floats, noise: Floats, first: Floats, kept: float, step: Floats) -> tuple[Floats, Floats]:
-    """Q r and the diagonal of Q, by channel, of what is `_filtered`, back from the last sample.
+def _weighed(
+    residual: Floats, noise: Floats, initial_variance: Floats, decay: float, step_variance: Floats
+) -> tuple[Floats, Floats]:
+    """Q r and the diagonal of Q by channel, for the model of `_filtered`, backward from the last sample.
 
-    The smoother of disturbances, which needs no matrices: Koopman 1993, doi 10.1093/biomet/80.1.117.
+    This is the disturbance smoother, which needs no matrices: Koopman 1993, doi 10.1093/biomet/80.1.117.
     """
-    new, total = (np.moveaxis(values, -2, 0) for values in _filtered(residual, noise, first, kept, step))
+    new, total = (
+        np.moveaxis(values, -2, 0) for values in _filtered(residual, noise, initial_variance, decay, step_variance)
+    )
     noise = np.atleast_2d(noise)
     white = np.broadcast_to(np.moveaxis(noise, -2, 0), (len(total), *noise.shape[:-2], noise.shape[-1]))
     weighed, precision = np.empty(new.shape), np.empty(total.shape)
     pull, weight = np.zeros(new.shape[1:]), np.zeros(total.shape[1:])
     for i in reversed(range(len(total))):
-        left = kept * white[i] / total[i]
-        share = kept - left
+        left = decay * white[i] / total[i]
+        share = decay - left
         own, certain = new[i] / total[i], 1.0 / total[i]
         weighed[i] = own - share * pull
         precision[i] = certain + share**2 * weight
@@ -352,18 +369,18 @@ def _weighed(residual: Floats, noise: Floats, first: Floats, kept: float, step: 
 
 
 def normal_density(deviation: Floats, variance: Floats) -> Floats:
-    """Log-density of independent channels."""
+    """Normal log-density of independent channels, summed over them."""
     return np.asarray(-0.5 * (deviation**2 / variance + np.log(variance) + _LOG_2PI).sum(axis=-1))
 
 
 def _sum_before(values: Floats) -> Floats:
-    """Over the samples before each."""
+    """Sum over the samples before each."""
     sums = np.zeros_like(values)
     np.cumsum(values[..., :-1, :], axis=-2, out=sums[..., 1:, :])
     return sums
 
 
-# ---- what cannot be
+# ---- refusals
 
 
 def _checked(measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -393,7 +410,7 @@ def _present(sheet: DataSheet, readings: Floats) -> NDArray[np.intp]:
 
 
 def refuse_silent(sheet: DataSheet, index: int) -> None:
-    """Refuse a channel that is measured without noise: no likelihood is one of it."""
+    """Refuse a channel that is measured without noise, which has no likelihood."""
     if sheet.noise[index] == 0:
         name = CHANNELS[index]
         source = "moment_noise" if name == "holding_moment" else "force_noise"
@@ -416,7 +433,7 @@ def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: NDArr
 def refuse_inexact(
     sheet: DataSheet, readings: Floats, present: NDArray[np.intp], wanders: bool, correlated: bool
 ) -> None:
-    """Refuse combinations whose likelihood has no exact form, nor one that is nearly exact."""
+    """Refuse combinations whose likelihood has no exact or nearly exact form."""
     what = "drift or an unknown bias" if wanders else "correlated noise"
     if math.isfinite(sheet.degrees_of_freedom):
         raise ParameterError(

@@ -1,4 +1,4 @@
-"""How likely each sample of a record is by itself, what it shares with the others being noise of its own."""
+"""Likelihood of each sample of a record by itself; errors that it shares with others count as its own noise."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ __all__ = ["LoneSamples"]
 
 
 class LoneSamples:
-    """Readings, each to be looked at by itself.
+    """Readings, each of which is judged by itself.
 
-    Where noise is white this is exact. An unknown bias and drift are shared by samples; a sample by itself sees in them
-    no more than noise, of the standard deviation that they have at its place in the record.
+    For white noise this is exact. Samples share an unknown bias and drift; for a single sample these are noise, with
+    their standard deviation at its position in the record.
 
     Parameters
     ----------
     sheet : DataSheet
     readings : ndarray, shape (n, 3)
-        In the sheet's units and frame, from the first sample of a record on, no channel missing.
+        Readings in the sheet's units and frame, from the first sample of a record, without missing channels.
 
     Raises
     ------
     ParameterError
-        If a channel has no noise; if drift or an unknown bias come together with outliers, or with a reading at the end
+        If a channel has no noise; if drift or an unknown bias is combined with outliers, or with a reading at the end
         of the range.
     """
 
@@ -50,14 +50,14 @@ class LoneSamples:
             refuse_inexact(sheet, readings, np.arange(len(CHANNELS)), wanders=True, correlated=False)
 
     def take(self, where: NDArray[np.intp]) -> LoneSamples:
-        """Some of the samples."""
+        """Select samples."""
         some = object.__new__(LoneSamples)
         some._sheet, some._wanders = self._sheet, self._wanders
         some._readings, some._wandering = self._readings[where], self._wandering[where]
         return some
 
     def log_density(self, loads: Floats) -> Floats:
-        """Of the readings, shape (..., n), for loads of shape (..., n, 3); NaN where a load is."""
+        """Log-density of the readings, shape (..., n), for loads of shape (..., n, 3); NaN where a load is NaN."""
         sheet = self._sheet
         if not self._wanders:
             return log_likelihood(sheet, self._readings, loads, pointwise=True)

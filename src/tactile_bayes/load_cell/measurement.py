@@ -1,4 +1,4 @@
-"""The measurement of a record by a sensor, the truth beside it; and what is known of its errors taken out again."""
+"""The measurement of a record by a sensor, with the truth beside it, and the correction for its known errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TAKEN_OUT = tuple(
 
 
 def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
-    """The record as a sensor gives it; see `LoadCell.measure`."""
+    """Measure a record with a sensor; see `LoadCell.measure`."""
     made = validate(record if sheet.frame is None else in_frame(record, sheet.frame))
     entries = _after(sheet, stated_entries(made)).entries()
     present = present_channels(made)
@@ -54,7 +54,7 @@ def measured(sheet: DataSheet, record: xr.Dataset, rng: np.random.Generator) -> 
 
 
 def corrected(sheet: DataSheet, record: xr.Dataset) -> xr.Dataset:
-    """The record without bias, gain, lever, and the encoder's offset and backlash; see `LoadCell.corrected`."""
+    """Correct a record for bias, gain, lever, and the encoder's offset and backlash; see `LoadCell.corrected`."""
     ideal = DataSheet()
     if all(getattr(sheet, name) == getattr(ideal, name) for name in CERTAIN):
         return record
@@ -76,7 +76,7 @@ def corrected(sheet: DataSheet, record: xr.Dataset) -> xr.Dataset:
 
 
 def stated_entries(record: xr.Dataset) -> dict[str, Any]:
-    """What the attributes of a record say of its load cell, but for its frame."""
+    """Entries of the data sheet in the attributes of a record, without the frame."""
     return {
         str(name).removeprefix(_PREFIX): value
         for name, value in record.attrs.items()
@@ -85,7 +85,7 @@ def stated_entries(record: xr.Dataset) -> dict[str, Any]:
 
 
 def _put(made: xr.Dataset, name: str, readings: NDArray[np.float64]) -> None:
-    """Put readings in place of a column, which is kept as the truth unless there is one."""
+    """Replace a column by readings, and store it as the truth unless there is one."""
     ideal, truth = made[name], column_of(f"truth_{name}")
     if truth is not None and truth.name not in made:
         attrs = {"units": ideal.attrs["units"], "long_name": truth.long_name_in(frame_of(made))}
@@ -94,7 +94,7 @@ def _put(made: xr.Dataset, name: str, readings: NDArray[np.float64]) -> None:
 
 
 def _after(sheet: DataSheet, stated: dict[str, Any]) -> DataSheet:
-    """What has measured a record that another sensor had measured before."""
+    """Data sheet of two successive measurements of a record."""
     ideal = DataSheet()
     here, before = DataSheet.from_entries({**sheet.entries(), "frame": None}), DataSheet.from_entries(stated)
     if ideal in (here, before):

@@ -1,4 +1,4 @@
-"""The roughness of a signal: its white noise, without a model of what is under it."""
+"""The roughness of a signal: its white noise, without a model of the signal."""
 
 from __future__ import annotations
 
@@ -11,15 +11,20 @@ __all__ = ["rough_noise"]
 
 
 def rough_noise(signal: NDArray[np.float64]) -> float:
-    """Standard deviation of the white noise on a smooth signal, from its median second difference; 0 of two samples.
+    """Standard deviation of the white noise on a smooth signal, from its median second difference.
 
-    Second differences take away what is straight, and the median what jumps; of normal noise they have √6 times its
+    Second differences remove linear trends, and the median removes jumps. For normal noise they have √6 times its
     standard deviation, which is 1.4826 times the median of their size.
 
     Parameters
     ----------
     signal : array, shape (n_samples,)
-        In the order of measurement.
+        Signal in the order of measurement.
+
+    Returns
+    -------
+    float
+        In the unit of the signal; 0 for fewer than 3 samples.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The zero load of a record: its unloaded stretches, and the bias and noise that they tell."""
+"""The zero load of a record: its unloaded stretches, and the bias and noise estimated from them."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, present_channels, 
 
 __all__ = ["found_cell", "zero_load"]
 
-_TELLING = 12
-"""Fewest samples of a sweep that is taken for unloaded because no contact was found in it: in shorter ones a strong
-contact can go unnoticed."""
+_MIN_SAMPLES = 12
+"""Least number of samples of a sweep that counts as unloaded because no contact was found in it: in a shorter sweep a
+strong contact may be missed."""
 
 _STEPS = 1e-2
-"""How far from whole, at most, a reading in steps may be."""
+"""Tolerated distance of a reading, in steps, from a whole number."""
 
 
 def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
-    """Where a record is unloaded, without labels, and what bias and white noise it shows there.
+    """Find the unloaded samples of a record, without labels, and estimate bias and white noise from them.
 
     A sweep is unloaded, then loaded without a break, then unloaded again; each part may be missing. Loads grow from
-    zero about straight in the sample number, and drop abruptly.
+    zero approximately linearly in the sample number, and drop abruptly.
 
     Parameters
     ----------
     record : xr.Dataset
-        A record. Nothing that it says of its load cell is used.
+        A record. Its data sheet of the load cell is not used.
     false_alarm : float
-        Largest probability, for each sweep, that contact is claimed where there is none; all channels and places
-        together, in white normal noise of unknown bias and size. Also the level of every other test named below.
+        Largest probability of a false detection of contact in a sweep, over all channels and positions, in white normal
+        noise of unknown bias and size. It is also the level of every other test named below.
 
     Returns
     -------
@@ -47,68 +47,68 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
         In the units and the frame of the record.
 
         contact, p_value (sweep)
-            Whether contact was found, and a bound on how often noise looks so much like it.
+            Whether contact was found, and an upper bound of the p-value of no contact.
         onset, snap_off (sweep, side)
             Samples of the record between which contact began and ended: the last "before" the event and the first
-            "after" it that are unloaded or loaded for certain, which at onset are at least two apart; -1 where there
-            is none, as before the onset of a sweep that is loaded from its first sample. Their drive angles, or NaN,
-            are onset_drive_angle and snap_off_drive_angle [rad].
+            "after" it that are certainly unloaded or loaded, which at onset are at least two apart; -1 where there is
+            none, as before the onset of a sweep that is loaded from its first sample. Their drive angles, or NaN, are
+            onset_drive_angle and snap_off_drive_angle [rad].
         unloaded (sample)
-            What bias and noise are made from: up to "before" of the onset and from "after" of the snap-off, and
-            sweeps of at least 12 samples that show neither contact nor slope at a level of 5 %.
+            Samples from which bias and noise are estimated: up to "before" of the onset and from "after" of the
+            snap-off, and sweeps of at least 12 samples with neither contact nor slope at a level of 5 %.
         bias, noise (channel), bias_uncertainty, noise_uncertainty (channel)
             Mean, standard deviation, and their standard errors; bias is one number for all sweeps. NaN for missing
             channels, and if fewer than 3 samples are unloaded.
         same_bias_p_value (channel)
-            That of the hypothesis that all unloaded stretches have one bias (analysis of variance).
+            p-value of the hypothesis that all unloaded stretches have the same bias (analysis of variance).
         resolution (channel)
-            Step of the reading, if it has one that can be seen; else 0.
+            Step of the reading, if it can be detected; else 0.
 
     Raises
     ------
     RecordError
-        If `record` is no record.
+        If `record` is not a record.
     ParameterError
         If `false_alarm` is not a probability below a half.
 
     Warns
     -----
     DriftWarning
-        If the stretches differ in their bias; its uncertainty then has the spread between stretches added.
+        If the stretches differ in their bias; the spread between stretches is then added to its uncertainty.
 
     Notes
     -----
     *Contact.* Take some samples at both ends of a sweep. Without contact the sum of squares about their mean, as a
-    share of that of the whole sweep, follows a beta distribution, exactly, whatever bias and noise are. The least of
-    its probabilities, over ends of 0, 1, 2, 3, 4, 6, 8, 12, ... samples and over channels, times their number
-    (Bonferroni), is `p_value`: the rate of false alarms is bounded for every length, and for channels that are
-    correlated. Lest outliers make a contact, the same must hold after readings that stand out from both neighbours are
-    cut off, at three deviations from the median.
+    share of that of the whole sweep, follows a beta distribution exactly, for any bias and noise. The smallest of its
+    probabilities, over ends of 0, 1, 2, 3, 4, 6, 8, 12, ... samples and over channels, times their number (Bonferroni),
+    is `p_value`: the rate of false alarms is bounded for every length, and for correlated channels. Lest outliers make
+    a contact, the same must hold after readings that exceed both neighbours are clipped at three deviations from the
+    median.
 
-    *Its bounds.* A sample (with a neighbour on the same side) or a block of 2, 4, 8, ... samples is loaded if Student's
-    t against the ends says so, again by Bonferroni. The first one bounds the onset from above. From below it is the
-    F-test of where a straight ramp up to there can start (an approximation, as for any break), less one sample, as
-    that after a break carries next to nothing. After the last loaded one, load is taken to stay as it is, until a
-    likelihood-ratio test tells that it is gone. This is repeated with what is then unloaded until nothing changes. An
-    end with a slope is not unloaded.
+    *Bounds of contact.* A sample (with a neighbour on the same side) or a block of 2, 4, 8, ... samples is loaded if
+    Student's t against the ends is significant, again by Bonferroni. The first one bounds the onset from above. The
+    bound from below is an F-test of the possible starts of a linear ramp up to there (an approximation, as for any
+    break), less one sample, since the sample after a break carries almost no load. After the last loaded sample the
+    load counts as constant until a likelihood-ratio test shows that it is gone. This is repeated with the samples that
+    are then unloaded until nothing changes. An end with a slope is not unloaded.
 
-    *What it does*, in simulations at the default, "σ" being one standard deviation of the noise. False alarms are two
-    to five times rarer than stated; outliers that follow Student's t with 5 degrees of freedom make one in less than
-    1 %, with 3 in less than 4 % of sweeps of up to 2000 samples. A load on one channel that grows to h at snap-off is
-    found in 95 of 100 sweeps from h = 8 σ (15 samples before, in and after contact), 5 σ (15, 100, 15) or 2.2 σ (100,
-    500, 100). Onset is noticed 17, 5 and 0.3 samples late at slopes of 0.2, 1 and 20 σ a sample, and 7, 3 and 1 samples
-    before it are left out to be safe. A snap-off from 20 σ is exact to the sample in 999 of 1000 sweeps, from 10 σ in
-    three of four; else its samples are further apart. Bias over its uncertainty follows Student's t, with a mean below
-    0.1; but a contact too weak to be found shifts it: by 4 uncertainties one of 100 samples that reaches 1 σ, between
-    15 unloaded ones on either side.
+    *Performance*, in simulations at the default, with the standard deviation σ of the noise. False alarms are two to
+    five times rarer than stated; outliers that follow Student's t with 5 degrees of freedom cause one in less than 1 %,
+    with 3 in less than 4 % of sweeps of up to 2000 samples. A load on one channel that grows to h at snap-off is found
+    in 95 of 100 sweeps from h = 8 σ (15 samples before, in and after contact), 5 σ (15, 100, 15) or 2.2 σ (100, 500,
+    100). Onset is detected 17, 5 and 0.3 samples late at slopes of 0.2, 1 and 20 σ a sample, and 7, 3 and 1 samples
+    before it are left out as a margin. A snap-off from 20 σ is exact to the sample in 999 of 1000 sweeps, from 10 σ in
+    three of four; otherwise its samples are further apart. Bias over its uncertainty follows Student's t, with a mean
+    below 0.1. But a contact too weak to be found shifts it: by 4 uncertainties for 100 samples that reach 1 σ, between
+    15 unloaded samples on either side.
 
-    *What it cannot do.* A load that does not change all through a sweep is taken for a bias. A zero that moves
-    during contact is told by the warning (2 σ in 7 of 10 sweeps, 15 samples on either side), but by more than about a
-    sixth of the largest load it is taken for load, and the sweep seems to have no snap-off. A rod that rings after
-    snap-off is loaded as long as it does.
+    *Limits.* A load that is constant throughout a sweep counts as a bias. The warning reports a zero that moves during
+    contact (2 σ in 7 of 10 sweeps, 15 samples on either side); but a change by more than about a sixth of the largest
+    load counts as load, and the sweep then seems to have no snap-off. A rod that rings after snap-off counts as loaded
+    as long as it rings.
 
-    If noise is smaller than the step of the reading it cannot be told from it: noise is then at least step/√12, and the
-    bias is not known to better than that.
+    Noise smaller than the step of the reading cannot be distinguished from it: the noise is then at least step/√12, and
+    the uncertainty of the bias is not smaller.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     sweep = record["sweep"].values
     order = np.argsort(sweep, kind="stable")
     sweeps = np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
-    bounds = [_telling(contact_bounds(readings[rows], false_alarm, floor), len(rows)) for rows in sweeps]
+    bounds = [_if_long_enough(contact_bounds(readings[rows], false_alarm, floor), len(rows)) for rows in sweeps]
     stretches = []
     for rows, of_sweep in zip(sweeps, bounds, strict=True):
         stretches += [rows[: of_sweep.before], rows[len(rows) - of_sweep.after :]]
@@ -157,7 +157,7 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
 
 
 def found_cell(record: xr.Dataset, *, false_alarm: float = 1e-3) -> dict[str, Any]:
-    """What `LoadCell.from_zero_load` finds, as arguments of a `LoadCell`; see there."""
+    """Arguments of the `LoadCell` of `LoadCell.from_zero_load`; see there."""
     found = zero_load(record, false_alarm=false_alarm)
     count = int(found["unloaded"].sum())
     if count < FEWEST:
@@ -182,20 +182,20 @@ def found_cell(record: xr.Dataset, *, false_alarm: float = 1e-3) -> dict[str, An
 
 
 def _step(values: Floats) -> float:
-    """Step of a reading, the smallest difference between two of which all others are multiples; 0 if there is none."""
+    """Step of a reading: its smallest difference, if all others are multiples of it; else 0."""
     different = np.unique(values)
     if not 2 <= different.size < values.size:
         return 0.0
     step = float(np.diff(different).min())
     whole = (different - different[0]) / step
-    # Of a few numbers, many samples have to agree: noise never repeats itself, but no load does, without noise.
+    # With two different numbers both must repeat: noise does not repeat itself, but zero load without noise does.
     few = different.size == 2 and min(np.count_nonzero(values == v) for v in different) == 1
     return 0.0 if few or np.any(np.abs(whole - np.round(whole)) > _STEPS) else step
 
 
-def _telling(bounds: ContactBounds, samples: int) -> ContactBounds:
-    """The bounds, but of a sweep without contact only if it is long enough to tell."""
-    if bounds.found or samples >= _TELLING:
+def _if_long_enough(bounds: ContactBounds, samples: int) -> ContactBounds:
+    """Return the bounds; a sweep without contact has no unloaded samples if it is too short."""
+    if bounds.found or samples >= _MIN_SAMPLES:
         return bounds
     return ContactBounds(bounds.p_value, False, bounds.onset, bounds.snap_off, 0, 0)
 
@@ -215,7 +215,7 @@ def _statistics(stretches: list[Floats], steps: Floats, floor: Floats, false_ala
     variance[rounded] = np.maximum(variance, steps**2 / 12.0)[rounded]
     bias = sizes @ means / count
     error = variance / count
-    # Noise of less than half a step does not carry readings across it often enough for their mean to forget it.
+    # With noise below half a step readings change too rarely for their mean to average over the step.
     error[rounded & (variance < 0.25 * steps**2)] += (steps**2 / 12.0)[rounded & (variance < 0.25 * steps**2)]
     p_value = np.ones(steps.size)
     if groups > 1:
@@ -243,14 +243,14 @@ def _labelled(
         "p_value": ("sweep", [of_sweep.p_value for of_sweep in bounds], {"long_name": "p-value of no contact"}),
         "unloaded": ("sample", unloaded, {"long_name": "whether the sample is unloaded"}),
     }
-    for name, words in (("onset", "first contact"), ("snap_off", "snap-off")):
+    for name, event in (("onset", "first contact"), ("snap_off", "snap-off")):
         inside = [getattr(of_sweep, name) for of_sweep in bounds]
         sample = np.array(
             [[-1 if i < 0 else int(rows[i]) for i in pair] for rows, pair in zip(sweeps, inside, strict=True)]
         )
         dims = ("sweep", "side")
-        variables[name] = (dims, sample, {"long_name": f"samples beside {words}"})
-        attrs = {"units": "rad", "long_name": f"drive angles beside {words}"}
+        variables[name] = (dims, sample, {"long_name": f"samples beside {event}"})
+        attrs = {"units": "rad", "long_name": f"drive angles beside {event}"}
         variables[f"{name}_drive_angle"] = (dims, np.where(sample < 0, np.nan, angle[sample]), attrs)
     for name, values in statistics.items():
         of_all = np.full(len(CHANNELS), np.nan)

@@ -61,7 +61,7 @@ def tip_arc(deficit: float, chord_angle: float, chi: float, epsilon1: float) -> 
     x, t = chi, epsilon1
     for _ in range(_MAX_STEPS):
         arc, by_chi, by_psi1 = arc_and_slopes(x, math.sin(0.5 * t) ** 2)
-        dx, dt = 0.0, t - chord_angle  # of a straight rod, whose chord lies along it
+        dx, dt = 0.0, t - chord_angle  # a straight rod lies along its chord
         if x > 0.0:
             angle_x, angle_t = chord_direction_rate(arc, by_chi), -chord_direction_rate(arc, by_psi1)
             value = chord_deficit(arc)

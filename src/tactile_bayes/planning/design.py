@@ -31,7 +31,7 @@ from tactile_bayes.planning.candidate import Candidate, Expected, Question, expe
 from tactile_bayes.planning.design_ledger import CANDIDATES, question_in_words
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
 from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge, known_from_posterior, known_from_prior
-from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["CRITERIA", "design"]
 
@@ -178,7 +178,7 @@ def design(
     candidates = tuple(Candidate(base, float(step)) for base, step in product(_bases(bases, told), steps))
     x = np.linspace(*_span(span, told), _PLACES)
     question = Question(told, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
-    with open_ledger(
+    with open_results_store(
         question_in_words(question), None if out is None else check_path("out", out).resolve(), CANDIDATES
     ) as ledger:
         found = keep_outcomes(

@@ -74,7 +74,7 @@ def _wandering(cell: LoadCell, samples: int) -> Floats:
     shared = np.broadcast_to(bias, (samples, samples, 3)).copy()
     if cell.drift is not None:
         gone = np.arange(samples)
-        kept = cell.drift.kept
+        kept = cell.drift.decay
         variance = wandering_deviation(cell, samples) ** 2 - bias
         apart = np.abs(gone[:, None] - gone)
         shared += kept ** apart[..., None] * variance[np.minimum(gone[:, None], gone)]

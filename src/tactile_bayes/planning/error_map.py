@@ -38,7 +38,7 @@ from tactile_bayes.planning.amplification import METHODS
 from tactile_bayes.planning.error_cell import CellOutcome, MapCell, MapTask, error_cell
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["CELLS", "error_map"]
 
@@ -190,7 +190,7 @@ def error_map(
         float(probability),
         int(seed),
     )
-    with open_ledger(_words(task), None if out is None else check_path("out", out).resolve(), CELLS) as ledger:
+    with open_results_store(_words(task), None if out is None else check_path("out", out).resolve(), CELLS) as ledger:
         kept = keep_outcomes(
             ledger, error_cell, task, len(cells), workers=workers, scheduler=scheduler, progress=progress
         )

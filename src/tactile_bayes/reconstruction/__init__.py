@@ -1,4 +1,4 @@
-"""Step 2: contact points from a measured record, sample by sample, raw or constrained to what a rod can do."""
+"""Step 2: contact points from a measured record, sample by sample, raw or constrained to possible contacts."""
 
 from tactile_bayes.reconstruction.estimate import STATUSES
 from tactile_bayes.reconstruction.samples import FALSE_ALARM, Samples, loaded_samples, samples_of

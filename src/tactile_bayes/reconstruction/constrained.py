@@ -1,4 +1,4 @@
-"""Constrained Step 2: the most likely of the contacts that a rod can make."""
+"""Constrained Step 2: the most likely of the possible contacts."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from tactile_bayes.reconstruction.samples import Samples
 __all__ = ["are_weighed", "constrained_estimate", "refuse_without_noise"]
 
 _CLEARANCE = 2.0
-"""Standard deviations from the edge between the phases below which a contact may well be of the other one."""
+"""Standard deviations from the edge between the phases below which the phase of a contact is uncertain."""
 
 _MISFIT = 25.0
-"""Sum of squares, of one degree of freedom, that noise exceeds in less than one of a million samples."""
+"""Sum of squares of one degree of freedom that noise exceeds in less than one of a million samples."""
 
 _RIVAL = 6.0
-"""Lead in the sum of squares, below which the other phase is too likely to be left out: by a factor of 20."""
+"""Difference of the sums of squares below which the other phase is not negligible: a likelihood ratio of 20."""
 
 
 def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
-    """Most likely contacts, with their covariance on the sheet of possible ones.
+    """Most likely contacts, with their covariance on the sheet of possible contacts.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
         misfit[where], distance[where] = np.where(found, (fit.misfit, fit.clearance), np.nan)
         bent = is_weak(reading.loads, reading.covariance)
         with np.errstate(invalid="ignore"):
-            # At the ends of what is possible: the line of force through the pivot, or an upright contour.
+            # Near the limits: the line of force through the pivot, or a vertical contour.
             bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
             bent |= np.abs(rod.place[2]) > 0.49 * np.pi
         bent |= bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
@@ -75,13 +75,13 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
 
 
 def are_weighed(samples: Samples) -> bool:
-    """Whether the load cell says how far each channel is to be trusted."""
+    """Return whether the load cell states a finite variance of every channel."""
     covariance = samples.reading.covariance
     return bool(np.all(np.isfinite(covariance)) and np.all(np.diagonal(covariance, axis1=1, axis2=2) > 0.0))
 
 
 def refuse_without_noise(samples: Samples) -> None:
-    """Refuse a load cell that does not say how far each channel is to be trusted."""
+    """Refuse a load cell without a finite variance of every channel."""
     if not np.all(np.isfinite(samples.reading.covariance)):
         raise ParameterError(
             "Student's t with 2 degrees of freedom and fewer has no standard deviation to weigh the channels by: use "

@@ -1,4 +1,4 @@
-"""The estimate: a contact for every sample, its covariance to first order, and whether that order holds."""
+"""The estimate: a contact for every sample, its covariance to first order, and the validity of that order."""
 
 from __future__ import annotations
 
@@ -41,40 +41,40 @@ STATUSES = (
     "either phase",
     "does not fit",
 )
-"""What can become of a sample, by code."""
+"""Statuses of a sample, by code."""
 
 MOST_BEND = 0.5
-"""Shift by curvature, in standard deviations, above which a covariance of first order is not to be trusted."""
+"""Shift by curvature, in standard deviations, above which a covariance of first order is not valid."""
 
 _WEAK = 10.0
-"""Standard deviations of the noise below which a force is weak: its direction is then hardly known."""
+"""Standard deviations of the noise below which a force is weak, so that its direction is uncertain."""
 
 _ROUNDING = 1e-9
 
 
 class Estimate(NamedTuple):
-    """Contacts, dimensionless, forward; NaN where there is none."""
+    """Contacts, dimensionless and mirrored to forward ones; NaN where there is none."""
 
     place: Floats
     """Contact point, slope angle and arc length, shape (n, 4)."""
     covariance: Floats | None
-    """Of the place, shape (n, 4, 4); None where nothing is known of errors."""
+    """Covariance of the place, shape (n, 4, 4); None without any noise level."""
     phase: NDArray[np.int8]
     status: NDArray[np.int8]
     """Code in `STATUSES`."""
     misfit: Floats | None = None
-    """Sum of squared deviations that is left, shape (n,)."""
+    """Residual sum of squared deviations, shape (n,)."""
     edge_distance: Floats | None = None
     """Distance from the change between tip and tangential contact, in standard deviations, shape (n,)."""
 
 
 def unanswered(loaded: NDArray[np.bool_], cut_off: NDArray[np.bool_]) -> NDArray[np.int8]:
-    """Status of samples for as long as no contact is found."""
+    """Status of samples before a contact is found."""
     return np.where(loaded, np.where(cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
 
 
 def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floats]:
-    """Standard deviations along the contour and normal to it of points with covariance (n, ≥ 2, ≥ 2)."""
+    """Standard deviations along the contour and normal to it, for points with covariance (n, ≥ 2, ≥ 2)."""
     cos, sin = np.cos(slope_angle), np.sin(slope_angle)
     xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
     with np.errstate(invalid="ignore"):
@@ -84,7 +84,7 @@ def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floa
 
 
 def is_weak(loads: Floats, covariance: Floats) -> NDArray[np.bool_]:
-    """Whether forces, of loads (n, 3) with covariance (n, 3, 3), are not much larger than their noise."""
+    """Return which forces, of loads (n, 3) with covariance (n, 3, 3), are below 10 standard deviations."""
     force = loads[:, 1:]
     with np.errstate(invalid="ignore", over="ignore"):
         squared = (force * force).sum(axis=1)
@@ -93,19 +93,19 @@ def is_weak(loads: Floats, covariance: Floats) -> NDArray[np.bool_]:
 
 
 def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> NDArray[np.bool_]:
-    """Whether contacts one standard deviation aside do not lie as a covariance of first order has it.
+    """Return where contacts one standard deviation aside contradict a covariance of first order.
 
     Parameters
     ----------
     place : ndarray, shape (n, 4)
     covariance : ndarray, shape (n, 4, 4)
     aside : list of pairs of ndarray, shape (n, ≥ 2)
-        Where the contact would be, had the data been one standard deviation more, or less, of each independent error.
+        Contacts for data that are one standard deviation larger, and smaller, in each independent error.
 
     Returns
     -------
     ndarray of bool, shape (n,)
-        True as well where such a contact does not exist.
+        True also where such a contact does not exist.
     """
     xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
     bent = np.zeros(len(place), dtype=bool)

@@ -1,4 +1,4 @@
-"""Raw Step 2: four noisy numbers taken at their word."""
+"""Raw Step 2: contacts from four noisy numbers as they are."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ROUNDING = 1e-9
 
 
 def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
-    """Contacts of Step 2, with the covariance that errors of the sensor give them to first order."""
+    """Contacts by Step 2, with their covariance to first order in the errors of the sensor."""
     fit = raw_contacts(samples.reading, delta)
     slope_angle, arclength = fit.place[:, 2:].T
     found = np.isfinite(arclength) & ~(samples.cut_off & samples.loaded)
@@ -32,7 +32,7 @@ def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
     status[found] = OK
     covariance = None
     with np.errstate(invalid="ignore"):
-        # In tangential contact the rod lies along the contour, in tip contact it ends there: which holds more nearly?
+        # In tangential contact the rod lies along the contour, in tip contact it ends there: take the nearer case.
         tip = np.abs(1.0 - arclength) < np.abs(np.sin(fit.tip_angle - slope_angle))
         if samples.has_noise:
             covariance = fit.covariance

@@ -1,4 +1,4 @@
-"""The samples of a record: which of them carry a load, on which side of the object, and what they say of it."""
+"""The samples of a record: which of them are loaded, on which side of the object, and with which uncertainty."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, t
 __all__ = ["FALSE_ALARM", "Samples", "loaded_samples", "samples_of"]
 
 FALSE_ALARM = 1e-3
-"""Share of unloaded samples that noise makes look loaded."""
+"""Share of unloaded samples that count as loaded because of noise."""
 
 _MIRROR = np.array([-1.0, -1.0, 1.0])
-"""Signs of the loads of a backward contact seen as a forward one."""
+"""Signs of the loads of a backward contact that is mirrored to a forward one."""
 
 
 class Samples(NamedTuple):
-    """The samples of a record as arrays, dimensionless, backward contacts mirrored to forward ones."""
+    """Samples of a record as arrays, dimensionless, with backward contacts mirrored to forward ones."""
 
     rod: Rod
     reading: Reading
-    """Known errors taken out, and the forces along the axes of the world."""
+    """Readings corrected for known errors, with forces along the axes of the laboratory."""
     side: Floats
     """+1, or −1 where a sample is mirrored, shape (n,)."""
     loaded: Flags
     cut_off: Flags
-    """Whether a channel is at the end of its range."""
+    """True if a channel is at the end of its range."""
     has_noise: bool
-    """Whether anything is known of the errors."""
+    """True if any noise level is known."""
 
     def take(self, where: NDArray[np.intp]) -> Samples:
-        """Some of the samples."""
+        """Select samples."""
         return self._replace(
             reading=self.reading.take(where),
             side=self.side[where],
@@ -51,10 +51,19 @@ class Samples(NamedTuple):
 
 
 def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: float = 0.0) -> Samples:
-    """The samples of a valid record with all load channels.
+    """Samples of a valid record with all load channels.
 
-    By a compliance of its suspension [rad per unit of moment of the record] the pivot turns under the moment, so that
-    the rod's slope is not the drive's, along with which the load cell may turn.
+    With a compliant suspension the pivot turns under the moment, so that the rod's slope differs from the drive angle,
+    with which the load cell may turn.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    cell : LoadCell
+        Load cell in the record's units.
+    suspension_compliance : float
+        Turn of the suspension per holding moment [rad per unit of moment of the record].
 
     Raises
     ------
@@ -75,7 +84,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
     side = contact_sides(corrected, cell)
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     angle = corrected.drive_angle.values
-    with np.errstate(over="ignore", invalid="ignore"):  # a load beyond all numbers has no zero of curvature
+    with np.errstate(over="ignore", invalid="ignore"):  # an infinite load has no zero of curvature
         loads = np.stack([corrected[name].values for name in CHANNELS], axis=-1) / units
         loads[~loaded] = 0.0
         cell = cell.dimensionless(rod)
@@ -83,8 +92,10 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         covariance = np.zeros((1, 3, 3))
         if has_noise:
             inverse = np.linalg.inv(cell.gain_matrix)
-            told_by = loads if cell.relative_noise or cell.drift is not None else loads[:1]  # or all are alike
-            covariance = inverse @ cell.covariance(told_by) @ inverse.T
+            for_covariance = (
+                loads if cell.relative_noise or cell.drift is not None else loads[:1]
+            )  # otherwise all are equal
+            covariance = inverse @ cell.covariance(for_covariance) @ inverse.T
         leaning = np.zeros(loads.shape)
         if frame_of(measured) == "turning":
             loads[:, 1], loads[:, 2] = turned(loads[:, 1], loads[:, 2], -angle)
@@ -111,7 +122,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
 
 
 def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> Flags:
-    """Which samples carry more load than noise explains.
+    """Find the samples whose load is significant.
 
     Parameters
     ----------
@@ -136,4 +147,4 @@ def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> F
         else:
             loaded |= measured[name].values != load_cell.bias[index]
     noisy = int(np.count_nonzero(~np.isnan(readings).all(axis=0)))
-    return loaded | (load_cell.surprise(readings) > chdtri(noisy, FALSE_ALARM)) if noisy else loaded
+    return loaded | (load_cell.squared_mahalanobis_distance(readings) > chdtri(noisy, FALSE_ALARM)) if noisy else loaded

@@ -1,4 +1,4 @@
-"""The side of the object that each sweep touches: as its direction says, unless the moment contradicts that."""
+"""The side of the object that each sweep touches: that of its direction, unless the moment contradicts it."""
 
 from __future__ import annotations
 
@@ -26,46 +26,51 @@ __all__ = [
 ]
 
 CONTACT_SIDES = "contact_sides"
-"""Of a record: a JSON object from sweep to the direction of a sweep that touches the object from that side."""
+"""Attribute of a record: a JSON object that maps a sweep to the direction in which a sweep touches the same side."""
 
 OTHER_SIDE = {"forward": "backward", "backward": "forward"}
 
 _CONTRADICTED, _DOUBTED = -6.0, -2.0
-"""Mean moment in contact, on the direction's side of the zero, in standard errors, below which the direction is not
-believed, and below which it is doubted."""
+"""Mean moment in contact, with the sign of the direction, in standard errors, below which the direction is rejected,
+and below which it is doubtful."""
 
 _UNLIKELY, _IMPOSSIBLE = 3.0, 5.0
-"""Standard deviations of a zero of which nothing is known: if the direction is right, and the zero no further off than
-the first, it is doubted at most; what is beyond the second is load and no zero."""
+"""Limits of an unknown zero, in standard deviations: a correct direction with a zero within the first is doubtful at
+most; beyond the second the value is a load and not a zero."""
 
 _ZERO = 0.1
-"""Standard deviation of a zero of which nothing is known [EI/L]."""
+"""Standard deviation of an unknown zero [EI/L]."""
 
 _WANDER = 0.2
-"""That of a zero that moves between contact and the unloaded samples beside it, in standard deviations of the noise."""
+"""Standard deviation of a shift of the zero between contact and the unloaded samples, over that of the noise."""
 
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
-"""Noise of a reading that has none, over the largest."""
+"""Noise of a reading without noise, over the largest reading."""
 
 _FALSE_ALARM = 1e-3
 _ALL_BUT_OUTLIERS = 0.98
 
 
 def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floats:
-    """+1 where the object is touched as in a forward sweep, −1 as in a backward one, shape (samples,).
+    """Side of contact of every sample: +1 as in a forward sweep, −1 as in a backward one, shape (samples,).
 
-    It is the side of the sweep's direction, unless the moment contradicts that, since a drive may also turn back in
-    contact: in contact the moment is on the other side of its zero by more than six standard errors. The zero is the
-    mean of the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else none within a
-    standard deviation of 0.1 EI/L. As what looks unloaded may be a load that does not change, the moment must also be
-    on the other side of all zeros within three of these. A record may state the sides of its sweeps (`with_sides`).
+    It is the side of the sweep's direction unless the moment contradicts it, since a drive may also turn back in
+    contact: then the moment in contact has the opposite sign by more than six standard errors. Its zero is the mean of
+    the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else 0 with a standard
+    deviation of 0.1 EI/L. Since seemingly unloaded samples may have a constant load, the moment must also have the
+    opposite sign for all zeros within three of these deviations. A record may state the sides of its sweeps
+    (`with_sides`).
 
     Parameters
     ----------
     record : xr.Dataset
-        A valid record. Known errors of the load cell are taken out.
+        A valid record, corrected for known errors of the load cell.
     load_cell : LoadCell, optional
-        Its noise counts where neighbours differ by less.
+        Its noise is a lower bound of the noise estimated from neighbouring samples.
+
+    Returns
+    -------
+    ndarray, shape (samples,)
     """
     sides = _stated(record)
     if not set(np.unique(record.sweep.values).tolist()) <= sides.keys():
@@ -78,12 +83,12 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
 
 
 def doubtful_sweeps(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[int, ...]:
-    """Sweeps whose moment speaks against their direction, and not clearly, the most doubtful first."""
+    """Sweeps whose moment contradicts their direction, but not significantly; the most doubtful first."""
     return sides_and_doubts(record, load_cell)[1]
 
 
 def sides_and_doubts(record: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[dict[int, str], tuple[int, ...]]:
-    """Sides of all sweeps, as `contact_sides` has them, and `doubtful_sweeps`, judged once."""
+    """Sides of all sweeps as in `contact_sides`, and `doubtful_sweeps`, in one computation."""
     stated, sides, doubted = _stated(record), {}, []
     for one in _judged(record, load_cell):
         said = str(record.direction.values[one.rows[0]])
@@ -94,17 +99,29 @@ def sides_and_doubts(record: xr.Dataset, load_cell: LoadCell | None = None) -> t
 
 
 def side_of(record: xr.Dataset, sweep: int) -> str:
-    """The side that the direction of a sweep says."""
+    """Side of contact that the direction of a sweep implies, "forward" or "backward"."""
     return str(record.direction.values[np.argmax(record.sweep.values == sweep)])
 
 
 def with_sides(record: xr.Dataset, sides: Mapping[int, str]) -> xr.Dataset:
-    """The record with the sides of some sweeps stated: "forward" as a forward sweep touches, or "backward".
+    """State the sides of some sweeps of a record: "forward" for the side that a forward sweep touches, or "backward".
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+    sides : mapping of int to {"forward", "backward"}
+        Sides by the number of the sweep.
+
+    Returns
+    -------
+    xr.Dataset
+        The record with the attribute `contact_sides`.
 
     Raises
     ------
     ParameterError
-        If a sweep is none of the record, or a side is neither.
+        If the record has no such sweep, or a side is invalid.
 
     Examples
     --------
@@ -126,14 +143,14 @@ def _stated(record: xr.Dataset) -> dict[int, str]:
 
 
 class _Judged(NamedTuple):
-    """What the moment of one sweep says of its direction."""
+    """Evidence of the moment of one sweep for its direction."""
 
     sweep: int
     rows: Index
     score: float
-    """How far its mean in contact is on the direction's side of the zero, in standard errors."""
+    """Mean moment in contact less the zero, with the sign of the direction, in standard errors."""
     absolute: float
-    """The same where nothing is known of the zero."""
+    """Score for an unknown zero."""
 
     @property
     def is_contradicted(self) -> bool:
@@ -141,7 +158,7 @@ class _Judged(NamedTuple):
 
 
 def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
-    """Every sweep of a record, in the order of their numbers."""
+    """Judge every sweep of a record, in the order of their numbers."""
     unit = rod_of(record).moment_unit
     cell = load_cell or LoadCell()
     known = float(np.sqrt(cell.covariance(np.zeros((1, 3)))[0, 0, 0]))

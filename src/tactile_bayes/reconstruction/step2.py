@@ -29,13 +29,13 @@ __all__ = ["AXIAL_ALARM", "reconstruct"]
 _METHODS = {"raw": raw_estimate, "constrained": constrained_estimate}
 _KEPT = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 AXIAL_ALARM = 6.0
-"""Size of the axial score beyond which the force along the rod is told not to agree with the moment."""
+"""Size of the axial score above which the force along the rod is reported to disagree with the moment."""
 _NO_CONTACT = 25.0
-"""Misfit of a loaded sample that no contact explains, at least."""
+"""Bound on the misfit of a loaded sample; the value for a sample without a contact."""
 _TWENTY_TO_ONE = 6.0
-"""Difference of misfits by which one of two sides is twenty times likelier."""
+"""Difference of misfits at which one of two sides is twenty times as likely."""
 _MIRROR = np.array([-1.0, 1.0, -1.0, 1.0])
-"""What backward contacts turn round of a place, its slope angle and the arc length."""
+"""Signs by which backward contacts are mirrored: contact point, slope angle and arc length."""
 
 _CLEAR = 3.0
 """Standard deviations from the edge between the phases at which the misfit is χ² with one degree of freedom."""
@@ -50,90 +50,90 @@ def reconstruct(
     friction: float = 0.0,
     suspension_compliance: float = 0.0,
 ) -> xr.Dataset:
-    """Contact point, arc length, slope and phase from every sample of a record, with their uncertainty.
+    """Reconstruct contact point, arc length, slope and phase from every sample of a record, with their uncertainty.
 
-    The raw method takes drive angle, holding moment and forces at their word: equation 26 of Merker et al. 2018, doi
-    10.1155/2018/1613945, gives the direction of the force, and the rod touches where its curvature is first zero
-    (equation 27). But these are four numbers, and a contact has three degrees of freedom: the constrained method
-    returns the most likely of the contacts that a rod can make, be it at the tip (arc length 1) or along the rod. One
-    bad sample never stops the others: `status` says what became of each.
+    The raw method takes drive angle, holding moment and forces as they are: equation 26 of Merker et al. 2018, doi
+    10.1155/2018/1613945, gives the direction of the force, and the contact is the first point of zero curvature
+    (equation 27). These are four numbers, and a contact has three degrees of freedom: the constrained method returns
+    the most likely of the possible contacts, at the tip (arc length 1) or along the rod. A bad sample does not affect
+    the others; `status` describes the result of each.
 
     Parameters
     ----------
     measured : xr.Dataset
         A record with all three load channels.
     method : {"raw", "constrained"}
-        How four numbers that do not quite fit together are turned into a contact.
+        How a contact is determined from four noisy numbers.
     load_cell : LoadCell, optional
-        Tells noise from load; by default the data sheet that the record carries, if any. A sample is loaded if the sum
-        of its squared loads in standard deviations is one that noise alone exceeds in 1 of 1000 samples. Without any
-        noise level every sample whose load is not exactly zero counts as loaded, and there are no standard deviations.
-        What it says of bias, gain and the encoder's offset is taken out first.
+        Load cell in the record's units; by default the data sheet in the record's attributes, if any. A sample is
+        loaded if its squared Mahalanobis distance from zero load is one that noise alone exceeds in 1 of 1000 samples.
+        Without any noise level every sample whose load is not exactly zero is loaded, and there are no standard
+        deviations. The record is first corrected for bias, gain and the encoder's offset.
     rod : Rod, optional
-        In place of the rod that an SI record states.
+        Rod in place of the one that an SI record states.
     friction : float
-        Coulomb's coefficient μ of the sliding rod.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84.
     suspension_compliance : float
-        By which the pivot's suspension turns under the holding moment [rad/(N m), or rad/(EI/L)]; that the moment's
-        error turns it, too, is neglected.
+        Turn of the pivot's suspension per holding moment [rad/(N m), or rad/(EI/L)]; the turn by the error of the
+        moment is neglected.
 
     Returns
     -------
     xr.Dataset
         Over "sample", in the units of the record: contact_x, contact_y (on the object's surface), contact_arclength,
-        slope_angle, contact_phase ("tip", "tangential", "none"), status, and standard deviations to first order in
-        the errors of load cell and encoder (NaN without any noise level): contact_x_sd, contact_y_sd with
+        slope_angle, contact_phase ("tip", "tangential", "none"), status, and standard deviations to first order in the
+        errors of load cell and encoder (NaN without any noise level): contact_x_sd, contact_y_sd with
         contact_xy_correlation, slope_angle_sd, contact_arclength_sd, and tangent_sd and normal_sd, along the contour
-        and across it. What samples share, like an unknown bias, is in them as if it were noise of each.
+        and across it. They include errors that samples share, like an unknown bias, as if they were independent.
 
-        With method="constrained" also misfit, the sum of squared deviations that is left, in standard deviations, and
-        edge_distance, how many standard deviations the contact is from the change between tip and tangential contact.
-        Where the model holds, the misfit is χ² with one degree of freedom if the edge is far. Within some 2 standard
-        deviations of it that holds no longer: data between the two phases have two ways to be near a contact, which
-        makes the misfit smaller, and data beyond the corner have none, which makes it larger. In simulations 3 to 6 %
-        of misfits there exceed 3.84, instead of 5 %, and their mean is 0.8 to 1.1. The attributes misfit_sum,
-        misfit_samples and misfit_probability (that noise gives such a sum, or a larger one) leave out what is nearer
-        than 3; the probability is NaN where samples share errors. Near 0 it says that rod, friction or frame are wrong,
-        or the noise is larger than stated; near 1, that it is smaller. In tangential contact the force along the rod at
-        the pivot follows from the moment, fAx cos φ0 + fAy sin φ0 = m0²/2 (− f sin δ with friction angle δ): the mean
-        of the difference over such samples, weighted, in standard errors, is axial_score: standard normal where the
-        model holds, far below zero where there is friction that is not stated.
+        With method="constrained" also misfit, the residual sum of squared deviations in standard deviations, and
+        edge_distance, the distance of the contact from the change between tip and tangential contact in standard
+        deviations. If the model holds, the misfit far from the edge follows χ² with one degree of freedom. Within some
+        2 standard deviations of the edge it does not: data between the two phases have two contacts nearby, which makes
+        the misfit smaller, and data beyond the corner have none, which makes it larger. In simulations 3 to 6 % of
+        misfits there exceed 3.84, instead of 5 %, and their mean is 0.8 to 1.1. The attributes misfit_sum,
+        misfit_samples and misfit_probability (the probability that noise gives at least this sum) leave out contacts
+        within 3 standard deviations; the probability is NaN if samples share errors. A value near 0 means that rod,
+        friction or frame are wrong or the noise is larger than stated; near 1, that it is smaller. In tangential
+        contact the force along the rod at the pivot follows from the moment, fAx cos φ0 + fAy sin φ0 = m0²/2 (− f sin δ
+        with the friction angle δ). The weighted mean of the difference over such samples, in standard errors, is
+        axial_score: it is standard normal if the model holds, and far below zero with unstated friction.
 
         status is one of
 
         ok
-            A contact on the rod, with standard deviations that hold if rod, noise and friction are what they are said
-            to be; a wrong one shows in the misfits, not in the status.
+            A contact on the rod, with valid standard deviations if rod, noise and friction are as stated; the misfits,
+            and not the status, show a wrong one.
         no contact
             The sample is not loaded; the rest is NaN.
         cut off
-            A channel is at the end of its range, so the load was larger; the rest is NaN.
+            A channel is at the end of its range, so that the load was larger; the rest is NaN.
         no zero of curvature
-            No point of the rod on the object's side is free of moment, as a contact must be; the rest is NaN.
+            The moment does not vanish at any point of the rod on the object's side, as it must at a contact; the rest
+            is NaN.
         nonlinear
-            A contact on the rod, but standard deviations and ellipses of first order do not hold: the force is below
-            10 standard deviations of its noise, or contacts one standard deviation aside lie half of one off the
-            ellipse. `infer_contacts` gives the whole posterior.
+            A contact on the rod, but standard deviations and ellipses of first order are not valid: the force is below
+            10 standard deviations of its noise, or contacts one standard deviation aside deviate by half of one from
+            the ellipse. `infer_contacts` gives the whole posterior.
         beyond the tip
-            The curvature vanishes only beyond the rod's end, at the point that is returned; under noise this is what
-            becomes of about half of the tip contacts. With method="raw" only.
+            The curvature vanishes only beyond the rod's end, at the point that is returned; under noise this happens to
+            about half of the tip contacts. With method="raw" only.
         at the edge
-            Within 2 standard deviations of the change between tip and tangential contact: the contact may well be of
-            the other phase, and standard deviations do not hold. `infer_contacts` weighs both. With
-            method="constrained" only.
+            Within 2 standard deviations of the change between tip and tangential contact: the phase is uncertain, and
+            standard deviations are not valid. `infer_contacts` weights both phases. With method="constrained" only.
         either phase
-            Tip and tangential contact are both likely, at different places, the one returned at most 20 times more than
-            the other. `infer_contacts` weighs them. With method="constrained" only.
+            Tip and tangential contact are both likely, at different points, the one returned at most 20 times as likely
+            as the other. `infer_contacts` weights them. With method="constrained" only.
         does not fit
-            No contact gives such loads: the misfit is above 25, which noise makes of less than one in a million. Is the
-            rod right, and the noise? With method="constrained" only.
+            No contact gives such loads: the misfit is above 25, which noise exceeds in less than one of a million
+            samples. Check the rod and the noise. With method="constrained" only.
 
     Raises
     ------
     RecordError
-        If `measured` is no record, or misses a load channel.
+        If `measured` is not a record, or lacks a load channel.
     ParameterError
-        If the method is unknown, the rod does not fit the record, or the constrained method has no noise to go by.
+        If the method is unknown, the rod does not fit the record, or the constrained method has no noise level.
 
     Examples
     --------
@@ -157,8 +157,8 @@ def reconstruct(
     measured = with_rod(validate(measured), rod)
     check_number("suspension_compliance", suspension_compliance, "give a number from 0 up", least=0.0)
     if suspension_compliance * float(np.abs(np.nan_to_num(measured.holding_moment.values)).max()) > 2.0 * np.pi:
-        remedy = "with such moments the pivot would give way by more than a turn: give radians per moment"
-        raise refused("suspension_compliance", suspension_compliance, remedy)
+        correction = "with such moments the pivot would give way by more than a turn: give radians per moment"
+        raise refused("suspension_compliance", suspension_compliance, correction)
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
     measured, doubtful = _with_likelier_sides(measured, cell, suspension_compliance, friction)
     samples = samples_of(measured, cell, suspension_compliance)
@@ -176,9 +176,10 @@ def reconstruct(
 def _with_likelier_sides(
     measured: xr.Dataset, cell: LoadCell, suspension_compliance: float, friction: float
 ) -> tuple[xr.Dataset, dict[int, str]]:
-    """The record with the sides of its sweeps stated, and those of doubtful ones: as said, or the likelier.
+    """Return the record with the sides of its sweeps stated, and the sides of doubtful sweeps.
 
-    Without any noise to go by there is no misfit, and directions are believed.
+    A doubtful sweep takes the side of its direction or, if the misfit is clearly smaller, the other. Without a noise
+    level there is no misfit, and it takes the side of its direction.
     """
     taken: dict[int, str] = {}
     sides, doubtful = sides_and_doubts(_in_channels(measured, cell), cell)
@@ -199,19 +200,19 @@ def _with_likelier_sides(
 
 
 def _in_channels(measured: xr.Dataset, cell: LoadCell) -> xr.Dataset:
-    """The record with known errors taken out, if it has all channels; else it is refused later."""
+    """Return the corrected record, if it has all channels; otherwise it is refused later."""
     return cell.corrected(measured) if len(present_channels(measured)) == len(CHANNELS) else measured
 
 
 def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> dict[str, tuple[str, object, object]]:
-    """Columns of the result, in the world's axes and the record's units."""
+    """Columns of the result, in the laboratory frame and the record's units."""
     rod, side = samples.rod, samples.side
     radius = 0.5 * rod.diameter / rod.length_unit
-    place = _in_world(estimate.place, side, radius)
+    place = _in_lab_frame(estimate.place, side, radius)
     nothing = np.full(side.size, np.nan)
     spread, tangent, normal, correlation = [nothing] * 4, nothing, nothing, nothing
     if estimate.covariance is not None:
-        covariance = _covariance_in_world(estimate.place, estimate.covariance, side, radius)
+        covariance = _covariance_in_lab_frame(estimate.place, estimate.covariance, side, radius)
         spread = list(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T)
         tangent, normal = spread_across(covariance, place[:, 2])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -250,16 +251,16 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     return variables
 
 
-def _in_world(place: Floats, side: Floats, radius: float) -> Floats:
-    """Places on the object's surface, backward contacts mirrored back."""
+def _in_lab_frame(place: Floats, side: Floats, radius: float) -> Floats:
+    """Places on the object's surface in the laboratory frame."""
     x, y, alpha, arclength = place.T
     if radius:
         x, y = x - radius * np.sin(alpha), y + radius * np.cos(alpha)
     return np.stack([side * x, y, side * alpha, arclength], axis=-1)
 
 
-def _covariance_in_world(place: Floats, covariance: Floats, side: Floats, radius: float) -> Floats:
-    """The same of their covariance."""
+def _covariance_in_lab_frame(place: Floats, covariance: Floats, side: Floats, radius: float) -> Floats:
+    """Covariance of places on the object's surface in the laboratory frame."""
     if radius:
         shift = np.broadcast_to(np.eye(4), covariance.shape).copy()
         shift[:, 0, 2], shift[:, 1, 2] = -radius * np.cos(place[:, 2]), -radius * np.sin(place[:, 2])
@@ -270,7 +271,7 @@ def _covariance_in_world(place: Floats, covariance: Floats, side: Floats, radius
 
 
 def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float) -> dict[str, float | int]:
-    """The misfit of all samples clear of the edge, how probable noise makes it, and whether it has a sign."""
+    """Sum of the misfits of all samples clear of the edge, its probability, and the axial score."""
     if estimate.misfit is None or estimate.edge_distance is None:
         return {}
     with np.errstate(invalid="ignore"):
@@ -289,8 +290,8 @@ def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float
 
 
 def _axial_score(reading: Reading, friction: float) -> float:
-    """Mean over tangential contacts of the force along the rod at the pivot, less what the moment says it is, over
-    its standard error.
+    """Mean difference, over tangential contacts, of the force along the rod at the pivot and its value from the moment,
+    over its standard error.
     """
     moment, force_x, force_y = reading.loads.T
     cos, sin = np.cos(reading.drive_angle), np.sin(reading.drive_angle)

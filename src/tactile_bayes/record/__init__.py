@@ -1,4 +1,4 @@
-"""The record of a tactile sensor: its schema, its validation, its units, its frame, and its files (CSV and NetCDF)."""
+"""The record of a tactile sensor: its schema, validation, units, frame, and files (CSV and NetCDF)."""
 
 from tactile_bayes.record.construction import make_record
 from tactile_bayes.record.files import read_record, write_record

@@ -1,4 +1,4 @@
-"""The attributes of a record: its units, its rod, data sheet and frame of its load cell, and remarks."""
+"""The attributes of a record: units, rod, data sheet and frame of the load cell, and remarks."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = [
 
 
 def rod_attributes(rod: Rod) -> dict[str, float]:
-    """A rod as attributes of a record; `stated_rod` is the inverse."""
+    """Convert a rod to attributes of a record; `stated_rod` is the inverse."""
     return {
         "rod_length": rod.length,
         "rod_flexural_rigidity": rod.flexural_rigidity,
@@ -46,7 +46,7 @@ def rod_attributes(rod: Rod) -> dict[str, float]:
 
 
 def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
-    """The rod that the attributes of a record state, 1.0 for what a dimensionless record leaves out."""
+    """Return the rod that the attributes of a record state; a dimensionless record may leave out values of 1."""
     units = attrs.get("units")
     if not isinstance(units, str) or units not in UNITS:
         found = "states no units" if units is None else f"has units {units!r}"
@@ -77,18 +77,18 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
 
 
 def stated_frame(attrs: Mapping[str, Any], source: Source) -> Frame:
-    """The frame of the load cell that the attributes of a record state, "fixed" if they state none."""
+    """Return the frame of the load cell that the attributes of a record state, "fixed" by default."""
     frame = attrs.get("load_cell_frame", "fixed")
     if not (isinstance(frame, str) and frame in FRAMES):
         raise source.error(
             f"attribute 'load_cell_frame' is {frame!r}: write 'fixed' for a load cell that measures along the axes of "
-            "the world, or 'turning' for one that turns with the drive and measures along the rod and across it"
+            "the laboratory, or 'turning' for one that turns with the drive and measures along the rod and across it"
         )
     return frame
 
 
 def same_rod(one: Rod, other: Rod) -> bool:
-    """Whether two rods are equal up to the rounding of a few operations."""
+    """Return whether two rods are equal up to the rounding of a few operations."""
     pairs = zip(rod_attributes(one).values(), rod_attributes(other).values(), strict=True)
     return all(math.isclose(*pair, rel_tol=1e-12) for pair in pairs)
 
@@ -96,7 +96,7 @@ def same_rod(one: Rod, other: Rod) -> bool:
 def completed_attributes(
     attrs: Mapping[str, Any], rod: Rod | None, frame: Frame | None, source: Source
 ) -> dict[str, Any]:
-    """The attributes with units, rod and frame that are stated, given beside them, or else assumed."""
+    """Complete attributes by units, rod and frame, as stated, as given, or by default."""
     completed = dict(attrs)
     if frame is not None:
         completed = {"load_cell_frame": frame, **completed}
@@ -129,7 +129,7 @@ def completed_attributes(
 
 
 def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, Any]:
-    """The attributes as strings and numbers, units and rod first, or the reason why they are none of a record."""
+    """Return the attributes as strings and numbers, units and rod first, or raise an error."""
     rod = stated_rod(attrs, source)
     stated_frame(attrs, source)
     checked: dict[str, Any] = {"units": attrs["units"], **rod_attributes(rod)}
@@ -157,7 +157,7 @@ def checked_attributes(attrs: Mapping[str, Any], source: Source) -> dict[str, An
 
 
 def no_entry(name: str) -> str:
-    """That a load cell's data sheet has no entry of this name, and which one was probably meant."""
+    """Message that the data sheet has no entry of this name, with the most similar one."""
     near = nearest(name, [*LOAD_CELL_UNITS, "frame"])
     hint = f"did you mean {near!r}?" if near else f"there are frame, {', '.join(LOAD_CELL_UNITS)}."
     return (
@@ -174,7 +174,7 @@ def _quantity(name: str, value: Any, source: Source) -> float:
 
 
 def _is_quantity(value: Any) -> bool:
-    """Whether a value is a number, or a text of a number with a unit, or with a decimal comma."""
+    """Return whether a value is a number, or the text of a number with a unit or a decimal comma."""
     if not isinstance(value, str):
         return isinstance(value, int | float)
     match = _QUANTITY.fullmatch(value.strip())

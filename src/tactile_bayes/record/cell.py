@@ -1,4 +1,4 @@
-"""A cell of a table: what number there is in it, if there is one."""
+"""A cell of a table, and the number in it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["integer_in", "is_integer_text", "number_in"]
 
 
 def number_in(cell: Any) -> float | None:
-    """The number in a cell, NaN if the cell is empty, None if there is something else in it."""
+    """Parse the number in a cell: NaN for an empty cell, None for other content."""
     if cell is None:
         return math.nan
     if isinstance(cell, str):
@@ -24,11 +24,11 @@ def number_in(cell: Any) -> float | None:
 
 
 def integer_in(cell: Any) -> int | None:
-    """The integer in a cell, None if there is something else in it; 2.0 is one, as tables often write it so."""
+    """Parse the integer in a cell, None for other content; 2.0 counts as one, since tables often contain it."""
     if isinstance(cell, int):
         integer = cell
     elif isinstance(cell, str) and is_integer_text(cell):
-        digits = cell.strip().lstrip("+-").lstrip("0")[:20] or "0"  # 20 are too many; Python refuses more than 4300
+        digits = cell.strip().lstrip("+-").lstrip("0")[:20] or "0"  # 20 overflow; Python refuses more than 4300
         integer = -int(digits) if "-" in cell else int(digits)
     else:
         number = number_in(cell)
@@ -39,5 +39,5 @@ def integer_in(cell: Any) -> int | None:
 
 
 def is_integer_text(text: str) -> bool:
-    """Whether a text is written as an integer, without a point or an exponent."""
+    """Return whether a text has the form of an integer, without a point or an exponent."""
     return re.fullmatch(r"\s*[+-]?[0-9]+\s*", text) is not None

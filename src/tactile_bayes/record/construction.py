@@ -28,38 +28,38 @@ def make_record(
     missing: Collection[str] = (),
     load_cell_frame: Frame | None = None,
 ) -> xr.Dataset:
-    """Record from a mapping of columns.
+    """Make a record from a mapping of columns.
 
     Parameters
     ----------
     columns : mapping of str to array, shape (n_samples,)
-        The columns of `MEASURED`, in the units of the record (angles in radians), and any further ones, numbers
-        or text; a single value stands for a whole column. base_x and base_y are 0 where they are absent. A
-        channel that the rig does not measure is a column of NaN, or named in `missing`. Attributes `units` and
-        `long_name` of a column that has them (a DataArray) are kept; true and false become 1 and 0.
+        The columns of `MEASURED`, in the units of the record (angles in radians), and any further columns of numbers
+        or text; a single value stands for a whole column. base_x and base_y are 0 by default. A channel that the rig
+        does not measure is a column of NaN, or named in `missing`. Attributes `units` and `long_name` of a column (of a
+        DataArray) are kept; true and false become 1 and 0.
     rod : Rod, optional
-        The rod, whose length and stiffness say that the record is SI. Without it, or with the dimensionless
-        `Rod()`, the record is dimensionless: lengths in rod lengths L, moments in EI/L, forces in EI/L². Where
-        `attrs` state units and rod already, they hold.
+        The rod, with length and stiffness in SI units; the record is then SI. Without it, or with the dimensionless
+        `Rod()`, the record is dimensionless: lengths in rod lengths L, moments in EI/L, forces in EI/L². Units and rod
+        in `attrs` have precedence.
     attrs : mapping, optional
-        Attributes of the record, strings and numbers: `load_cell_force_noise` and `load_cell_moment_noise` are the
-        data sheet of the sensor in the record's units; others are kept as they are.
+        Attributes of the record, strings and numbers: `load_cell_force_noise` and `load_cell_moment_noise` belong to
+        the data sheet of the sensor, in the record's units; others are kept as they are.
     missing : collection of str, optional
         Channels that the rig does not measure.
     load_cell_frame : {"fixed", "turning"}, optional
-        Whether force_x and force_y are along the axes of the world, or the load cell turns with the drive: then they
-        are along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0), φ0 the drive angle. By
+        Frame of force_x and force_y: the axes of the laboratory, or those of a load cell that turns with the drive,
+        along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0), with the drive angle φ0. By
         default as `attrs` state, else "fixed".
 
     Returns
     -------
     xr.Dataset
-        Dimension "sample"; every variable with attributes `units` and `long_name`.
+        The record, dimension "sample"; every variable has attributes `units` and `long_name`.
 
     Raises
     ------
     RecordError
-        If the columns cannot be a record; see `validate`.
+        If the columns are not a valid record; see `validate`.
     ParameterError
         If `missing` names something that is not a channel.
 
@@ -90,13 +90,13 @@ def make_record(
 
 
 def completed_record(table: Table, rod: Rod | None, missing: Collection[str], frame: Frame | None) -> xr.Dataset:
-    """The record that a table makes with the rod, the missing channels and the frame that were given beside it."""
+    """Make a record from a table, with the given rod, missing channels and frame."""
     columns = _with_missing(table, [missing] if isinstance(missing, str) else check_names("missing", missing))
     return checked_record(Table(columns, completed_attributes(table.attrs, rod, frame, table.source), table.source))
 
 
 def _with_missing(table: Table, missing: Collection[str]) -> dict[str, Cells]:
-    """The columns with an empty one for each channel that is declared missing."""
+    """Add an empty column for each channel that is declared missing."""
     columns = dict(table.columns)
     for name in missing:
         if name not in CHANNELS:

@@ -1,4 +1,4 @@
-"""The CSV form of a record: a header of commented lines, a line of column names, a line per sample."""
+"""The CSV format of a record: a header of commented lines, a line of column names, a line for each sample."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from tactile_bayes.tasks import write_atomically
 __all__ = ["read_csv", "write_csv"]
 
 _ROWS = 20_000
-"""Samples that are written at once."""
+"""Number of samples that are written at once."""
 
 _BRACKETS = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)")
 
 
 def write_csv(record: xr.Dataset, path: Path) -> None:
-    """Write a record that has been validated."""
+    """Write a validated record."""
     columns = {str(name): variable for name, variable in record.variables.items()}
     columns = {name: columns[name] for name in sorted(columns, key=lambda name: name not in MEASURED)}
     with write_atomically(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
@@ -67,7 +67,7 @@ def _cell_texts(values: NDArray[Any]) -> list[str]:
 
 
 def _quoted_cells(texts: list[str]) -> list[str]:
-    """The texts, in quotation marks where they would not be read back without."""
+    """Put texts in quotation marks where reading requires them."""
     quoted = {  # csv.writer would leave a lone carriage return unquoted
         text: '"' + text.replace('"', '""') + '"' for text in set(texts) if re.search('[,;\t"\r\n]', text)
     }
@@ -75,9 +75,9 @@ def _quoted_cells(texts: list[str]) -> list[str]:
 
 
 def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read a table as it is in the file; columns that mean something in a record have the right kind of cells.
+    """Read a table as it is in the file; columns of a record have the right kind of cells.
 
-    Columns without a name are left out if they are empty: a separator at the end of every line makes one.
+    Empty columns without a name are left out: a separator at the end of every line makes one.
     """
     source = Source(str(path))
     with open(path, "rb") as file:
@@ -96,7 +96,7 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
         described = {
             name: cast(Kind, header.descriptions[name]["kind"]) for name in names if name in header.descriptions
         }
-        # Columns without a name are called by their place until they are left out; names in a file begin with no blank.
+        # Columns without a name are called by their position until they are left out; no name begins with a blank.
         places = [name or f" (column {place})" for place, name in enumerate(header.names, start=1)]
         unnamed = {name: place for place, name in enumerate(places, start=1) if name not in names}
         for name in unnamed:
@@ -118,7 +118,7 @@ def read_csv(path: Path, columns: Mapping[str, str]) -> Table:
 
 
 def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Mapping[str, str], source: Source) -> None:
-    """Refuse a line that was taken for the column names, but means nothing, where a line below looks more like them."""
+    """Refuse a line of unknown column names if a line below looks more like column names."""
     if any_meant(columns, names):
         return
     below = lines_below(file)
@@ -129,7 +129,7 @@ def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Map
                 header.line, f"{what}but they are in line {number}: put # before the lines above that"
             )
     widths = [len(cells_in(line, header.delimiter)) for line in below]
-    if len(header.names) == 1 or len(header.names) not in widths:  # what separates names does not separate cells there
+    if len(header.names) == 1 or len(header.names) not in widths:  # another delimiter separates the cells there
         widths = [len(cells_in(line)) for line in below]
     if max(widths, default=0) > len(header.names):
         raise source.line_error(
@@ -140,7 +140,7 @@ def _refuse_title(file: BinaryIO, header: Header, names: list[str], columns: Map
 
 
 def _refuse_content(texts: NDArray[Any], place: int, lines: NDArray[np.int64], head: int, source: Source) -> None:
-    """Refuse a column without a name that has something in it."""
+    """Refuse a column without a name that is not empty."""
     for sample in np.flatnonzero(texts != "").tolist():
         text = str(texts[sample])
         if text.strip():
@@ -150,7 +150,7 @@ def _refuse_content(texts: NDArray[Any], place: int, lines: NDArray[np.int64], h
 
 
 def _with_usual_line_ends(file: BinaryIO) -> BinaryIO:
-    """The file; or a copy with other line ends, if it has only carriage returns, as files once had."""
+    """Return the file, or a copy with usual line ends if it has carriage returns only, like old files."""
     start = file.peek(1 << 16) if isinstance(file, io.BufferedReader) else b""
     if b"\n" in start or b"\r" not in start:
         return file
@@ -158,15 +158,15 @@ def _with_usual_line_ends(file: BinaryIO) -> BinaryIO:
 
 
 def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], source: Source) -> dict[str, str]:
-    """The units of columns, if the line below their names is a row of units; the file is then left behind it.
+    """Read the units of columns if the line below their names is a row of units; the file is then positioned after it.
 
-    In such a row a column that is measured has a unit, and no cell is a number; a unit of another column, like °C, need
-    not be known here. Pure numbers alone make none: 1 and - may be units, but readings too.
+    In such a row a measured column has a unit, and no cell is a number; a unit of another column, like °C, may be
+    unknown. Pure numbers alone are no row of units: 1 and - may be units, but readings too.
 
     Raises
     ------
     RecordError
-        If a measured column has a unit that is none, or that differs from what the header states.
+        If a measured column has an unknown unit, or one that differs from the header.
     """
     cells = cells_in(next(iter(lines_below(file)), ""), header.delimiter)
     texts = [_without_brackets(cell) for cell in cells]
@@ -190,7 +190,7 @@ def _units_below(file: BinaryIO, header: Header, meant: Mapping[str, Kind], sour
 def _refuse_unit(
     place: int, name: str, text: str, unit: Unit | None, header: Header, source: Source, *, is_measured: bool
 ) -> None:
-    """Refuse a cell of a row of units that is none, or not that of its column."""
+    """Refuse an unknown unit in a row of units, or one that differs from that of its column."""
     number = header.line + 1
     if not name:
         raise source.line_error(

@@ -22,7 +22,7 @@ FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
 _DELIMITERS = ",;\t"
 _SEARCHED, _LONGEST = 50, 10_000
-"""Lines, and bytes of each, that are looked at ahead of what is read."""
+"""Number of lines, and of bytes of each, that are inspected ahead of reading."""
 
 _NAME = r"[\w.\-]+"
 _QUOTED = r'"(?:[^"\\]|\\.)*"'
@@ -38,24 +38,24 @@ _QUANTITY = re.compile(r"(?P<number>[^\[\]]+)(?:\[(?P<unit>[^\]]*)\])?")
 
 @dataclass(frozen=True)
 class Header:
-    """What a CSV file says before its first sample.
+    """Content of a CSV file before its first sample.
 
     Parameters
     ----------
     attrs : mapping
         Attributes of the record; quantities are in SI, or in units of the rod.
     descriptions : mapping of str to mapping
-        What is said of columns: `kind`, `units`, `long_name`.
+        Descriptions of columns: `kind`, `units`, `long_name`.
     heads : mapping of str to int
-        The line that says what a column is.
+        Line of the description of each column.
     stated : mapping of str to int
-        The line that states an attribute.
+        Line of each attribute.
     names : list of str
-        The columns; "" for one without a name.
+        Names of the columns; "" for a column without a name.
     delimiter : str
-        What separates them.
+        Separator of the columns.
     line : int
-        The line of the names.
+        Line of the names.
     """
 
     attrs: Mapping[str, Any]
@@ -71,19 +71,19 @@ class Header:
 
 
 def header_line(name: str, value: str | float, units: str) -> str:
-    """An attribute of a record in the given units, as a line of a header."""
+    """Format an attribute of a record in the given units as a line of a header."""
     unit = _attribute_unit(name, units)
     return f"# {_quoted(name, _NAME)}: {_header_text(value)}{'' if unit == '1' else f' [{unit}]'}\n"
 
 
 def column_line(name: str, kind: str, attrs: Mapping[str, Any]) -> str:
-    """The description of a column, as a line of a header."""
+    """Format the description of a column as a line of a header."""
     unit = _quoted(str(attrs["units"]), _UNIT)
     return f"# column {_quoted(name, _NAME)}: {kind} [{unit}] {_header_text(str(attrs['long_name']))}\n"
 
 
 def _attribute_unit(name: str, units: str) -> str:
-    """The unit of an attribute in a record of the given units; "1" where it has none."""
+    """Return the unit of an attribute in a record of the given units; "1" if it has none."""
     unit = ATTRIBUTE_UNITS.get(name, "1")
     return unit if units != "dimensionless" or unit == "rad" else "1"
 
@@ -96,7 +96,7 @@ def _header_text(value: str | float) -> str:
 
 
 def _quoted(text: str, plain: str) -> str:
-    """The text, in quotation marks where it would not be recognised without."""
+    """Put a text in quotation marks where recognition requires them."""
     return text if re.fullmatch(plain, text) and text.isprintable() else json.dumps(text, ensure_ascii=False)
 
 
@@ -104,13 +104,13 @@ def _quoted(text: str, plain: str) -> str:
 
 
 def read_header(file: BinaryIO, source: Source) -> Header:
-    """Read the lines up to the names, and leave the file where the samples begin."""
+    """Read the lines up to the names; the file is then positioned at the first sample."""
     stated: dict[str, tuple[int, str]] = {}
     descriptions: dict[str, dict[str, str]] = {}
     heads: dict[str, int] = {}
     delimiter = None
     for number, line in enumerate(_lines(file, source), start=1):
-        if number == 1 and (match := re.fullmatch(rf"sep=([{_DELIMITERS}])\s*", line)):  # as spreadsheets begin a file
+        if number == 1 and (match := re.fullmatch(rf"sep=([{_DELIMITERS}])\s*", line)):  # written by spreadsheets
             delimiter = match[1]
             continue
         if not line.startswith("#"):
@@ -163,7 +163,7 @@ def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
 
 
 def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) -> dict[str, str | int | float]:
-    """The values of header lines; quantities that the schema knows are converted, and a unit of theirs means SI."""
+    """Parse the values of header lines; known quantities are converted, and a unit of one of them means SI."""
     attrs = {key: _header_value(text) for key, (_, text) in stated.items()}
     matches = {key: _QUANTITY.fullmatch(stated[key][1]) for key in ATTRIBUTE_UNITS if key in stated}
     if "units" not in attrs and any(
@@ -189,7 +189,7 @@ def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) ->
 
 
 def _header_value(text: str) -> str | int | float:
-    """What a value in a header means: a number, a text in quotation marks, or else the text itself."""
+    """Parse a value in a header: a number, a text in quotation marks, or else the text itself."""
     if is_integer_text(text):
         number: float | None = integer_in(text)
     else:
@@ -198,7 +198,7 @@ def _header_value(text: str) -> str | int | float:
 
 
 def _unpadded(text: str) -> str:
-    """The text without blanks around it, and without the delimiters that a spreadsheet pads a header with."""
+    """Strip blanks, and the delimiters with which a spreadsheet pads a header."""
     return text.strip().rstrip(_DELIMITERS + " ")
 
 
@@ -210,7 +210,7 @@ def _unquoted(text: str) -> str:
 
 
 def lines_below(file: BinaryIO) -> list[str]:
-    """The next lines of a file, as far as is looked ahead; it is left where it stands."""
+    """Return the next lines of a file, up to a limit, without a change of its position."""
     begin = file.tell()
     lines = [line[:_LONGEST].decode("utf-8", "replace") for line in islice(file, _SEARCHED)]
     file.seek(begin)
@@ -218,7 +218,7 @@ def lines_below(file: BinaryIO) -> list[str]:
 
 
 def cells_in(line: str, delimiter: str | None = None) -> list[str]:
-    """The cells of a line, without blanks around them; with what makes the most of them, if no delimiter is given."""
+    """Split a line into cells without blanks around them, by default with the delimiter that gives the most cells."""
     cells = (_parted(line, sign) for sign in delimiter or _DELIMITERS)
     return [cell.strip() for cell in max(cells, key=len)]
 
@@ -226,13 +226,13 @@ def cells_in(line: str, delimiter: str | None = None) -> list[str]:
 def _parted(line: str, delimiter: str) -> list[str]:
     try:
         return next(csv.reader([line], delimiter=delimiter), [])
-    except csv.Error:  # where it is among the rows, it is refused with them
+    except csv.Error:  # a row with this error is refused later
         return line.split(delimiter)
 
 
 def _delimiter_of(line: str, below: Sequence[str]) -> str:
-    """What separates the names in a line: tabs or semicolons, if they part the next line alike, as commas may stand in
-    names and in decimals; else what makes the most columns. Tabs may also be blanks behind commas."""
+    """Find the delimiter of a line of names: tabs or semicolons if the next line has as many cells by them, since names
+    and decimals may contain commas; else the one with the most columns. Tabs may also be blanks after commas."""
     first = next((other for other in below if any(cells_in(other))), "")
     for sign in "\t;":
         names = cells_in(line, sign)

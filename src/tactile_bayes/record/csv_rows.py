@@ -1,4 +1,4 @@
-"""The rows of a CSV file: chunks of lines become columns, by a fast reader, or a careful one that knows its place."""
+"""The rows of a CSV file: a fast reader, or a careful one that reports positions, converts chunks to columns."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ from tactile_bayes.record.table import Source
 __all__ = ["Layout", "read_rows"]
 
 _FIRST, _CHUNK = 1 << 16, 1 << 21
-"""Bytes that are read at once: at first few, from which the kinds of columns are guessed."""
+"""Bytes that are read at once: first a small chunk, from which the kinds of columns are inferred."""
 
 _MARK = 5_790_842_613_117
-"""Ends each line for the fast reader, so that no cell is taken for that of another column."""
+"""Last cell of each line for the fast reader, which shows whether cells are in the right columns."""
 
 _ROUNDING: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 )
-"""Digits become the nearest double: since pandas 3.1 they always do."""
+"""Options for rounding to the nearest double, the only behaviour since pandas 3.1."""
 
 
 @dataclass
 class Layout:
-    """What the columns of a file are, as far as it is known before they are read.
+    """Known properties of the columns of a file before they are read.
 
     Parameters
     ----------
     names : list of str
-        The columns.
+        Names of the columns.
     delimiter : str
-        What separates them. Where it is no comma, a comma may separate decimals.
+        Separator of the columns. If it is not a comma, a comma may separate decimals.
     line : int
-        The line above the first row.
+        Line above the first row.
     meant : mapping of str to {"integer", "number", "text"}
-        Kinds of columns that mean something in a record.
+        Kinds of the columns of a record.
     described : mapping of str to {"integer", "number", "text"}
-        Kinds of other columns, where the header says them.
+        Kinds of other columns that the header describes.
     guessed : dict of str to {"integer", "number", "text"}
-        Kinds of the rest, from their cells; filled while they are read.
+        Kinds of the remaining columns, inferred from their cells during reading.
     """
 
     names: list[str]
@@ -67,19 +67,19 @@ class Layout:
             self.decimal = "."
 
     def kind(self, name: str) -> Kind | None:
-        """The kind of a column, None if nothing is known of it yet."""
+        """Return the kind of a column, None if it is not known yet."""
         return self.meant.get(name) or self.described.get(name) or self.guessed.get(name)
 
 
 class _WrongGuessError(Exception):
-    """A column has text in it, but was guessed to be of numbers: all of it has to be read again, as text."""
+    """A column that seemed numeric contains text: the whole column must be read again, as text."""
 
 
 def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    """The columns of a file from where it stands, as int64, float64 or text, and the line that each sample begins in.
+    """Read the columns of a file from its position, as int64, float64 or text, and the first line of each sample.
 
-    It takes little more memory than what it returns. Text is as `text_array` makes it. Columns that the layout says
-    nothing of are integers, else numbers (empty cells are NaN), else text.
+    The memory needed is little more than that of the result. Text is returned as by `text_array`. Columns without a
+    known kind are integers, else numbers (empty cells are NaN), else text.
     """
     begin = file.tell()
     while True:
@@ -110,7 +110,7 @@ def _read_once(
 
 
 def _chunks(file: BinaryIO) -> Iterator[bytes]:
-    """The rest of a file in pieces that end with a line, but for the last."""
+    """Yield the rest of a file in pieces that end with a line, except the last."""
     size, rest = _FIRST, b""
     while block := file.read(size):
         end = block.rfind(b"\n") + 1
@@ -123,7 +123,7 @@ def _chunks(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    """The values of a column one after the other; text word by word, where equal widths might waste memory."""
+    """Concatenate the parts of a column; text word by word if equal widths might waste memory."""
     dtype = np.result_type(*parts) if parts else np.dtype(object)
     if dtype.kind not in "UO" or (dtype.itemsize * sum(map(len, parts)) <= FREE and dtype.kind == "U"):
         return np.concatenate(parts)
@@ -136,7 +136,7 @@ def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
-    """The columns of a chunk; None where anything is unusual, which is for the careful reader."""
+    """Read the columns of a chunk; None if anything is unusual, for the careful reader."""
     kinds = {name: layout.kind(name) for name in layout.names}
     if None in kinds.values() or layout.decimal is None or b"\0" in chunk:
         return None
@@ -149,7 +149,7 @@ def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
     chunk = chunk.replace(b"\n", f"{layout.delimiter}{_MARK}\n".encode())
     dtypes: dict[int, Any] = {len(layout.names): np.int64}
     for index, (name, kind) in enumerate(kinds.items()):
-        if kind != "integer" or name not in layout.guessed:  # where it would be inferred, 2.0 is no integer
+        if kind != "integer" or name not in layout.guessed:  # in an inferred column 2.0 is not an integer
             dtypes[index] = {"integer": np.int64, "number": np.float64, "text": object}[kind or "text"]
     try:
         with warnings.catch_warnings(action="error"), np.errstate(invalid="raise"):
@@ -189,7 +189,7 @@ def _read_fast(chunk: bytes, layout: Layout) -> dict[str, NDArray[Any]] | None:
 
 
 def _begins_with_truth(chunk: bytes, kinds: Mapping[str, Kind | None], layout: Layout) -> bool:
-    """Whether a number may be the word true or false in the first line: where all are, pandas makes 1 and 0 of them."""
+    """Return whether a number in the first line may be the word true or false, which pandas converts to 1 and 0."""
     line = chunk[: chunk.index(b"\n")].lower()
     if b"true" not in line and b"false" not in line:
         return False
@@ -212,12 +212,12 @@ def _text_array(texts: Sequence[str], stripped: bool) -> NDArray[Any]:
 def _read_carefully(
     chunk: bytes, chunks: Iterator[bytes], layout: Layout, above: int, source: Source
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64], int]:
-    """The columns of a chunk, the lines of its samples, and its last line; or the refusal of a cell, with its place."""
+    """Read the columns of a chunk, the lines of its samples, and its last line; an error states the position."""
     lines: list[str] = []
 
     def fed() -> Iterator[str]:
         piece = chunk
-        while piece:  # further ones only where a cell in quotation marks goes on beyond the end of one
+        while piece:  # more than one if a cell in quotation marks continues beyond the end of a piece
             lines.extend(_text_lines(piece, above + len(lines), source))
             yield from lines[reader.line_num :]
             piece = next(chunks, b"")
@@ -247,7 +247,7 @@ def _read_carefully(
             f"the line cannot be read ({error}): correct it; a quotation mark that is not closed takes in what follows",
         ) from error
     here = Source(source.name, begins, aliases=source.aliases)
-    order = sorted(layout.names, key=lambda name: name not in layout.meant)  # they show what separates decimals
+    order = sorted(layout.names, key=lambda name: name not in layout.meant)  # these show the decimal separator
     places = {name: index for index, name in enumerate(layout.names)}
     columns = {name: _column_values(name, [row[places[name]] for row in rows], layout, here) for name in order}
     return columns, np.array(begins, dtype=np.int64), begin - 1
@@ -266,7 +266,7 @@ def _text_lines(chunk: bytes, above: int, source: Source) -> list[str]:
 
 
 def _column_values(name: str, texts: list[str], layout: Layout, source: Source) -> NDArray[Any]:
-    """The cells of a column as what it is known to be, or as what they look like."""
+    """Convert the cells of a column to its known kind, or to the kind of their content."""
     kind = layout.kind(name)
     if kind == "text":
         return _text_array(texts, name in layout.meant)
@@ -286,7 +286,7 @@ def _column_values(name: str, texts: list[str], layout: Layout, source: Source) 
 
 
 def _number_in(text: str, layout: Layout) -> float | None:
-    """The number in a cell; the first one with decimals shows whether a comma or a point separates them."""
+    """Parse the number in a cell; the first one with decimals determines the decimal separator."""
     if layout.delimiter != "," and ("," in text or "." in text):
         sign = "," if "," in text else "."
         number = number_in(text.replace(",", ".")) if layout.decimal in (None, sign) else None
@@ -297,7 +297,7 @@ def _number_in(text: str, layout: Layout) -> float | None:
 
 
 def _kind_of(texts: list[str], layout: Layout) -> Kind:
-    """What the cells of a column are of which nothing is said."""
+    """Infer the kind of a column from its cells."""
     if all(is_integer_text(text) and integer_in(text) is not None for text in texts):
         return "integer"
     decimal = layout.decimal

@@ -1,4 +1,4 @@
-"""The encoding of a CSV file: UTF-8, or Windows-1252; and what a file is that is neither."""
+"""The encoding of a CSV file: UTF-8 or Windows-1252; other files are recognised and refused."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BINARY = {
     ),
     b"PK\x03\x04": f"a workbook of a spreadsheet, or another zip archive: {_SAVE}",
 }
-_MARKS = {  # the longer one first, which begins like the shorter one
+_MARKS = {  # a longer mark precedes a shorter one with the same beginning
     codecs.BOM_UTF32_LE: "UTF-32",
     codecs.BOM_UTF32_BE: "UTF-32",
     codecs.BOM_UTF16_LE: "UTF-16",
@@ -32,7 +32,7 @@ _MARKS = {  # the longer one first, which begins like the shorter one
 
 
 def refuse_other_kinds(start: bytes, source: Source) -> None:
-    """Refuse a file that shows by its first bytes what else it is."""
+    """Refuse a file whose first bytes show another format."""
     for mark, what in _BINARY.items():
         if start.startswith(mark):
             raise source.error(f"this is no CSV file, but {what}")
@@ -44,9 +44,9 @@ def refuse_other_kinds(start: bytes, source: Source) -> None:
 
 
 def in_utf8(file: BinaryIO) -> BinaryIO:
-    """The file; or a copy in UTF-8, if it is text in Windows-1252, as programs on Windows write it.
+    """Return the file, or a copy in UTF-8 if it is text in Windows-1252, as programs on Windows write it.
 
-    A file in UTF-8 in which some bytes are damaged stays as it is, to be refused where the first one is.
+    A file in UTF-8 with damaged bytes stays as it is, to be refused at the first of them.
     """
     decoder = codecs.getincrementaldecoder("utf-8")()
     try:
@@ -63,7 +63,7 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
 
 
 def _from_windows(content: bytes) -> bytes | None:
-    """The content in UTF-8, if it can be Windows-1252; where most signs beyond ASCII are UTF-8, it is that, damaged."""
+    """Convert content from Windows-1252 to UTF-8; None if it is something else, like damaged UTF-8."""
     if b"\0" in content or content.startswith(codecs.BOM_UTF8):
         return None
     beyond = _BEYOND_ASCII.findall(content.decode("utf-8", "surrogateescape"))
@@ -77,7 +77,7 @@ def _from_windows(content: bytes) -> bytes | None:
 
 
 def not_utf8(error: UnicodeDecodeError) -> str:
-    """Why bytes are no text in UTF-8, nor all in Windows-1252, and what to do."""
+    """Message for bytes that are neither UTF-8 nor Windows-1252."""
     byte = error.object[error.start : error.start + 1]
     character = byte.decode("cp1252", "ignore")
     reading = f", {character!r} in Windows-1252" if character else ""

@@ -1,4 +1,4 @@
-"""The files of a record, CSV and NetCDF."""
+"""The files of a record: CSV and NetCDF."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tactile_bayes.record.csv_format import read_csv, write_csv
 from tactile_bayes.record.netcdf import read_netcdf_table, write_netcdf_record
 from tactile_bayes.record.origin import renamed
 from tactile_bayes.record.schema import FRAMES, Frame
-from tactile_bayes.record.stroke import split_at_turns
+from tactile_bayes.record.sweep_segments import split_at_turns
 from tactile_bayes.record.units import in_units_of_record
 from tactile_bayes.record.validation import validate
 
@@ -46,32 +46,32 @@ def read_record(
     """Read a record from a CSV or a NetCDF file, with columns of any name, unit, sign and zero.
 
     A CSV file has a header of commented lines, `# key: value`, then a line of column names, then one line per
-    sample; `write_record` shows the form. The header may be absent: then the numbers are dimensionless, or SI if
-    `rod` is given or a column states a unit. A load cell that turns with the drive is stated by
-    `# load_cell_frame: turning`. Semicolons or tabs may stand between columns, and then commas in decimals; text is in
-    UTF-8 or Windows-1252. In a NetCDF file every variable lies along one dimension, "sample" or any other.
+    sample; `write_record` shows the format. The header is optional: without it the numbers are dimensionless, or SI if
+    `rod` is given or a column states a unit. The line `# load_cell_frame: turning` states a load cell that turns with
+    the drive. Semicolons or tabs may separate columns, and decimals may then have commas; text is in UTF-8 or
+    Windows-1252. In a NetCDF file every variable has one common dimension, "sample" or any other.
 
-    Units are those of the record (SI, or those of the rod; angles in radians), or others that are stated: by
-    `columns`, in the name of a column ("force_x [mN]"), in a row of units below the names, in a line of the header
-    (`# column force_x: number [mN]`, `# rod_length: 200 [mm]`), or in the attribute `units` of a NetCDF variable. They
-    are converted.
+    Units are those of the record (SI, or those of the rod; angles in radians). Other units are converted if they are
+    stated: by `columns`, in the name of a column ("force_x [mN]"), in a row of units below the names, in a line of the
+    header (`# column force_x: number [mN]`, `# rod_length: 200 [mm]`), or in the attribute `units` of a NetCDF
+    variable.
 
     Parameters
     ----------
     path : path-like
         A file with suffix .csv or .nc.
     columns : mapping of str to str, optional
-        What the file has for a column of a record: `NAME`, or `NAME[UNIT]` where the file does not state the unit. A
-        minus before it, `-NAME[UNIT]`, is for a rig that counts the other way round, a number with a sign for one
-        that counts from another zero: `90-NAME[deg]` or `NAME[mN]+12.5`; it is in the same unit. For base_x,
-        base_y, sweep and direction one value for all samples can be given, as "12[mm]", "0" or "forward". A unit in
-        the name of a column may be left out. Further columns keep their names, but for a slash, which no NetCDF file
-        can store: "Temp / °C" becomes "Temp [°C]", and another slash "|".
+        Source of a column of a record in the file: `NAME`, or `NAME[UNIT]` if the file does not state the unit. A minus
+        before it, `-NAME[UNIT]`, reverses the sign, and a number with a sign shifts the zero, in the same unit:
+        `90-NAME[deg]` or `NAME[mN]+12.5`. For base_x, base_y, sweep and direction one value for all samples can be
+        given, as "12[mm]", "0" or "forward". A unit in the name of a column may be left out. Further columns keep their
+        names, except for a slash, which no NetCDF file can store: "Temp / °C" becomes "Temp [°C]", and another slash
+        "|".
     split_sweeps : bool
-        Whether the columns sweep and direction, which the file lacks, are found from the drive angle: a sweep ends
-        where the angle comes back from an extreme by more than a tenth of its whole range, or where the pivot moves;
-        its direction is that of the straight line through its angles. An angle that is back within one sample was
-        reset, and the sweeps before and after it have one direction.
+        Whether to derive the columns sweep and direction from the drive angle if the file lacks them. A sweep ends
+        where the angle returns from an extreme by more than a tenth of its whole range, or where the pivot moves; its
+        direction is that of a straight line fitted to its angles. An angle that returns within one sample was reset,
+        and the sweeps before and after it have the same direction.
     rod : Rod, optional
         The rod, if the file does not state it.
     missing : collection of str, optional
@@ -82,20 +82,19 @@ def read_record(
     Returns
     -------
     xr.Dataset
-        The record. Its attribute `units_source` is "assumed" if neither file nor `rod` told the units.
+        The record. Its attribute `units_source` is "assumed" if neither the file nor `rod` states the units.
 
     Raises
     ------
     RecordError
-        If the content is not a record, see `validate` (the message names line and column); if the file is SI
-        and no rod is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if a
-        column is in a unit of another quantity, or what stands for it in `columns` is not there; if there are sweeps
-        already where they are to be split, or the drive angle jumps by about a turn there; if the path is a folder,
-        or its suffix another one.
+        If the content is not a record, see `validate` (the message names line and column); if the file is SI and no rod
+        is stated; if it states another rod than `rod`, or another frame than `load_cell_frame`; if a column has the
+        unit of another quantity, or its source in `columns` does not exist; if the file to be split has sweeps already,
+        or its drive angle jumps by about a turn; if the path is a folder, or has another suffix.
     FileNotFoundError
         If there is no such file.
     ParameterError
-        If `columns` names no column of a record, or what stands for it cannot be.
+        If a key of `columns` is not a column of a record, or a value is invalid.
 
     Examples
     --------
@@ -148,17 +147,17 @@ def read_record(
 
 
 def write_record(record: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a record to a CSV or a NetCDF file, without loss: what is read back is the same, digit by digit.
+    """Write a record to a CSV or a NetCDF file, without loss of digits.
 
-    The file is written whole: if writing fails, a file that was there before is still there. Of the attributes of
-    a column, a CSV file keeps `units` and `long_name`.
+    The file is written atomically: if writing fails, an existing file stays as it was. Of the attributes of a column, a
+    CSV file keeps `units` and `long_name`.
 
     Parameters
     ----------
     record : xr.Dataset
         A record.
     path : path-like
-        Where to; its suffix, .csv or .nc, decides on the form.
+        File to write; its suffix, .csv or .nc, determines the format.
 
     Raises
     ------

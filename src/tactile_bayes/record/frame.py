@@ -1,4 +1,4 @@
-"""The frame of a record: whether its forces are along the axes of the world, or turn with the drive."""
+"""The frame of a record: its forces are along the axes of the laboratory, or turn with the drive."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith
     "lever_x",
     "lever_y",
 }
-"""Entries of a load cell's data sheet that hold along the axes it measures along, and along no others; with errors of
-the encoder the angle between the two is not known."""
+"""Entries of a load cell's data sheet that are valid only along its own axes; with errors of the encoder the angle
+between the frames is not known."""
 
 
 def frame_of(record: xr.Dataset) -> Frame:
-    """The frame of a record's forces, "fixed" or "turning"; "fixed" where the record states none.
+    """Return the frame of a record's forces, "fixed" or "turning"; "fixed" if the record states none.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def frame_of(record: xr.Dataset) -> Frame:
     Raises
     ------
     RecordError
-        If its attribute `load_cell_frame` is something else.
+        If its attribute `load_cell_frame` has another value.
 
     Examples
     --------
@@ -52,38 +52,37 @@ def frame_of(record: xr.Dataset) -> Frame:
 
 
 def in_frame(record: xr.Dataset, frame: Frame) -> xr.Dataset:
-    """The same record with its forces in a frame: along the axes of the world, or along the rod and across it.
+    """Convert the forces of a record to a frame: along the axes of the laboratory, or along the rod and across it.
 
     A load cell that turns with the drive measures the support reaction (fAx, fAy) as
 
         force_x =  fAx cos φ0 + fAy sin φ0,  along the rod at the pivot,
         force_y = −fAx sin φ0 + fAy cos φ0,  across it,
 
-    φ0 being the drive angle, in both directions of the sweep. Without friction the first is half the square of the
+    with the drive angle φ0, in both directions of the sweep. Without friction the first is half the square of the
     holding moment in tangential contact, in units of the rod, and greater in tip contact.
 
     Parameters
     ----------
     record : xr.Dataset
-        A record. If it is in the frame already it is returned unchanged.
+        A record. If it is in the frame already, it is returned unchanged.
     frame : {"fixed", "turning"}
-        The frame that is wanted.
+        Frame of the result.
 
     Returns
     -------
     xr.Dataset
-        The record with `force_x`, `force_y` and, where it has them, `truth_force_x` and `truth_force_y` in the frame,
-        which its attribute `load_cell_frame` states. Forces are turned by the drive angle as it was recorded, their
-        truth by `truth_drive_angle` where there is one.
+        The record with `force_x`, `force_y` and, if present, `truth_force_x` and `truth_force_y` in the frame, which
+        its attribute `load_cell_frame` states. Forces are turned by the recorded drive angle, their true values by
+        `truth_drive_angle` if there is one.
 
     Raises
     ------
     RecordError
-        If `record` is not a record, or has only one of the two forces: a force in the one frame takes both of the
-        other. (Where both are missing, nothing is lost.) Also if its load cell has flaws that are bound to the axes
-        it measures along, like a bias.
+        If `record` is not a record, or has only one of the two forces: a force in one frame depends on both forces in
+        the other. (Both may be missing.) Also if its load cell has errors along its own axes, like a bias.
     ParameterError
-        If the frame is none of the two.
+        If the frame is invalid.
 
     Examples
     --------
@@ -122,9 +121,14 @@ def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Fl
     Parameters
     ----------
     force_x, force_y : array_like
-        Components along the axes before, in any unit.
+        Components along the original axes, in any unit.
     angle : array_like
-        [rad]; broadcast with the forces.
+        Angle of the turn [rad]; broadcasts with the forces.
+
+    Returns
+    -------
+    (ndarray, ndarray)
+        Components along the turned axes, of the broadcast shape.
 
     Examples
     --------
@@ -138,7 +142,7 @@ def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Fl
 
 
 def _refuse_bound_to_frame(record: xr.Dataset) -> None:
-    """Refuse a record whose data sheet says of its forces what holds in the frame they were measured in."""
+    """Refuse a record whose data sheet has entries that are valid only in the frame of the measurement."""
     for name, value in record.attrs.items():
         entry = str(name).removeprefix("load_cell_")
         if name in ATTRIBUTE_UNITS and entry in _BOUND:
@@ -150,12 +154,12 @@ def _refuse_bound_to_frame(record: xr.Dataset) -> None:
 
 
 def _values(record: xr.Dataset, name: str) -> Floats:
-    """A column, NaN if there is none."""
+    """Return a column, NaN if there is none."""
     return np.asarray(record[name].values) if name in record else np.full(record.sizes["sample"], np.nan)
 
 
 def _refuse_half_a_force(names: tuple[str, str], forces: tuple[Floats, Floats], frame: Frame) -> None:
-    """Refuse samples in which one component of the force is known, and the other is not."""
+    """Refuse samples with only one component of the force."""
     for (name, values), (other, others) in permutations(zip(names, forces, strict=True)):
         lacks = np.isnan(values) & ~np.isnan(others)
         if not lacks.any():

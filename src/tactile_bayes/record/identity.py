@@ -1,4 +1,4 @@
-"""The identity of a record: a hash of what was measured."""
+"""The identity of a record: a hash of the measured values."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["record_hash"]
 
 
 def record_hash(record: xr.Dataset) -> str:
-    """SHA-256 of what was measured: names, values and units of the columns of `MEASURED`, their frame, and the rod.
+    """SHA-256 of the measured values: names, values and units of the columns of `MEASURED`, their frame, and the rod.
 
-    Columns of truth and other further columns, the order of columns, and other attributes do not matter. A record
-    has the same hash before and after it was written to a file.
+    It does not depend on further columns, like those of the truth, on the order of columns, or on other attributes. A
+    record has the same hash before and after it is written to a file.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def record_hash(record: xr.Dataset) -> str:
     rod = rod_of(record)
     add(str(record.attrs["units"]).encode())
     add(np.array([rod.length, rod.flexural_rigidity, rod.diameter], dtype="<f8").tobytes())
-    if frame_of(record) != "fixed":  # which is what records were before they stated it
+    if frame_of(record) != "fixed":  # older records do not state it
         add(frame_of(record).encode())
     for name in MEASURED:
         values = record[name].values
@@ -62,6 +62,6 @@ def record_hash(record: xr.Dataset) -> str:
             add("\n".join(values.tolist()).encode())
         elif COLUMNS[name].kind == "integer":
             add(values.astype("<i8").tobytes())
-        else:  # one NaN for all, whatever its bits
+        else:  # all NaN have the same bits
             add(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
     return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""NetCDF files that show every damage: checksums in the file, one over all of it; and a record as one."""
+"""NetCDF files with checksums in the file and one over all of it, which reveal any damage; records in such files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SEAL = b"\ntactile_bayes: SHA-256 of all bytes before this line "
 _SEAL_BYTES = len(_SEAL) + 64 + 1
 
 _SUPERBLOCK = 48
-"""First bytes of an HDF5 file, among which is the number of all its bytes."""
+"""Number of first bytes of an HDF5 file that contain the number of all its bytes."""
 
 _CHUNK = 1 << 22
 
@@ -33,20 +33,20 @@ def write_netcdf(
     path: str | os.PathLike[str],
     encoding: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
-    """Write a dataset or a tree to a NetCDF 4 file, whole or not at all, with checksums.
+    """Write a dataset or a tree to a NetCDF 4 file atomically, with checksums.
 
-    Arrays of numbers and characters carry Fletcher-32 checksums, which every program that uses HDF5 checks. In HDF5,
+    Arrays of numbers and characters have Fletcher-32 checksums, which every program that uses HDF5 verifies. In HDF5,
     attributes, scalars, strings of different lengths and the structure of the file cannot have them. Therefore the last
-    line of the file, beyond the end that HDF5 knows, is the SHA-256 of all bytes before it; `read_netcdf` checks it.
-    Programs that open the file to change it drop that line.
+    line of the file, beyond the end that HDF5 knows, is the SHA-256 of all bytes before it; `read_netcdf` verifies it.
+    Programs that modify the file drop that line.
 
     Parameters
     ----------
     content : xr.Dataset or xr.DataTree
     path : path-like
-        Where to.
+        File to write.
     encoding : mapping of str to mapping, optional
-        Of the variables of a dataset, as xarray takes it.
+        Encoding of the variables of a dataset, as in xarray.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def write_netcdf(
 
 
 def _with_checksums(dataset: xr.Dataset, encoding: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """The encoding, with Fletcher-32 for all variables that can have it."""
+    """Add Fletcher-32 to the encoding of all variables that can have it."""
     encodings = {name: dict(options) for name, options in encoding.items()}
     for name, variable in dataset.variables.items():
         options = encodings.setdefault(str(name), {})
@@ -82,7 +82,7 @@ def _with_checksums(dataset: xr.Dataset, encoding: Mapping[str, Mapping[str, Any
 def read_netcdf(
     path: Path, opened: Callable[..., Content], refused: Callable[[str], Exception], **options: Any
 ) -> Content:
-    """Read a NetCDF 4 file of this or any other program into memory.
+    """Read a NetCDF 4 file of this or another program into memory.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ def read_netcdf(
     opened : callable
         `xarray.open_dataset` or `xarray.open_datatree`.
     refused : callable
-        Makes the error from what is wrong with the file; it has to name the file, and to say what to do.
+        Makes the error from a description of the fault; the error names the file and says what to do.
     **options
-        For `opened`.
+        Options of `opened`.
 
     Raises
     ------
     Exception
-        From `refused`, if the file is damaged or no NetCDF 4 file.
+        The error from `refused`, if the file is damaged or not a NetCDF 4 file.
     OSError
         If it cannot be opened.
     """
@@ -107,10 +107,10 @@ def read_netcdf(
 
 @contextmanager
 def reading(path: Path, refused: Callable[[str], Exception]) -> Iterator[None]:
-    """A block in which a NetCDF 4 file is read; whatever fails in it is raised as an error from `refused`.
+    """Context in which a NetCDF 4 file is read; any failure is raised as an error from `refused`.
 
-    A file that ends with its SHA-256 is checked first, so that HDF5, which a damaged file may make crash or hang, sees
-    none. Others, of another program or of an earlier version, are read as they are.
+    A file that ends with its SHA-256 is verified first, since a damaged file may cause HDF5 to crash or hang. Files of
+    other programs or earlier versions are read without this check.
     """
     with open(path, "rb") as file:
         size = os.fstat(file.fileno()).st_size
@@ -122,13 +122,13 @@ def reading(path: Path, refused: Callable[[str], Exception]) -> Iterator[None]:
             raise refused("is damaged, it is not as it was written (its SHA-256 differs)")
     try:
         yield
-    except Exception as error:  # HDF5 and what reads with it fail in many ways over a damaged file
+    except Exception as error:  # a damaged file causes many kinds of errors in HDF5
         what = " ".join(str(error).split()) or type(error).__name__
         raise refused(f"cannot be read, it is damaged or cut short, or no NetCDF 4 file ({what})") from error
 
 
 def _seal(file: BinaryIO, size: int) -> bytes:
-    """The last line of a file whose other bytes are the first `size` ones; it is left behind them."""
+    """Compute the last line of a file from its first `size` bytes; the file is then positioned after them."""
     file.seek(0)
     digest = hashlib.sha256()
     while size > 0 and (block := file.read(min(size, _CHUNK))):
@@ -138,9 +138,9 @@ def _seal(file: BinaryIO, size: int) -> bytes:
 
 
 def read_netcdf_table(path: Path, columns: Mapping[str, str]) -> Table:
-    """Read a table as it is in the file; all its columns are read, whichever are meant.
+    """Read a table as it is in the file, with all columns.
 
-    The dimension of the samples may have any name, if all columns lie along it.
+    The dimension of the samples may have any name if all columns share it.
     """
     source = Source(str(path))
     record = read_netcdf(
@@ -157,13 +157,13 @@ def read_netcdf_table(path: Path, columns: Mapping[str, str]) -> Table:
 
 
 def write_netcdf_record(record: xr.Dataset, path: Path) -> None:
-    """Write a record that has been validated."""
+    """Write a validated record."""
     record = record.reset_coords([name for name in record.coords if name not in record.dims])
     encoding: dict[Any, dict[str, Any]] = {}
     taken = {*map(str, record.variables), "sample"}
     for name, variable in record.variables.items():
-        if variable.dtype.kind == "U":  # as fixed-width characters, which every NetCDF library reads
-            dimension = re.sub(r"\d", "_", f"{name}_length")  # a number in it would be taken for the length
+        if variable.dtype.kind == "U":  # fixed-width characters, which every NetCDF library reads
+            dimension = re.sub(r"\d", "_", f"{name}_length")  # a number in the name would count as the length
             while dimension in taken:
                 dimension += "_"
             taken.add(dimension)

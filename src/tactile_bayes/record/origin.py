@@ -1,4 +1,4 @@
-"""The origin of a column: what a file calls it, in which unit it has it, and with which sign and zero."""
+"""The origin of a column in a file: its name, unit, sign and zero."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ _UNIT_IN_NAME = re.compile(
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a column of a record comes from: offset + sign · (a column of the file), or one value for all samples.
+    """Origin of a column of a record: offset + sign · (a column of the file), or one value for all samples.
 
     Parameters
     ----------
     column : str or None
-        The column of the file; None for a value.
+        Column of the file; None for a value.
     unit : str or None
-        Its unit, where one is given beside it, or in its name; that of the offset too.
+        Unit of column and offset, if it is given with the column or in its name.
     sign : {1, -1}
-        −1 where the file counts the other way round.
+        −1 for an opposite sign in the file.
     offset : float
-        What is added.
+        Offset that is added.
     value : str, float, int or None
-        The value.
+        Value for all samples.
     """
 
     column: str | None
@@ -57,7 +57,7 @@ class Origin:
     value: str | float | None = None
 
     def __str__(self) -> str:
-        """What stands for the column, as `read_record` takes it, less the unit."""
+        """Return the origin in the form that `read_record` takes, without the unit."""
         if self.column is None:
             return str(self.value)
         sign = "-" if self.sign < 0 else "+" if self.offset else ""
@@ -65,24 +65,23 @@ class Origin:
 
 
 def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source) -> dict[str, Origin]:
-    """Where the columns of a record come from that a file calls otherwise.
+    """Find the origins of the columns of a record that have other names in a file.
 
     Parameters
     ----------
     columns : mapping of str to str
-        Names of a record, and what stands for them in the file; see `read_record`. Columns like "force_x [mN]" are
-        found without it.
+        Origins by the name of a column of a record; see `read_record`. Columns like "force_x [mN]" need no entry.
     names : iterable of str
-        The columns of the file.
+        Columns of the file.
     source : Source
         The file.
 
     Raises
     ------
     ParameterError
-        If a key is no column of a record, or a value cannot be read.
+        If a key is not a column of a record, or a value cannot be parsed.
     RecordError
-        If the file lacks a column, or has one already that is called like one of these.
+        If the file lacks a column, or has a column with the name of one of the keys.
 
     Examples
     --------
@@ -105,7 +104,7 @@ def origins_of(columns: Mapping[str, str], names: Iterable[str], source: Source)
 
 
 def any_meant(columns: Mapping[str, str], names: Iterable[str]) -> bool:
-    """Whether any of these columns means something in a record, by its own name or by what is given for one."""
+    """Return whether any of these columns belongs to a record, by its own name or by a given origin."""
     names = list(names)
     if any(_stem_and_unit(name)[0] in MEASURED for name in names):
         return True
@@ -116,16 +115,16 @@ def any_meant(columns: Mapping[str, str], names: Iterable[str]) -> bool:
 
 
 def meant_kinds(origins: Mapping[str, Origin], names: Iterable[str]) -> dict[str, Kind]:
-    """The kinds of those columns of a file that mean something in a record."""
+    """Return the kinds of the columns of a file that belong to a record."""
     kinds = {name: column.kind for name in names if (column := column_of(name)) is not None}
     kinds |= {origin.column: _column(target).kind for target, origin in origins.items() if origin.column is not None}
     return kinds
 
 
 def renamed(table: Table, columns: Mapping[str, str]) -> Table:
-    """The table with the names of a record, its signs and its zeros; units are stated, and not converted yet.
+    """Return the table with the names, signs and zeros of a record; units are stated but not converted.
 
-    A further column whose name has a slash in it is called otherwise, if there is no column of that name yet.
+    A further column with a slash in its name is renamed, if there is no column of the new name.
     """
     origins = origins_of(columns, table.columns, table.source)
     used = Counter(origin.column for origin in origins.values())
@@ -152,7 +151,7 @@ def renamed(table: Table, columns: Mapping[str, str]) -> Table:
 
 
 def _cells(target: str, origin: Origin, found: Cells, is_shared: bool, source: Source) -> Cells:
-    """What is in a column of the file, as a column of the record."""
+    """Convert a column of the file to a column of the record."""
     values, attrs = found
     if _column(target).kind != "number":
         return values, {name: value for name, value in attrs.items() if name != "units"}
@@ -205,7 +204,7 @@ def _origin(target: str, text: str, names: list[str], source: Source) -> Origin:
 
 
 def _readings(text: str) -> Iterator[Origin]:
-    """What a text may mean, from the most literal to the least: names may have signs, digits and brackets in them."""
+    """Yield possible meanings of a text, the most literal first: names may contain signs, digits and brackets."""
     starts = [("", 1, text)]
     if match := _LEAD.fullmatch(text):
         starts.append((match["offset"] or "", -1 if match["sign"] == "-" else 1, match["rest"]))
@@ -221,7 +220,7 @@ def _readings(text: str) -> Iterator[Origin]:
 
 
 def _found(text: str, names: list[str]) -> str | None:
-    """The column that a text names, blanks apart; a unit in the name of a column may be left out."""
+    """Find the column that a text names, regardless of blanks; a unit in its name may be left out."""
     if text in names:
         return text
     for form in (str, lambda name: _stem_and_unit(name)[0]):
@@ -236,7 +235,7 @@ def _compact(text: str) -> str:
 
 
 def _checked(target: str, column: Column, origin: Origin, text: str, source: Source) -> Origin:
-    """The origin with the unit that the column's name states, unless that contradicts what is given."""
+    """Complete an origin by the unit in the column's name, or refuse a contradiction."""
     if column.kind != "number":
         if origin.unit is not None or origin.sign < 0 or origin.offset:
             raise ParameterError(
@@ -262,7 +261,7 @@ def _checked(target: str, column: Column, origin: Origin, text: str, source: Sou
 
 
 def _stem_and_unit(name: str) -> tuple[str, str | None]:
-    """A name without the unit in it, and the unit; what is in square brackets is taken for one whatever it is."""
+    """Split a name into stem and unit; any content of square brackets counts as a unit."""
     match = _UNIT_IN_NAME.fullmatch(name)
     if match is None:
         return name, None
@@ -272,7 +271,7 @@ def _stem_and_unit(name: str) -> tuple[str, str | None]:
 
 
 def _value(target: str, text: str) -> Origin | None:
-    """A value for all samples, if the text is one, and the column can have it."""
+    """Parse a value for all samples, if the text is one and the column can have it."""
     match = _VALUE.fullmatch(text)
     if target == "direction":
         return Origin(None, value=text) if text in DIRECTIONS else None

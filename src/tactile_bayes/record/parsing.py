@@ -1,4 +1,4 @@
-"""The parsing of columns: cells as integers, numbers or text, or which of them is none."""
+"""The parsing of columns: cells become integers, numbers or text, or the first invalid one is refused."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tactile_bayes.record.table import Source
 __all__ = ["FREE", "parsed_column", "text_array"]
 
 FREE = 1 << 26
-"""Bytes that a column of text may take whatever is in it."""
+"""Bytes that a column of text may always take."""
 
 
 def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[Any]:
-    """The cells of a column as int64, float64 or text: the array itself, where it is that already."""
+    """Convert the cells of a column to int64, float64 or text; an array of that type is returned as it is."""
     column = column_of(name)
     if column is not None:
         kind: Kind = column.kind
@@ -39,7 +39,7 @@ def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[An
         return values.astype(np.float64, copy=False)
     if kind == "integer" and values.dtype.kind in "bi":
         return values.astype(np.int64, copy=False)
-    if kind == "integer" and values.dtype.kind == "f":  # 2.0 is one, as tables often write it so
+    if kind == "integer" and values.dtype.kind == "f":  # 2.0 counts as one, since tables often contain it
         with np.errstate(invalid="ignore"):
             integers = values.astype(np.int64)
         if (integers == values).all() and (np.abs(values) < 2.0**63).all():
@@ -61,8 +61,8 @@ def parsed_column(name: str, values: NDArray[Any], source: Source) -> NDArray[An
 
 
 def _refuse_text(name: str, values: NDArray[Any], source: Source) -> None:
-    """Refuse cells that no file, or not every one, can store."""
-    other = values[1:][values[1:] != values[:-1]]  # as a rule many in a row are the same
+    """Refuse cells that not every file format can store."""
+    other = values[1:][values[1:] != values[:-1]]  # most neighbours are equal
     for text in {*values[:1].tolist(), *other.tolist()}:
         reason = not_storable(text)
         if reason is None and len(text) > LONGEST_CELL:
@@ -76,15 +76,15 @@ def _text(cell: Any) -> str | None:
 
 
 def text_array(texts: Sequence[str]) -> NDArray[Any]:
-    """Texts as an array of NumPy's text, or of str objects.
+    """Return texts as an array of NumPy strings, or of str objects.
 
-    NumPy gives every cell the room of the longest one, four bytes a character. Where that is much, and less than half
-    of it would be used, the cells are objects, equal ones the same.
+    NumPy gives every cell the width of the longest one, four bytes a character. If that is much, and less than half of
+    it would be used, the cells are objects, with one object for equal texts.
 
     Parameters
     ----------
     texts : sequence of str, length n_samples
-        The cells.
+        Cells.
 
     Examples
     --------

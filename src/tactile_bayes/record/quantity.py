@@ -1,4 +1,4 @@
-"""The quantities of a record, and the units that people measure them in."""
+"""Units of the quantities of a record, and their conversion."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ _COMMON = {
 }
 _LONGEST = 100
 _LARGEST = 10**100
-"""Characters of a unit, and the most that one is in SI: what is longer or more is none."""
+"""Largest number of characters of a unit, and its largest size in SI."""
 
 _SYMBOL = re.compile(
     rf"(?P<prefix>{'|'.join(sorted(_PREFIXES, key=len, reverse=True))})"
@@ -75,12 +75,12 @@ _SEPARATOR = re.compile(r"[\s·⋅•*.]+|-(?=[^\W\d])")
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit: how many SI units it is, and of what.
+    """A unit: its size in SI units, and its dimension.
 
     Parameters
     ----------
     scale : Fraction
-        The unit in SI units.
+        Size of the unit in SI units.
     dimension : tuple of int
         Powers of length, force, time and angle.
 
@@ -95,22 +95,26 @@ class Unit:
 
     @property
     def is_number(self) -> bool:
-        """Whether it is the unit of pure numbers."""
+        """True for the unit of pure numbers."""
         return not any(self.dimension)
 
 
 @functools.cache
 def unit_of(text: str) -> Unit | None:
-    """The unit that a text means, or None.
+    """Parse a unit, or return None.
 
-    Metres, newtons, gram-forces, seconds, radians and degrees, with prefixes from p to G, products and powers. Marks
-    that people write differently do not matter: N m², N·m^2, N*m2, N-m² and Nm² are one unit. Where symbols are not
-    separated a prefix is seen before a product: mN is a millinewton, and m N a newton metre.
+    It is made of metres, newtons, gram-forces, seconds, radians and degrees, with prefixes from p to G, products and
+    powers. N m², N·m^2, N*m2, N-m² and Nm² are the same unit. Without a separator a prefix has precedence over a
+    product: mN is a millinewton, and m N a newton metre.
 
     Parameters
     ----------
     text : str
-        A unit.
+        Text of a unit.
+
+    Returns
+    -------
+    Unit or None
 
     Examples
     --------
@@ -142,7 +146,7 @@ def unit_of(text: str) -> Unit | None:
 
 
 def _factors(piece: str) -> tuple[Unit, ...] | None:
-    """The units in a piece without separators, one after the other; None if it is not made of units."""
+    """Split a piece without separators into units; None if it is not made of units."""
     factors = []
     while piece:
         match = _SYMBOL.match(piece)
@@ -157,14 +161,14 @@ def _factors(piece: str) -> tuple[Unit, ...] | None:
 
 
 def converted(values: Any, unit: Unit, other: Unit) -> Any:
-    """Values in another unit of the same quantity, an array in place; a power of ten costs one rounding and no more.
+    """Convert values to another unit of the same quantity, an array in place, with one rounding for a power of ten.
 
     Parameters
     ----------
     values : float or array of float64
-        In the one unit.
+        Values in `unit`.
     unit, other : Unit
-        The one unit, and the other.
+        Unit of the values, and unit of the result.
 
     Examples
     --------
@@ -173,7 +177,7 @@ def converted(values: Any, unit: Unit, other: Unit) -> Any:
     """
     ratio = unit.scale / other.scale
     out = values if isinstance(values, np.ndarray) else None
-    with np.errstate(over="ignore"):  # infinities are refused with the others
+    with np.errstate(over="ignore"):  # infinities are refused later
         if ratio.numerator == 1:
             result = np.divide(values, float(ratio.denominator), out=out)
         else:
@@ -182,12 +186,12 @@ def converted(values: Any, unit: Unit, other: Unit) -> Any:
 
 
 def accepted_units(expected: str) -> str:
-    """Units that are taken where one is expected, in words.
+    """List common units of the quantity of a unit, for messages.
 
     Parameters
     ----------
     expected : str
-        A unit.
+        Text of a unit.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The schema of a record: its columns, its attributes, and what they mean."""
+"""The schema of a record: its columns and attributes, and their meaning."""
 
 from __future__ import annotations
 
@@ -39,22 +39,22 @@ Scale = Literal["length_unit", "moment_unit", "force_unit"]
 
 @dataclass(frozen=True)
 class Column:
-    """What a column of a record means.
+    """Meaning of a column of a record.
 
     Parameters
     ----------
     name : str
         Name of the column.
     kind : {"integer", "number", "text"}
-        What its cells are.
+        Kind of the cells.
     unit : str
-        Unit in an SI record; "1" for pure numbers and words.
+        Unit in an SI record; "1" for pure numbers and text.
     scale : {"length_unit", "moment_unit", "force_unit"} or None
-        The property of `Rod` that a dimensionless value is multiplied with to be SI; None where both are the same.
+        Property of `Rod` that converts a dimensionless value to SI by multiplication; None if both are equal.
     long_name : str
-        What it is, in words.
+        Description of the column.
     turning_name : str, optional
-        What it is where the load cell turns with the drive, if that is something else.
+        Description for a load cell that turns with the drive, if it differs.
 
     Examples
     --------
@@ -72,22 +72,22 @@ class Column:
     turning_name: str | None = None
 
     def unit_in(self, units: str) -> str:
-        """Unit of the column in a record of the given units, "SI" or "dimensionless"."""
+        """Return the unit of the column in a record of the given units, "SI" or "dimensionless"."""
         return "1" if units == "dimensionless" and self.scale else self.unit
 
     def long_name_in(self, frame: Frame) -> str:
-        """What the column is, in words, where the load cell is fixed, or turning."""
+        """Return the description of the column for a fixed or a turning load cell."""
         return self.turning_name if frame == "turning" and self.turning_name else self.long_name
 
 
 CHANNELS = ("holding_moment", "force_x", "force_y")
-"""What the load cell measures, in the order of every array with a channel axis."""
+"""Channels of the load cell, in the order of every array with a channel axis."""
 
 MEASURED = ("sweep", "direction", "base_x", "base_y", "drive_angle", *CHANNELS)
-"""What a record is made of; everything else is a further column."""
+"""Columns of a record; all others are further columns."""
 
 REQUIRED = ("sweep", "direction", "drive_angle", *CHANNELS)
-"""What a table must have to be a record (a channel may be empty); base_x and base_y are 0 where they are absent."""
+"""Columns that a table must have to be a record (a channel may be empty); base_x and base_y are 0 by default."""
 
 COLUMNS: Mapping[str, Column] = MappingProxyType(
     {
@@ -110,17 +110,17 @@ COLUMNS: Mapping[str, Column] = MappingProxyType(
         )
     }
 )
-"""Every column whose meaning is known; `truth_` before a name means the same quantity without error."""
+"""All columns with a known meaning; the prefix `truth_` means the same quantity without error."""
 
 DIRECTIONS = ("forward", "backward")
-"""Senses of the drive: slopes that grow, and slopes that shrink."""
+"""Senses of the drive: increasing and decreasing drive angles."""
 
 FRAMES: tuple[Frame, Frame] = ("fixed", "turning")
-"""What the attribute `load_cell_frame` of a record can be: force_x and force_y along the axes x and y of the world, or
-along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0)."""
+"""Values of the attribute `load_cell_frame` of a record: force_x and force_y along the axes x and y of the laboratory,
+or along the rod at the pivot, (cos φ0, sin φ0), and across it, (−sin φ0, cos φ0)."""
 
 UNITS = ("SI", "dimensionless")
-"""What the attribute `units` of a record can be."""
+"""Values of the attribute `units` of a record."""
 
 _GAIN_UNITS = {("N", "N m"): "1/m", ("N m", "N"): "m"}
 
@@ -154,8 +154,8 @@ LOAD_CELL_UNITS: Mapping[str, str] = MappingProxyType(
         "drive_angle_resolution": "rad",
     }
 )
-"""The entries of a load cell's data sheet that are quantities, with their units in SI; `LoadCell` says what they mean.
-As attributes of a record their names begin with "load_cell_"."""
+"""Quantities in a load cell's data sheet, with their units in SI; `LoadCell` describes them. As attributes of a record
+their names begin with "load_cell_"."""
 
 ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
     {
@@ -165,16 +165,20 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
         **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )
-"""The attributes that are quantities, with their units in an SI record."""
+"""Attributes that are quantities, with their units in an SI record."""
 
 
 def column_of(name: str) -> Column | None:
-    """What a column of this name means, or None for a column that the schema does not know.
+    """Return the meaning of a column, or None for a column that the schema does not know.
 
     Parameters
     ----------
     name : str
-        Name of a column, with `truth_` before it or without.
+        Name of a column, with or without the prefix `truth_`.
+
+    Returns
+    -------
+    Column or None
 
     Examples
     --------
@@ -191,7 +195,7 @@ def column_of(name: str) -> Column | None:
 
 
 def same_unit(one: str, other: str) -> bool:
-    """Whether two units differ at most in the marks that people write differently, as N m², N·m^2 and Nm2 do."""
+    """Return whether two texts mean the same unit up to notation, like N m², N·m^2 and Nm2."""
     return _plain(one) == _plain(other)
 
 
@@ -200,12 +204,16 @@ def _plain(unit: str) -> str:
 
 
 def present_channels(record: xr.Dataset) -> tuple[str, ...]:
-    """The channels that a record has measured: those that are not NaN throughout.
+    """Return the channels of a record that are not NaN throughout.
 
     Parameters
     ----------
     record : xr.Dataset
         A record.
+
+    Returns
+    -------
+    tuple of str
 
     Examples
     --------

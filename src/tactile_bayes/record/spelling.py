@@ -1,4 +1,4 @@
-"""Spelling: which name was probably meant."""
+"""Suggestions for misspelt names."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ __all__ = ["nearest"]
 
 
 def nearest(name: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """The candidate that is most like a name, whatever their case and the order of their words; None if none is.
+    """Find the candidate most similar to a name, regardless of case and the order of words; None if none is similar.
 
     Parameters
     ----------
     name : str
-        What was written.
+        Misspelt name.
     candidates : iterable of str
-        What could have been meant.
+        Valid names.
     cutoff : float
-        How like it has to be, from 0 to 1 for the same letters.
+        Least similarity, from 0 to 1 for the same letters.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Names and texts that can be stored in every file, and what a name becomes that cannot."""
+"""Names and texts that every file format can store, and the conversion of others."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Any
 __all__ = ["LONGEST_CELL", "is_storable", "is_storable_attribute", "not_storable", "storable"]
 
 LONGEST_CELL = 131_072
-"""Characters of a text in a cell, which Python's reader of CSV files takes."""
+"""Largest number of characters in a cell, that of Python's CSV reader."""
 
 _LONGEST_NAME = 200
-"""Bytes of a name; NetCDF takes 256, also of names that are made of it."""
+"""Largest number of bytes of a name; NetCDF limits it, and names derived from it, to 256."""
 
 _RESERVED = frozenset(
     ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict")
 ) | {"_NCProperties"}
-"""Attributes that NetCDF and HDF5 keep for themselves."""
+"""Attributes that NetCDF and HDF5 reserve."""
 
 _NOT_STORABLE = re.compile("[\0\ud800-\udfff]")
 _WITH_UNIT = re.compile(r"(?P<stem>[^/]*\S)\s+/\s+(?P<unit>\S.*)")
 
 
 def is_storable(name: Any) -> bool:
-    """Whether a column or an attribute can have this name in a CSV file and in a NetCDF file."""
+    """Return whether a column can have this name in a CSV file and in a NetCDF file."""
     return (
         isinstance(name, str)
         and name.strip() == name
@@ -36,12 +36,12 @@ def is_storable(name: Any) -> bool:
 
 
 def is_storable_attribute(name: Any) -> bool:
-    """Whether an attribute can have this name in a CSV file and in a NetCDF file."""
+    """Return whether an attribute can have this name in a CSV file and in a NetCDF file."""
     return is_storable(name) and name not in _RESERVED
 
 
 def not_storable(text: str) -> str | None:
-    """What keeps a text from being stored in every file, None where nothing does.
+    """Return the reason why not every file can store a text, None if there is none.
 
     Examples
     --------
@@ -55,12 +55,12 @@ def not_storable(text: str) -> str | None:
 
 
 def storable(name: str) -> str:
-    """The name without a slash, which stands between groups in a NetCDF file.
+    """Replace slashes in a name, which separate groups in a NetCDF file.
 
     Examples
     --------
     >>> storable("Temp / °C"), storable("Fx/Fy"), storable("v / m/s")
     ('Temp [°C]', 'Fx|Fy', 'v [m|s]')
     """
-    match = _WITH_UNIT.fullmatch(name)  # the form of DIN 1313
+    match = _WITH_UNIT.fullmatch(name)  # the notation of DIN 1313
     return (f"{match['stem']} [{match['unit']}]" if match else name).replace("/", "|")

@@ -1,4 +1,4 @@
-"""A sweep: one stroke of the drive, with one direction and one pivot."""
+"""A sweep: one motion of the drive, with one direction and one pivot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["refuse_impossible_sweeps"]
 
 
 def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source) -> None:
-    """Refuse sweeps of several directions or pivots, or whose drive angle is in degrees or runs the wrong way."""
+    """Refuse sweeps with several directions or pivots, or with a drive angle in degrees or against the direction."""
     direction, angle = values["direction"], values["drive_angle"]
     forward = direction == "forward"
     impossible = ~(forward | (direction == "backward"))
@@ -45,7 +45,7 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
         first, last = _ends(rows)
         sweep = int(values["sweep"][first])
         for name, column, part in (
-            ("direction", forward, "stroke of the drive"),
+            ("direction", forward, "motion of the drive"),
             ("base_x", values["base_x"], "position of the pivot"),
             ("base_y", values["base_y"], "position of the pivot"),
         ):
@@ -68,7 +68,7 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
 
 
 def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | NDArray[np.intp]]:
-    """The rows of each sweep, in the order of measurement: slices, where sweeps come one after the other."""
+    """Yield the rows of each sweep in the order of measurement, as slices if sweeps are contiguous."""
     steps = np.flatnonzero(sweep[1:] != sweep[:-1]) + 1
     numbers = sweep[np.concatenate(([0], steps))]
     if np.unique(numbers).size == numbers.size:
@@ -80,12 +80,12 @@ def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | NDArray[np.intp]]:
 
 
 def _ends(rows: slice | NDArray[np.intp]) -> tuple[int, int]:
-    """The first and the last row of a sweep."""
+    """Return the first and the last row of a sweep."""
     return (rows.start, rows.stop - 1) if isinstance(rows, slice) else (int(rows[0]), int(rows[-1]))
 
 
 def _runs_backwards(angle: NDArray[np.float64], sense: int) -> bool:
-    """Whether a sequence runs against its sense, and not only by the noise of the encoder (see `validate`)."""
+    """Return whether a sequence runs against its sense by more than the noise of the encoder (see `validate`)."""
     if angle.size < 2:
         return False
     angle = angle - angle[0]  # so that a drive at rest has exactly no trend
@@ -102,5 +102,5 @@ def _runs_backwards(angle: NDArray[np.float64], sense: int) -> bool:
 
 
 def _product(one: NDArray[np.floating[Any]], other: NDArray[np.floating[Any]]) -> float:
-    """Scalar product, without the threads of BLAS: many sweeps, little work in each."""
+    """Scalar product without the threads of BLAS, for many short sweeps."""
     return float(np.einsum("i,i->", one, other))

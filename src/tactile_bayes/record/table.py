@@ -1,4 +1,4 @@
-"""A table that may become a record: columns and attributes as they were found, and where that was."""
+"""A table that may become a record: columns and attributes as read, and their source."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from tactile_bayes.errors import RecordError
 __all__ = ["Cells", "Source", "Table", "table_of"]
 
 Cells = tuple[NDArray[Any], Mapping[str, Any]]
-"""The values of a column, shape (n_samples,), and its attributes."""
+"""Values of a column, shape (n_samples,), and its attributes."""
 
 _LONGEST = 1500
-"""Characters of a refusal."""
+"""Largest number of characters of a message."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a table comes from, so that a refusal can point at it.
+    """Source of a table, for the positions in messages.
 
     Parameters
     ----------
     name : str
         Name of the file, if there is one.
     lines : sequence or array of int, optional
-        The line of the file that each sample begins in.
+        First line of each sample in the file.
     heads : mapping of str to int, optional
-        The line of the file that says what a column is.
+        Line of the description of each column.
     aliases : mapping of str to str, optional
-        What a column is called in the file, if that is something else.
+        Name of a column in the file, if it differs.
     names : sequence of str, optional
-        The columns of the file.
+        Columns of the file.
     origins : mapping of str to str, optional
-        What stands for a column in the file, with sign and zero, as `read_record` takes it, less the unit.
+        Origins of columns, with sign and zero, in the form that `read_record` takes, without the unit.
     stated : mapping of str to int, optional
-        The line of the file that states an attribute.
+        Line of each attribute.
     """
 
     name: str = ""
@@ -52,52 +52,52 @@ class Source:
     stated: Mapping[str, int] = field(default_factory=dict)
 
     def row(self, sample: int) -> str:
-        """What a sample is called."""
+        """Return the name of a sample in messages."""
         return f"sample {sample}" if self.lines is None else f"line {self.lines[sample]}"
 
     def error(self, what: str) -> RecordError:
-        """A refusal of the table."""
-        if len(what) > _LONGEST:  # what a file has in it may be of any length; the remedy is at the end
+        """Make an error about the table."""
+        if len(what) > _LONGEST:  # quoted content may be of any length; the correction is at the end
             what = f"{what[: _LONGEST // 2]} … {what[-_LONGEST // 2 :]}"
         return RecordError(f"{self.name}: {what}" if self.name else what)
 
     def line_error(self, line: int, what: str) -> RecordError:
-        """A refusal that points at a line of the file."""
+        """Make an error with a line of the file."""
         return self.error(f"line {line}: {what}")
 
     def cell_error(self, sample: int, column: str, what: str) -> RecordError:
-        """A refusal that points at a cell."""
+        """Make an error with a cell."""
         return self.error(f"{self.row(sample)}, {self.column(column)}: {what}")
 
     def column_error(self, column: str, what: str) -> RecordError:
-        """A refusal that points at what is said of a column."""
+        """Make an error with the description of a column."""
         return self._error_at(self.heads.get(column), f"{self.column(column)} {what}")
 
     def attribute_error(self, name: str, what: str) -> RecordError:
-        """A refusal that points at an attribute."""
+        """Make an error with an attribute."""
         return self._error_at(self.stated.get(name), f"attribute {name!r} {what}")
 
     def _error_at(self, line: int | None, what: str) -> RecordError:
         return self.error(what if line is None else f"line {line}, {what}")
 
     def column(self, name: str) -> str:
-        """What a column is called."""
+        """Return the name of a column in messages."""
         alias = self.aliases.get(name, name)
         return f"column {name!r}" if alias == name else f"column {name!r} ({alias!r} in the file)"
 
 
 @dataclass(frozen=True)
 class Table:
-    """What may become a record.
+    """Table that may become a record.
 
     Parameters
     ----------
     columns : mapping of str to Cells
-        The columns, all of one length.
+        Columns, all of one length.
     attrs : mapping
         Attributes of the record.
     source : Source
-        Where both come from.
+        Source of both.
     """
 
     columns: Mapping[str, Cells]
@@ -116,7 +116,7 @@ class Table:
 
 
 def table_of(dataset: xr.Dataset, source: Source, dimension: Hashable = "sample") -> Table:
-    """The table in a dataset, if all its variables have the dimension of the samples alone."""
+    """Return the table in a dataset, if all its variables have the dimension of the samples only."""
     for name, variable in dataset.variables.items():
         if variable.dims != (dimension,):
             raise source.error(

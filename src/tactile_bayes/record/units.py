@@ -1,4 +1,4 @@
-"""The units of a record: its rod, and the conversion to and from dimensionless numbers, and of a table to them."""
+"""The units of a record: its rod, and the conversion between SI and dimensionless quantities."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["in_units_of_record", "rod_of", "to_dimensionless", "to_si", "with_ro
 
 
 def rod_of(record: xr.Dataset) -> Rod:
-    """The rod that a record was measured with; `Rod()`, with a diameter in rod lengths, if it is dimensionless.
+    """Return the rod of a record; for a dimensionless record `Rod()`, with a diameter in rod lengths.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def rod_of(record: xr.Dataset) -> Rod:
     Raises
     ------
     RecordError
-        If the attributes of the record state no rod, or an impossible one.
+        If the attributes of the record state no rod, or an invalid one.
 
     Examples
     --------
@@ -45,7 +45,24 @@ def rod_of(record: xr.Dataset) -> Rod:
 
 
 def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
-    """The record as measured with another rod than the one it states."""
+    """Replace the rod that a record states, without a change of its values.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        A record.
+    rod : Rod, optional
+        Rod in the units of the record; by default the record is returned unchanged.
+
+    Returns
+    -------
+    xr.Dataset
+
+    Raises
+    ------
+    ParameterError
+        If the record is dimensionless and the rod is not.
+    """
     check_optional("the rod", rod, Rod)
     if rod is None:
         return record
@@ -57,15 +74,19 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
 
 
 def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
-    """The record in units of its rod: lengths L, moments EI/L, forces EI/L².
+    """Convert a record to the units of its rod: lengths L, moments EI/L, forces EI/L².
 
     Equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945. The data sheet of the load cell is converted with
-    the columns. Further columns that the schema does not know are kept as they are.
+    the columns. Columns that the schema does not know are kept as they are.
 
     Parameters
     ----------
     record : xr.Dataset
-        A record. If it is dimensionless it is returned unchanged.
+        A record. If it is dimensionless, it is returned unchanged.
+
+    Returns
+    -------
+    xr.Dataset
 
     Raises
     ------
@@ -86,19 +107,23 @@ def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
 
 
 def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
-    """The record in SI units, as this rod would have given it; the inverse of `to_dimensionless`.
+    """Convert a dimensionless record to SI units with a rod; the inverse of `to_dimensionless`.
 
     Parameters
     ----------
     record : xr.Dataset
-        A dimensionless record, or one that is SI already, with the same rod.
+        A dimensionless record, or an SI record with the same rod.
     rod : Rod
-        Length [m] and flexural rigidity [N m²]; its diameter must be that of the record's rod.
+        Rod with length [m] and flexural rigidity [N m²]; its diameter must be that of the record's rod.
+
+    Returns
+    -------
+    xr.Dataset
 
     Raises
     ------
     RecordError
-        If `record` is not a record, or was made with a rod of another diameter.
+        If `record` is not a record, or has a rod of another diameter.
 
     Examples
     --------
@@ -125,12 +150,12 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
 
 
 def _in_lengths(rod: Rod) -> Rod:
-    """The rod in its own units."""
+    """Return the rod in its own units."""
     return Rod(diameter=rod.diameter / rod.length_unit)
 
 
 def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
-    """The record in other units, with the rod that it then states."""
+    """Convert a record to other units, and state its rod."""
     converted = validate(record)
     convert = operator.mul if units == "SI" else operator.truediv
     for name, variable in converted.variables.items():
@@ -150,21 +175,21 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
 
 
 def in_units_of_record(table: Table, rod: Rod | None) -> Table:
-    """The table with every column that the schema knows in the unit of the record.
+    """Convert every column that the schema knows to the unit of the record.
 
-    The record is SI or dimensionless as its attribute `units` says, or else as the rod does; where neither is there,
-    a column in newtons or millimetres says that it is SI. Arrays of float64 are converted in place.
+    The attribute `units`, or else the rod, determines whether the record is SI or dimensionless; without both, a column
+    with a unit like newtons or millimetres makes it SI. Arrays of float64 are converted in place.
 
     Raises
     ------
     RecordError
-        If a column is in a unit of another quantity, or in one that is not known.
+        If a column has the unit of another quantity, or an unknown one.
     """
     attrs: dict[str, Any] = dict(table.attrs)
     if "units" not in attrs and rod is None and any(_is_physical(*item) for item in table.columns.items()):
         attrs["units"] = "SI"
     units = attrs.get("units", "dimensionless" if rod is None or rod.is_dimensionless else "SI")
-    if units not in UNITS:  # which is refused with the other attributes
+    if units not in UNITS:  # refused later, with the other attributes
         return table
     columns: dict[str, Cells] = {}
     for name, (values, of_column) in table.columns.items():
@@ -191,7 +216,7 @@ def in_units_of_record(table: Table, rod: Rod | None) -> Table:
 
 
 def _is_physical(name: str, cells: Cells) -> bool:
-    """Whether a column states a unit that it would not have in a dimensionless record."""
+    """Return whether a column states a unit that it would not have in a dimensionless record."""
     column = column_of(name)
     if column is None or column.scale is None or "units" not in cells[1]:
         return False

@@ -1,4 +1,4 @@
-"""The validation of records: everything that is refused, with where it is and what to do."""
+"""The validation of records: each error says what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["checked_record", "validate"]
 
 
 def validate(record: xr.Dataset) -> xr.Dataset:
-    """The record, completed, or a refusal that says what is wrong with it, where, and what to do.
+    """Validate and complete a record, or raise an error that says what is wrong, where, and what to do.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def validate(record: xr.Dataset) -> xr.Dataset:
     -------
     xr.Dataset
         The same record with columns in the order of the schema, absent bases as 0, and `units` and `long_name`
-        on every variable. The argument is not changed; values that are right as they are are not copied.
+        on every variable. The argument is not changed; valid values are not copied.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def validate(record: xr.Dataset) -> xr.Dataset:
 
 
 def checked_record(table: Table) -> xr.Dataset:
-    """The record that a table makes, or the reason why it makes none."""
+    """Make a record from a table, or raise an error that says why this is not possible."""
     columns, attrs, source = table.columns, table.attrs, table.source
     _refuse_names(attrs, source, is_storable_attribute)
     attributes = checked_attributes(attrs, source)
@@ -123,7 +123,7 @@ def _checked_column_attributes(
             "state the units that the record is in, and for SI the rod"
         )
     long_name = column.long_name_in(stated_frame(of_record, source))
-    own_words = [column.long_name_in(frame) for frame in FRAMES]  # those of another frame go with it
+    own_words = [column.long_name_in(frame) for frame in FRAMES]  # descriptions for another frame are replaced
     kept = {key: value for key, value in attrs.items() if not (key == "long_name" and value in own_words)}
     return {"long_name": long_name, **kept, "units": expected}
 

@@ -1,4 +1,4 @@
-"""Step 1: what the base feels in a sweep, by contour or by slope angle, with events, labels and units."""
+"""Step 1: the readings of a sweep along a contour, or states at slope angles, with events, labels and units."""
 
 from tactile_bayes.sweep.columns import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 from tactile_bayes.sweep.events import Event, SweepEvents

@@ -1,4 +1,4 @@
-"""Columns of many sweeps at once: arrays in the laboratory's signs and units."""
+"""Columns of many sweeps at once: arrays in the laboratory frame, with units."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ SAMPLE_COLUMNS = (
     "contact_arclength",
     "tip_angle",
 )
-"""What is known of every sample; loads are 0 out of contact, the rest NaN. The phase comes beside them."""
+"""Columns of samples; loads are 0 out of contact, the others NaN."""
 
 EVENT_COLUMNS = ("drive_angle", "slope_angle", "contact_x", "contact_y")
 
 
 class ManyUnits(NamedTuple):
-    """Units of the rods of many sweeps, each a number for all or an array over lanes."""
+    """Units of the rods of many sweeps, each a number for all or an array of shape (n,)."""
 
     length_unit: Any
     moment_unit: Any
@@ -42,20 +42,20 @@ class ManyUnits(NamedTuple):
 
 
 def sweep_samples(paths: Paths, units: ManyUnits, index: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
-    """What the base feels at the drive angles that paths were traced with, and the contacts.
+    """Loads and contacts at the drive angles with which paths were traced.
 
     Parameters
     ----------
     paths : Paths
-        A lane for each sweep.
+        A path for each sweep.
     units : ManyUnits
-        Of the lanes' rods.
-    lane : ndarray of int
-        Which lanes, of any shape.
+        Units of their rods.
+    index : ndarray of int
+        Indices of sweeps, of any shape.
 
     Returns
     -------
-    dict of str to ndarray, shape (*lane.shape, k)
+    dict of str to ndarray, shape (*index.shape, k)
         `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
     """
     states, each = paths.sampled_states(index), index[..., None]
@@ -66,7 +66,7 @@ def sweep_samples(paths: Paths, units: ManyUnits, index: NDArray[np.intp]) -> di
 
 
 def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:
-    """`EVENT_COLUMNS` of every "first_contact" and "snap_off", in the laboratory frame; NaN where there is none."""
+    """`EVENT_COLUMNS` of "first_contact" and "snap_off" in the laboratory frame, shape (n,); NaN without contact."""
     index = np.arange(paths.sweep_frame.size)
     events = {}
     for name, angle, parameter in (
@@ -81,7 +81,7 @@ def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Fl
 
 
 def phases_of(paths: Paths) -> list[str]:
-    """Phases of every lane in their order, as "A-B-A" (A is tip contact, B tangential); "" where nothing touches."""
+    """Phases of every sweep in order, as "A-B-A" (A is tip contact, B tangential); "" for a sweep without contact."""
     count = np.isfinite(paths.change_parameter).sum(axis=1)
     return [
         "-".join("A" if tip else "B" for tip in to_tip[:phases])

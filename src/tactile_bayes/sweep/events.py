@@ -1,4 +1,4 @@
-"""The events of a sweep: where contact begins, changes its phase and ends."""
+"""The events of a sweep: first contact, changes of the phase, and snap-off."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class Event:
     Attributes
     ----------
     kind : str
-        "tip" or "tangential" at first contact; "tip → tangential" and so on at a change; "fold" (a smooth maximum of
-        the drive angle), "corner" (a maximum where the phase changes or the contour's curvature jumps) or "thrust"
-        (the line of force has come to pass through the pivot) at snap-off.
+        At first contact "tip" or "tangential"; at a change "tip → tangential" and so on; at snap-off "fold" (a smooth
+        maximum of the drive angle), "corner" (a maximum where the phase changes or the contour's curvature jumps) or
+        "thrust" (the line of force passes through the pivot).
     drive_angle, slope_angle : float
-        [rad].
+        Drive angle, and slope angle of the contour at the contact [rad].
     contact_x, contact_y, contact_arclength : float
         Contact point on the object and arc length of the rod up to it [length].
     holding_moment, force_x, force_y : float
-        Base wrench.
+        Base wrench [N m and N, or EI/L and EI/L²].
     """
 
     kind: str
@@ -49,22 +49,22 @@ class Event:
 
 @dataclass(frozen=True)
 class SweepEvents:
-    """Where contact begins, changes its phase and ends in one sweep.
+    """Events of one sweep: first contact, changes of the phase, and snap-off.
 
     Attributes
     ----------
     direction : str
         "forward" or "backward".
     base : (float, float)
-        The pivot.
+        The pivot [length].
     first_contact, snap_off : Event
     transitions : tuple of Event
-        Changes of the phase, in the order in which they happen.
+        Changes of the phase, in their order.
     clear : bool
-        Whether the straight rod is free of the object after snap-off. If it is not, the rod comes to rest in another
-        contact, which no sweep leads to.
+        Whether the straight rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
+        contact, which no sweep reaches.
     largest_strain : float
-        Largest bending strain of the rod up to snap-off, to 1e-4 of it; 0 for a rod without thickness.
+        Largest bending strain of the rod up to snap-off, with a relative error of 1e-4; 0 for a rod without thickness.
     """
 
     direction: str
@@ -84,10 +84,10 @@ def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod
     # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
     wrench = _at_rest_first(states, bool(to_tip[0]))
     columns = to_lab_frame(paths.sweep_frame, index, states._replace(wrench=wrench), rod)
-    words = ["tip" if tip else "tangential" for tip in to_tip]
+    phases = ["tip" if tip else "tangential" for tip in to_tip]
     kinds = [
-        words[0],
-        *(f"{before} → {after}" for before, after in pairwise(words)),
+        phases[0],
+        *(f"{before} → {after}" for before, after in pairwise(phases)),
         SnapOff(int(paths.snap_off[0])).name.lower(),
     ]
     names = [name for name in Event.__dataclass_fields__ if name != "kind"]

@@ -15,7 +15,7 @@ __all__ = ["RodUnits", "to_lab_frame"]
 
 
 class RodUnits(Protocol):
-    """What dimensionless numbers are multiplied with: a `Rod`, or arrays for many."""
+    """Units of dimensionless quantities: a `Rod`, or arrays for many rods."""
 
     @property
     def length_unit(self) -> Any: ...
@@ -26,21 +26,22 @@ class RodUnits(Protocol):
 
 
 def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
-    """States on lanes in the laboratory's signs and units; the contact point is the object's, not the centreline's.
+    """Convert states to the laboratory frame, with units; the contact point is that on the object's surface.
 
     Parameters
     ----------
-    seen : SweepFrame
-    lane : ndarray, broadcastable to shape (...)
+    sweep_frame : SweepFrame
+    index : ndarray, broadcastable to shape (...)
+        Indices of the contours.
     states : States
-        Of shape (...).
+        Dimensionless states, shape (...).
     rod : RodUnits
-        The units of the rod, or of each state's rod.
+        Units of the rod, or of each state's rod.
 
     Returns
     -------
     dict of str to ndarray, shape (...)
-        By the names of a record's columns; phases as numbers.
+        Columns by the names of a record; phases as numbers.
     """
     mirrored = sweep_frame.mirrored[index]
     sign = np.where(mirrored, -1.0, 1.0)

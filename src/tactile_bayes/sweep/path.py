@@ -1,4 +1,4 @@
-"""One sweep along one contour: its exact path, or a refusal that says why there is none."""
+"""The exact path of one sweep along one contour, or an error that says why there is none."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def sweep_paths(
     rod: Rod | None = None,
     friction: float = 0.0,
 ) -> Paths:
-    """The exact path of one sweep along one contour, or a refusal that says why there is none.
+    """Compute the exact path of one sweep along one contour, or raise an error that says why there is none.
 
-    Parameters and errors are those of `scan`.
+    Parameters and errors are those of `scan`, with one pivot and one direction.
     """
     rod = Rod() if rod is None else rod
     sweep_frame = to_sweep_frame(contour, base, direction, rod)
@@ -85,12 +85,12 @@ def _end(contour: Contour, at_right: bool) -> str:
 
 
 def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SweepFrame:
-    """One contour as one rod sees it from one pivot.
+    """Convert one contour to the frame of a sweep of a rod about a pivot.
 
     Raises
     ------
     ParameterError
-        If one of them is none, or there are several contours.
+        If an argument has the wrong kind, or there are several contours.
     """
     check_kind("the contour", contour, Contour, "give one, such as tb.contours.Parabola(a=0.5, q=0.5)")
     check_kind("the rod", rod, Rod, "give a Rod, such as tb.Rod(length=0.1, flexural_rigidity=1.2e-5)")
@@ -106,7 +106,7 @@ def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direc
 
 
 def friction_angle_of(friction: float) -> float:
-    """The angle arctan μ [rad] by which friction turns the contact force, refused where the rod's map would fold."""
+    """Friction angle arctan μ [rad]; ParameterError where the map of the rod would fold."""
     most = float(np.tan(MAX_FRICTION_ANGLE))
-    remedy = f"give Coulomb's coefficient, a number from 0 to {most:.2f}"
-    return float(np.arctan(check_number("friction", friction, remedy, least=0.0, most=most)))
+    correction = f"give Coulomb's coefficient, a number from 0 to {most:.2f}"
+    return float(np.arctan(check_number("friction", friction, correction, least=0.0, most=most)))

@@ -1,4 +1,4 @@
-"""Step 1 as a user asks for it: a rod sweeps along a contour, and the base feels it."""
+"""Step 1 for users: the record of a rod that sweeps along a contour."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from tactile_bayes.sweep.path import Direction, friction_angle_of, sweep_paths, 
 __all__ = ["Scan", "equilibria", "scan"]
 
 _MARGIN = 15
-"""Steps of the drive before first contact and after snap-off."""
+"""Number of drive steps before first contact and after snap-off."""
 
 _FINEST = 1e-6
-"""Steps of the drive [rad] below this would make millions of samples."""
+"""Least step of the drive [rad]; smaller ones would give millions of samples."""
 
 _COARSEST = 0.5
-"""Steps of the drive [rad] above this are taken for degrees: a sweep would have a handful of samples."""
+"""Largest step of the drive [rad]; a larger one is probably in degrees."""
 
 
 class _ByDirection(dict[str, SweepEvents]):
@@ -46,18 +46,18 @@ class _ByDirection(dict[str, SweepEvents]):
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """What `scan` returns.
+    """Result of `scan`.
 
     Attributes
     ----------
     record : xr.Dataset
-        The record, dimension "sample", with `truth_` columns for what the base cannot feel.
+        The record, dimension "sample", with `truth_` columns for the contact.
     sweeps : tuple of SweepEvents
-        The events of each sweep, by its number in the record.
+        Events of each sweep, by its number in the record.
     events : mapping of str to SweepEvents
-        The same by direction, where there is one base only.
+        Events by direction, if there is one base only.
     contour : Contour
-        What was scanned.
+        The contour that was scanned.
     """
 
     record: xr.Dataset
@@ -81,13 +81,13 @@ def equilibria(
 ) -> xr.Dataset:
     """States in which the rod touches a contour at given slope angles.
 
-    Where a sweep would already have let go they are equilibria all the same, if unstable ones: equations 19 and 20 of
-    Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form.
+    They solve equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form. Beyond snap-off they
+    are equilibria too, but unstable.
 
     Parameters
     ----------
     contour : Contour
-        In metres if `rod` is given in SI, else in rod lengths.
+        One contour; in metres if `rod` is given in SI, else in rod lengths.
     slope_angles : array_like, shape (n,)
         Slope angles α of the contour at the contact [rad]; those of a backward sweep are mostly negative.
     base : (float, float)
@@ -97,19 +97,19 @@ def equilibria(
     rod : Rod, optional
         By default the dimensionless rod.
     friction : float
-        Coulomb's coefficient μ of the sliding rod.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84.
 
     Returns
     -------
     xr.Dataset
-        Over "slope_angle": drive_angle, holding_moment, force_x, force_y, contact_arclength, contact_phase ("tip",
-        "tangential" or "none"), contact_x, contact_y, tip_angle; NaN where the rod
-        cannot reach, and where the contour has no such slope.
+        Over "slope_angle": drive_angle and tip_angle [rad], holding_moment, force_x, force_y, contact_arclength,
+        contact_x and contact_y, in SI or the units of the rod, and contact_phase ("tip", "tangential" or "none"). They
+        are NaN beyond the rod's reach, and where the contour has no such slope.
 
     Raises
     ------
     ParameterError
-        If a slope angle is outside (−π/2, π/2), or an argument is none that is offered.
+        If a slope angle is outside (−π/2, π/2), or another argument is invalid.
 
     Examples
     --------
@@ -154,41 +154,41 @@ def scan(
     rod: Rod | None = None,
     friction: float = 0.0,
 ) -> Scan:
-    """Sweep the rod along a contour and record what its base feels, from before first contact to after snap-off.
+    """Sweep the rod along a contour, and record the loads at its base from before first contact to after snap-off.
 
     Parameters
     ----------
     contour : Contour
-        In metres if `rod` is given in SI, else in rod lengths.
+        One contour; in metres if `rod` is given in SI, else in rod lengths.
     direction : {"both", "forward", "backward"}
-        Which sweeps; "both" is a forward sweep (number 0), then a backward one (number 1).
+        Directions of the sweeps; "both" is a forward sweep (number 0), then a backward one (number 1).
     base : (float, float) or sequence of them
         The pivot, in the contour's unit of length. The contour must lie above it. With several pivots (a support that
-        is moved, or an array of whiskers) each is visited in turn, and the sweeps are numbered through.
+        is moved, or an array of whiskers) each is used in turn, and the sweeps are numbered consecutively.
     drive_step : float
-        Step of the drive [rad], at most 0.5; the grid consists of its multiples, and reaches 15 steps beyond contact on
-        both sides, as far as a turn goes.
+        Step of the drive [rad], at most 0.5; the grid consists of its multiples, from 15 steps before contact to 15
+        steps after it, within a turn.
     drive_angles : array_like, shape (n,), optional
-        A grid of one's own [rad], used in increasing order forward and in decreasing order backward; of equal angles
-        one is kept.
+        Drive angles in place of this grid [rad], used in increasing order forward and in decreasing order backward,
+        without duplicates.
     rod : Rod, optional
-        By default the dimensionless rod. One with a diameter touches with its surface.
+        By default the dimensionless rod. A rod with a diameter touches with its surface.
     friction : float
-        Coulomb's coefficient μ of the sliding rod.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84.
 
     Returns
     -------
     Scan
-        Outside contact the load is zero and the `truth_` columns are NaN, their phase "none".
+        Out of contact loads are zero, `truth_` columns are NaN, and the phase is "none".
 
     Warns
     -----
     ClearanceWarning
-        If the straight rod would cut the object after snap-off: what it does then is not known, and the samples are
-        left out.
+        If the straight rod would cut the object after snap-off: its state is then unknown, and these samples are left
+        out.
     StrainWarning
         If the rod is bent beyond its elastic strain, or beyond a strain of 0.1, where the model of a slender, linearly
-        elastic rod ends.
+        elastic rod fails.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def scan(
     ContourError
         If the pivot is not below the contour or too close to it, or the rod would touch beyond an end of it.
     ParameterError
-        If an argument is none that is offered.
+        If an argument is invalid.
 
     Examples
     --------
@@ -232,7 +232,7 @@ def scan(
             first, snap = np.sort([sweep.first_contact.drive_angle, sweep.snap_off.drive_angle])
             steps = np.arange(np.floor(first / drive_step) - _MARGIN, np.ceil(snap / drive_step) + _MARGIN + 1)
             angles = steps * drive_step
-            angles = angles[np.abs(angles) <= 2.0 * np.pi]  # a record knows none beyond
+            angles = angles[np.abs(angles) <= 2.0 * np.pi]  # the limit of a record
         else:
             angles = grid
         if not sweep.clear:
@@ -251,7 +251,7 @@ def scan(
 
 
 def _floats(values: ArrayLike) -> Floats:
-    """Numbers as an array, NaN if they are none."""
+    """Return numbers as an array, or NaN if they are not numbers."""
     numbers = as_numbers(values)
     return np.asarray(np.nan) if numbers is None else numbers
 

@@ -1,4 +1,4 @@
-"""Step 1 for many contours of one family in one call."""
+"""Step 1 for many contours of one family at once."""
 
 from __future__ import annotations
 
@@ -31,16 +31,17 @@ def scan_many(
     rod: Rod | None = None,
     friction: float = 0.0,
 ) -> xr.Dataset:
-    """What the base feels at drive angles, for many contours at once: some 8000 sweeps of 180 samples in a second.
+    """Sweep the rod along many contours at once: some 8000 sweeps of 180 samples in a second.
 
-    Loads are right to 1e-9 of the largest, contacts to 1e-10 of the path, events to rounding.
+    Loads have errors of 1e-9 of the largest, contacts of 1e-10 of the path, events of rounding. The equations are those
+    of `scan`.
 
     Parameters
     ----------
     contours : Contour
-        With parameters of shape (n,); in metres if `rod` is given in SI, else in rod lengths.
+        Contours with parameters of shape (n,); in metres if `rod` is given in SI, else in rod lengths.
     drive_angles : array_like, shape (k,) or (n, k)
-        [rad].
+        Drive angles, for all contours or for each [rad].
     direction : {"forward", "backward"}
         Sense of the drive.
     base : (array_like, array_like), each of shape () or (n,)
@@ -48,21 +49,21 @@ def scan_many(
     rod : Rod, optional
         By default the dimensionless rod.
     friction : float
-        Coulomb's coefficient μ of the sliding rod.
+        Coulomb's coefficient μ of the sliding rod, at most 0.84.
 
     Returns
     -------
     xr.Dataset
         Over "contour" and "sample": drive_angle, holding_moment, force_x, force_y (0 out of contact), contact_x,
         contact_y, slope_angle, contact_arclength, tip_angle (NaN out of contact), contact_phase. Over "contour":
-        status ("ok", or why the contour cannot be swept), clear (whether the straight rod passes it after snap-off),
+        status ("ok", or why the contour cannot be swept), clear (whether the straight rod is clear of it at the end),
         phases ("A-B": first tip, then tangential contact), and first_contact_* and snap_off_* with drive_angle,
         slope_angle, contact_x and contact_y. A contour that cannot be swept has no contact and NaN events.
 
     Raises
     ------
     ParameterError
-        If shapes do not fit, drive angles are beyond a turn, or an argument is none that is offered.
+        If shapes do not broadcast, drive angles exceed a turn, or another argument is invalid.
 
     Examples
     --------
@@ -118,8 +119,8 @@ def scan_many(
     variables: dict[str, Any] = {"drive_angle": labelled(both, angles, "drive_angle")}
     variables |= {name: labelled(both, values, name) for name, values in samples.items()}
     variables["contact_phase"] = labelled(both, phase, "contact_phase")
-    fates = np.array([one.message for one in Reachability])
-    variables["status"] = ("contour", fates[paths.reach])
+    statuses = np.array([one.message for one in Reachability])
+    variables["status"] = ("contour", statuses[paths.reach])
     with np.errstate(invalid="ignore"):
         variables["clear"] = ("contour", paths.is_clear())
     variables["phases"] = ("contour", np.array(phases_of(paths), dtype=np.str_))

@@ -1,4 +1,4 @@
-"""The template of a record that is yet to be made: drive angles without loads."""
+"""The template of a record: drive angles without loads."""
 
 from __future__ import annotations
 
@@ -23,19 +23,22 @@ def record_template(
     rod: Rod | None,
     load_cell: LoadCell,
 ) -> xr.Dataset:
-    """Return an empty record: every pivot in turn, swept in every direction, with loads of zero.
+    """Return a record of sweeps about every pivot in every direction, with loads of zero.
 
-    Angles are those that an encoder without an error of its own reads.
+    Its drive angles include the encoder's offset and backlash.
 
     Parameters
     ----------
     bases : sequence of (float, float)
+        Pivots, in the unit of length of the record.
     directions : sequence of {"forward", "backward"}
+        Directions of the sweeps about each pivot.
     drive_angles : ndarray, shape (n,)
-        Of the rod, in any order [rad].
+        Drive angles of the rod, in any order [rad].
     rod : Rod, optional
+        By default the dimensionless rod.
     load_cell : LoadCell
-        Its frame, and its encoder's offset and backlash.
+        Provides the frame, and the encoder's offset and backlash.
     """
     angles = np.sort(drive_angles)
     parts: dict[str, list[Any]] = {name: [] for name in ("sweep", "direction", "base_x", "base_y", "drive_angle")}

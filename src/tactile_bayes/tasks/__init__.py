@@ -1,17 +1,17 @@
-"""Independent tasks, here or on a Dask cluster; the ledger that a stopped run goes on from; files written whole."""
+"""Independent tasks, here or on a Dask cluster; the results store, from which a stopped run resumes; atomic files."""
 
 from tactile_bayes.tasks.files import alone_in, is_temporary, write_atomically
-from tactile_bayes.tasks.ledger import Kind, Ledger, TaskProgress, keep_outcomes, open_ledger
+from tactile_bayes.tasks.results_store import Kind, ResultsStore, TaskProgress, keep_outcomes, open_results_store
 from tactile_bayes.tasks.workers import run_tasks
 
 __all__ = [
     "Kind",
-    "Ledger",
+    "ResultsStore",
     "TaskProgress",
     "alone_in",
     "is_temporary",
     "keep_outcomes",
-    "open_ledger",
+    "open_results_store",
     "run_tasks",
     "write_atomically",
 ]

@@ -1,4 +1,4 @@
-"""Files written whole, of which a reader sees the old or the new one and never half of either; folders for one run."""
+"""Atomic writes, so that a reader sees the old or the new file and never a part; folders for a single run."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ _DAY = 86_400.0
 
 @contextmanager
 def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path to write to, and put it in the place of `path` when the block has succeeded.
+    """Yield a temporary path to write to, and move it to `path` when the block has succeeded.
 
-    The temporary file has the same name, in a hidden folder beside `path`, which is locked while it is there. At the
-    end of the block the file is brought to the disk and renamed, and the directory is brought to the disk; if the block
-    raises, it is removed and what was at `path` stays as it was.
+    The temporary file has the same name, in a hidden folder beside `path`, which is locked while it exists. At the end
+    of the block the file is flushed to the disk and renamed, and the directory is flushed; if the block raises, the
+    temporary file is removed and `path` stays as it was.
 
-    Processes that were killed leave such folders behind. They are removed first, where the lock tells that nobody
-    writes in them: not on Windows, nor on a file system without locks. As locks may not reach other machines, those
-    from another machine have to be a day old, too.
+    Processes that were killed leave such folders behind. They are removed first if their lock shows that nobody writes
+    to them: not on Windows, nor on a file system without locks. Since locks may not reach other machines, folders from
+    another machine must also be a day old.
 
     Parameters
     ----------
     path : path-like
-        The file to be written. A symbolic link is followed.
+        File to be written. A symbolic link is followed.
 
     Yields
     ------
     pathlib.Path
-        Where the block has to write.
+        Temporary path for the block to write to.
 
     Raises
     ------
     FileNotFoundError
-        If the folder of `path` is not there, or the block wrote no file.
+        If the folder of `path` does not exist, or the block wrote no file.
 
     Examples
     --------
@@ -77,13 +77,13 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def is_temporary(path: Path) -> bool:
-    """Whether a path is called like what `write_atomically` writes in, or a killed process left behind."""
+    """Return whether a path has the name of a folder of `write_atomically`."""
     return _TEMPORARY.fullmatch(path.name) is not None
 
 
 @contextmanager
 def _hidden_folder(parent: Path) -> Iterator[Path]:
-    """A new folder, locked, which is removed in the end."""
+    """Create a locked folder, and remove it at the end."""
     while True:
         folder = parent / f".tactile-bayes-{_HOST}-{secrets.token_hex(8)}.tmp"
         folder.mkdir()
@@ -101,7 +101,7 @@ def _hidden_folder(parent: Path) -> Iterator[Path]:
 
 
 def _remove_leftovers(parent: Path) -> None:
-    """Remove hidden folders of processes that were killed, as far as that can be told and done."""
+    """Remove hidden folders of killed processes, where they can be identified and removed."""
     with suppress(OSError):
         for name in os.listdir(parent):
             if match := _TEMPORARY.fullmatch(name):
@@ -115,7 +115,7 @@ def _remove_leftovers(parent: Path) -> None:
 
 
 def _lock(folder: Path) -> int | None:
-    """Lock a folder until the handle is closed or the process ends; None where the system cannot.
+    """Lock a folder until the handle is closed or the process ends; None where the system has no locks.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def _lock(folder: Path) -> int | None:
 
 @contextmanager
 def alone_in(folder: Path, refusal: type[Exception]) -> Iterator[None]:
-    """Keep other runs out of a folder, where the system can; the lock goes with the process.
+    """Keep other runs out of a folder, where the system has locks; the lock ends with the process.
 
     Raises
     ------

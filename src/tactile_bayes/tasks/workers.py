@@ -26,10 +26,10 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _PATIENCE = "10s"
-"""How long a scheduler may take to answer."""
+"""Timeout of the connection to a scheduler."""
 
 _RETRIES = 3
-"""How often a task is tried again after a process died over it."""
+"""Number of retries of a task after its process died."""
 
 
 def run_tasks(
@@ -39,37 +39,38 @@ def run_tasks(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> Generator[tuple[Task, Result], None, None]:
-    """Call a function on every task; results come in the order in which they are ready.
+    """Call a function on every task, and yield results in the order in which they are ready.
 
-    A process that dies (killed, out of memory) is replaced, and its task done again. What a task computes must not
-    depend on where or when it is done. Each runs with one thread of linear algebra. Processes end with the iterator,
-    and with this process, however it ends; Ctrl-C is this process's affair alone.
+    A process that dies (killed, out of memory) is replaced, and its task is repeated. The result of a task must not
+    depend on where or when it is computed. Each task runs with one thread of linear algebra. Processes end with the
+    iterator, and with this process, however it ends; only this process receives Ctrl-C.
 
     Parameters
     ----------
     function : callable
-        Of one task; for processes and clusters a function of a module, not a local one.
+        Function of one task; for processes and clusters a function of a module, not a local one.
     tasks : sequence
-        Small: they travel.
+        Tasks; small objects, since they are sent to other processes.
     workers : int, optional
-        Processes on this machine; by default one for each core that this process may use. 1 stays in this process. Each
-        begins by importing the script that is run: what starts processes belongs under `if __name__ == "__main__":`.
+        Number of processes on this machine; by default one for each core that this process may use. With 1 all tasks
+        run in this process. Each process begins by importing the script that is run: code that starts processes
+        belongs under `if __name__ == "__main__":`.
     scheduler : str, optional
-        Address of a Dask scheduler, such as "tcp://10.0.0.1:8786"; in place of `workers`. Its workers need this
-        package in the same version; as long as there are none, the tasks wait.
+        Address of a Dask scheduler, such as "tcp://10.0.0.1:8786", in place of `workers`. Its workers need this
+        package in the same version; tasks wait as long as there are no workers.
 
     Yields
     ------
-    task, result
+    (task, result)
 
     Raises
     ------
     ParameterError
-        If `workers` is no positive number, or Dask is wanted and not installed, or its scheduler does not answer in ten
-        seconds.
+        If `workers` is not a positive number; if a scheduler is given and Dask is not installed, or the scheduler does
+        not answer in ten seconds.
     TaskError
-        If processes died over a task again and again, or cannot begin, or the scheduler is lost. What a task raises
-        itself is raised here.
+        If processes die repeatedly over a task, or cannot start, or the scheduler is lost. An exception of a task
+        itself is raised here too.
 
     Examples
     --------
@@ -102,7 +103,7 @@ def _cores() -> int:
 
 
 class _Process:
-    """A process that does one task after the other."""
+    """A process that runs one task after the other."""
 
     def __init__(self, function: Callable[[Any], Any]) -> None:
         context = multiprocessing.get_context("spawn")
@@ -115,7 +116,7 @@ class _Process:
         theirs.close()
 
     def end(self) -> int | None:
-        """Its exit code, once it is gone."""
+        """End the process, and return its exit code."""
         self.connection.close()
         self.process.terminate()
         self.process.join()
@@ -179,11 +180,11 @@ def _refuse_hopeless(process: _Process, code: int | None, deaths: Counter[int | 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """A process started here never hears Ctrl-C; this one hears it afterwards, and SIGTERM if it listens to that."""
+    """Start processes that ignore Ctrl-C; this one receives it afterwards, and SIGTERM if it has a handler for it."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    resource_tracker.ensure_running()  # which else would let the signals through, as it starts with the first process
+    resource_tracker.ensure_running()  # it starts with the first process and would unblock the signals
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         with _termination_held():
@@ -194,7 +195,7 @@ def _interrupts_held() -> Iterator[None]:
 
 @contextmanager
 def _termination_held() -> Iterator[None]:
-    """Not by blocking it, which the process started here would go on doing."""
+    """Delay SIGTERM without blocking it: the process started here would inherit a blocked signal."""
     handler = signal.getsignal(signal.SIGTERM)
     if not callable(handler) or threading.current_thread() is not threading.main_thread():
         yield
@@ -216,7 +217,7 @@ def _work(function: Callable[[Any], Any], connection: Connection) -> None:
         connection.send((True, None))
         while True:
             connection.send(_outcome(function, connection.recv()))
-    except (EOFError, OSError):  # nobody listens any more
+    except (EOFError, OSError):  # the parent is gone
         pass
 
 
@@ -236,7 +237,7 @@ def _outcome(function: Callable[[Any], Any], task: Any) -> tuple[bool, Any]:
 
 
 def _travels(error: Exception) -> bool:
-    """Whether an error can be made again from its arguments in another process."""
+    """Return whether an error can be rebuilt from its arguments in another process."""
     if not all(argument is None or isinstance(argument, str | int | float) for argument in error.args):
         return False
     try:
@@ -250,7 +251,7 @@ def _travels(error: Exception) -> bool:
 
 
 def _refuse_malformed(address: str) -> None:
-    """A client would take a minute over such an address, and fail in its destructor."""
+    """Refuse a malformed address, over which a client would take a minute and fail in its destructor."""
     from distributed.comm.addressing import get_address_host_port, parse_address
     from distributed.comm.registry import get_backend
 

@@ -20,8 +20,8 @@ def alarms(sheet, missing=()):
     made[..., list(missing)] = np.nan
     # Only what walks makes a difference between the first sample and others.
     together = made if walks else made.reshape(1, -1, 3)
-    surprise = np.array([sheet.surprise(record) for record in together]).reshape(made.shape[:2])
-    return surprise > stats.chi2(3 - len(missing)).isf(FALSE_ALARM)
+    distance = np.array([sheet.squared_mahalanobis_distance(record) for record in together]).reshape(made.shape[:2])
+    return distance > stats.chi2(3 - len(missing)).isf(FALSE_ALARM)
 
 
 @pytest.mark.parametrize(
@@ -72,12 +72,14 @@ def test_it_is_mahalanobis_distance(name):
         for i in range(6):
             off, rows = readings[i, there] - mean[3 * i + there], 3 * i + there
             expected.append(off @ np.linalg.solve(covariance[np.ix_(rows, rows)], off))
-        np.testing.assert_allclose(sheet.surprise(seen), expected, rtol=1e-12)
+        np.testing.assert_allclose(sheet.squared_mahalanobis_distance(seen), expected, rtol=1e-12)
 
 
-def test_loads_beyond_all_bounds_surprise():
+def test_loads_beyond_all_bounds_are_far():
     for sheet in (CELL, cell(degrees_of_freedom=3.0), cell(drift=WALK), cell(correlation=SHARED)):
-        assert (sheet.surprise([[1e30, 0.0, 0.0], [0.0, -1e200, 0.0], [1e200, 1e200, -1e200]]) > 100.0).all()
+        assert (
+            sheet.squared_mahalanobis_distance([[1e30, 0.0, 0.0], [0.0, -1e200, 0.0], [1e200, 1e200, -1e200]]) > 100.0
+        ).all()
 
 
 # --- Loaded samples of a record ---------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from hypothesis import given
 
 from helpers.record_tables import refused
 from tactile_bayes.record import make_record, read_record, write_record
-from tactile_bayes.record.stroke import split_at_turns, turning_points
+from tactile_bayes.record.sweep_segments import split_at_turns, turning_points
 from tactile_bayes.record.table import Source, Table
 
 
@@ -37,19 +37,19 @@ UP, DOWN = np.linspace(1.0, 2.0, 101), np.linspace(2.0, 1.0, 101)
         ([UP[:2], DOWN[:0]], [0], "f"),
     ],
 )
-def test_strokes_without_noise(parts, starts, directions):
+def test_segments_without_noise(parts, starts, directions):
     assert split(np.concatenate(parts)) == (starts, directions)
 
 
 @given(st.integers(0, 2**32), st.floats(0.0, 0.02), st.integers(1, 7), st.booleans())
-def test_encoder_noise_makes_no_strokes(seed, noise, strokes, downwards):
+def test_encoder_noise_makes_no_segments(seed, noise, segments, downwards):
     # Noise is uniform within ±0.02 of the range at most, so it cannot come back by a tenth, whatever the seed; an
     # extreme lies where the angle is within 0.04 of the end, that is within 4 samples of the turn.
-    angle = np.concatenate([DOWN[k > 0 :] if (k + downwards) % 2 else UP[k > 0 :] for k in range(strokes)])
+    angle = np.concatenate([DOWN[k > 0 :] if (k + downwards) % 2 else UP[k > 0 :] for k in range(segments)])
     noisy = angle + np.random.default_rng(seed).uniform(-noise, noise, angle.size)
     starts, directions = split(noisy)
-    assert directions == ("bf" * 4 if downwards else "fb" * 4)[:strokes]
-    assert np.abs(np.array(starts) - [0, *(101 + 100 * k for k in range(strokes - 1))]).max() <= 4
+    assert directions == ("bf" * 4 if downwards else "fb" * 4)[:segments]
+    assert np.abs(np.array(starts) - [0, *(101 + 100 * k for k in range(segments - 1))]).max() <= 4
 
 
 @given(st.lists(st.integers(-20, 20), min_size=1, max_size=700), st.integers(0, 25))

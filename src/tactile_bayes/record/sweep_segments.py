@@ -1,4 +1,4 @@
-"""The strokes of a drive: where it turns back, and which way it goes in between."""
+"""Sweep segments: the turning points of a drive, and its direction between them."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from tactile_bayes.record.table import Source, Table
 __all__ = ["split_at_turns", "turning_points"]
 
 _WIDEST = 0.5
-"""Neighbouring samples of a sweep are closer than this [rad]."""
+"""Largest distance of neighbouring samples of a sweep [rad]."""
 
 SHARE = 0.1
-"""A drive turns where it comes back by more than this share of its whole range."""
+"""Least return of the drive angle after a turning point, as a share of its whole range."""
 
 
 def turning_points(angle: NDArray[np.float64], least: float) -> list[int]:
-    """The extremes of an angle that it leaves again by more than a threshold, minima and maxima in turn.
+    """Find the extremes of an angle after which it returns by more than a threshold, minima and maxima alternating.
 
-    Noise of an encoder makes no turning point as long as the angle does not come back by the threshold.
+    Noise of an encoder below the threshold causes no turning point.
 
     Parameters
     ----------
     angle : array of float, shape (n_samples,)
         Drive angles in the order of measurement [rad].
     least : float
-        The threshold [rad].
+        Threshold [rad].
 
     Returns
     -------
     list of int
-        Samples, in ascending order.
+        Indices of samples, in ascending order.
 
     Examples
     --------
@@ -55,24 +55,24 @@ def turning_points(angle: NDArray[np.float64], least: float) -> list[int]:
 
 
 def split_at_turns(table: Table) -> Table:
-    """The table with sweeps and directions from its drive angle.
+    """Add sweeps and directions to a table, from its drive angle.
 
-    A sweep ends where the drive turns, that is where the angle comes back from an extreme by more than a tenth of its
-    whole range, and where the pivot moves. An angle that is back within one sample was reset: the sweeps before and
-    after it have one direction. The direction of a sweep is that of the straight line through its angles.
+    A sweep ends where the drive turns, that is where the angle returns from an extreme by more than a tenth of its
+    whole range, and where the pivot moves. An angle that returns within one sample was reset: the sweeps before and
+    after it have the same direction. The direction of a sweep is that of a straight line fitted to its angles.
 
     Raises
     ------
     RecordError
-        If the table has sweeps or directions already; if it has no samples, or an angle that does not move or that
-        begins anew after a turn.
+        If the table has sweeps or directions already; if it has no samples, or an angle that does not change or that
+        jumps by a turn.
     """
     source = table.source
     table.refuse_empty()
     for name in ("sweep", "direction"):
         if name in table.columns:
             raise source.column_error(name, "is there already: do without split_sweeps, or remove the column")
-    if "drive_angle" not in table.columns:  # which is refused with what else is missing
+    if "drive_angle" not in table.columns:  # refused later, with other missing columns
         return table
     angle = parsed_column("drive_angle", table.columns["drive_angle"][0], source)
     bad = ~np.isfinite(angle)
@@ -116,10 +116,10 @@ def split_at_turns(table: Table) -> Table:
 def _refuse_wrapped(angle: NDArray[np.float64], moved: NDArray[np.bool_], source: Source) -> None:
     """Refuse an angle that jumps by about a turn between two samples.
 
-    That is an angle modulo a turn, or a drive that was reset after a stroke of a whole turn, which makes a sweep more.
-    Only who measured knows which, so it is not unwrapped here.
+    It is an angle modulo a turn, or a drive that was reset after a sweep of a whole turn, which begins a new sweep.
+    Only the user knows which, so that the angle is not unwrapped here.
     """
-    if np.abs(angle).max() > 2.0 * math.pi:  # which are degrees, and refused as such
+    if np.abs(angle).max() > 2.0 * math.pi:  # probably degrees, which are refused later
         return
     step = np.diff(angle)
     wrapped = (np.abs(np.abs(step) - 2.0 * math.pi) < _WIDEST) & ~moved[1:]
@@ -134,7 +134,7 @@ def _refuse_wrapped(angle: NDArray[np.float64], moved: NDArray[np.bool_], source
 
 
 def _left_extreme(angle: NDArray[np.float64], begin: int, sense: int, least: float) -> tuple[int, int] | None:
-    """The first maximum (sense 1) or minimum (−1) that the angle leaves by more than a threshold, and where it has."""
+    """First maximum (sense 1) or minimum (−1) after which the angle returns by a threshold, and the sample of that."""
     top, place = -np.inf, begin
     size = 256
     while begin < angle.size:
@@ -152,5 +152,5 @@ def _left_extreme(angle: NDArray[np.float64], begin: int, sense: int, least: flo
 
 
 def _trend(angle: NDArray[np.float64]) -> float:
-    """The slope of the straight line through a sequence, times something positive."""
+    """Slope of a straight line fitted to a sequence, times a positive factor."""
     return float(np.einsum("i,i->", np.arange(angle.size) - (angle.size - 1) / 2, angle - angle[0]))

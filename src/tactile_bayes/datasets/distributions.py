@@ -1,4 +1,4 @@
-"""Laws: how a number differs from record to record of a data set."""
+"""Distributions of the numbers that differ from record to record of a data set."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number
 from tactile_bayes.errors import SpecificationError
 
-__all__ = ["Law", "law_of"]
+__all__ = ["Distribution", "distribution_of"]
 
 
 class _Kind(NamedTuple):
-    """A law of two numbers."""
+    """A distribution with two parameters."""
 
     is_possible: Callable[[float, float], bool]
     rule: str
-    """What they must be."""
-    words: str
+    """Rule for the two numbers, for messages."""
+    text: str
     at: Callable[[float, float, Floats], Any]
-    """The numbers at shares of the probability."""
+    """Quantile function."""
 
 
 _KINDS = {
@@ -58,24 +58,24 @@ _KINDS = {
 
 
 @dataclass(frozen=True)
-class Law:
-    """A number for each record: always the same, drawn, or one after the other of a list.
+class Distribution:
+    """A number for each record: constant, drawn, or from a list in turn.
 
     Parameters
     ----------
     kind : {"constant", "uniform", "log_uniform", "normal", "log_normal", "choice", "each"}
-        Constant: the number. Uniform and log_uniform: between two. Normal: mean and standard deviation; log_normal:
-        median, and standard deviation of the natural logarithm. Choice: one of a list, each as likely. Each: the
-        list's numbers in turn, every one together with every one of the specification's other lists, but for those on
-        the same axis, which advance in step.
+        Constant: the number. Uniform and log_uniform: the two limits. Normal: mean and standard deviation; log_normal:
+        median, and standard deviation of the natural logarithm. Choice: one of a list with equal probabilities. Each:
+        the numbers of the list in turn, in all combinations with the specification's other lists, except those on the
+        same axis, which advance in step.
     numbers : tuple of float
-        What the kind wants.
+        Parameters of the kind.
     """
 
     kind: str
     numbers: tuple[float, ...]
     axis: str | None = None
-    """Of lists only."""
+    """Axis of a list."""
 
     @property
     def is_drawn(self) -> bool:
@@ -83,23 +83,23 @@ class Law:
 
     @property
     def least(self) -> float:
-        """The least number that it may give; the median of a log_normal one, which is positive throughout."""
+        """Least possible number; for log_normal, which is always positive, the median."""
         if self.kind == "normal" and self.numbers[1]:
             return -math.inf
         return self.numbers[0] if self.kind in ("normal", "log_normal") else min(self.numbers)
 
     @property
-    def words(self) -> str:
-        """For people."""
+    def text(self) -> str:
+        """Description of the distribution."""
         numbers = [f"{number:g}" for number in self.numbers]
         if self.kind == "choice":
             return f"one of {', '.join(numbers)}"
         if self.kind == "each":
             return f"each of {', '.join(numbers)}" + (f", on the axis {self.axis}" if self.axis else "")
-        return _KINDS[self.kind].words.format(*numbers) if self.kind in _KINDS else numbers[0]
+        return _KINDS[self.kind].text.format(*numbers) if self.kind in _KINDS else numbers[0]
 
     def at(self, share: Floats, turn: NDArray[np.intp]) -> Floats:
-        """The numbers at shares of the probability, in [0, 1), of records whose turn in the list is given."""
+        """Return the quantiles at probabilities in [0, 1), for records with given positions in the list."""
         if self.kind == "choice":
             return np.array(self.numbers)[(share * len(self.numbers)).astype(np.intp)]
         if self.kind == "each":
@@ -110,23 +110,23 @@ class Law:
         return np.asarray(_KINDS[self.kind].at(first, second, share))
 
 
-def law_of(value: Any, key: str) -> Law:
-    """The law that a value of a specification states; `key` names it in refusals.
+def distribution_of(value: Any, key: str) -> Distribution:
+    """Parse the distribution that a value of a specification states; messages name it by `key`.
 
     Raises
     ------
     SpecificationError
-        If it states none.
+        If the value is not a distribution.
 
     Examples
     --------
-    >>> law_of({"uniform": [0.3, 0.8]}, "contours[0].q").at(np.array([0.0, 0.5]), np.zeros(2, dtype=int))
+    >>> distribution_of({"uniform": [0.3, 0.8]}, "contours[0].q").at(np.array([0.0, 0.5]), np.zeros(2, dtype=int))
     array([0.3 , 0.55])
     """
     if _is_number(value):
-        return Law("constant", (float(value),))
+        return Distribution("constant", (float(value),))
     kinds = (*_KINDS, "choice", "each")
-    hint = f"give a number, or a law such as {{ uniform = [0.3, 0.8] }} (laws: {', '.join(kinds)})"
+    hint = f"give a number, or a distribution such as {{ uniform = [0.3, 0.8] }} (distributions: {', '.join(kinds)})"
     axis = None
     if isinstance(value, dict) and "each" in value and "axis" in value:
         value = dict(value)
@@ -137,14 +137,14 @@ def law_of(value: Any, key: str) -> Law:
         raise SpecificationError(f"{key} is {value!r}: {hint}")
     ((kind, numbers),) = value.items()
     if kind not in kinds:
-        raise SpecificationError(f"{key} has the law {kind!r}, which there is not: {hint}")
+        raise SpecificationError(f"{key} has the distribution {kind!r}, which is unknown: {hint}")
     if not isinstance(numbers, list) or not numbers or not all(map(_is_number, numbers)):
         raise SpecificationError(f"{key}.{kind} is {numbers!r}: give a list of finite numbers")
     if kind in _KINDS and len(numbers) != 2:
         raise SpecificationError(f"{key}.{kind} has {len(numbers)} numbers: give two")
     if kind in _KINDS and not _KINDS[kind].is_possible(*numbers):
         raise SpecificationError(f"{key}.{kind} is {numbers!r}: {_KINDS[kind].rule}")
-    return Law(kind, tuple(float(number) for number in numbers), axis)
+    return Distribution(kind, tuple(float(number) for number in numbers), axis)
 
 
 def _is_number(value: Any) -> bool:
@@ -153,5 +153,5 @@ def _is_number(value: Any) -> bool:
 
 
 def _open(share: Floats) -> Floats:
-    """Shares away from 0, where a normal number would be infinite."""
+    """Bound probabilities away from 0, where a normal quantile would be infinite."""
     return np.maximum(share, 2.0**-54)

@@ -1,0 +1,167 @@
+"""The results store: outcomes of finished tasks in a file that is always complete."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from tactile_bayes.errors import TactileBayesError
+from tactile_bayes.tasks.files import alone_in, write_atomically
+from tactile_bayes.tasks.workers import run_tasks
+
+__all__ = ["Kind", "ResultsStore", "TaskProgress", "keep_outcomes", "open_results_store"]
+
+Task = TypeVar("Task")
+Outcome = TypeVar("Outcome")
+
+_FORMAT = 1
+
+_WRITING_SHARE = 0.05
+"""Share of the time that is spent on writing outcomes."""
+
+
+class Kind(NamedTuple):
+    """Kind of the outcomes in a results store."""
+
+    what: str
+    """Name of the outcomes, and of the file."""
+    error: type[TactileBayesError]
+    encode: Callable[[Any], dict[str, Any]]
+    """Maps an outcome to JSON values without NaN."""
+    decode: Callable[[dict[str, Any]], Any]
+    """Inverse of `encode`; raises KeyError, TypeError, ValueError or AttributeError."""
+
+    @property
+    def file(self) -> str:
+        return f"{self.what}.json"
+
+
+class TaskProgress(NamedTuple):
+    """Progress of many tasks."""
+
+    done: int
+    wanted: int
+    made: int
+    """Number of tasks done in this run."""
+    seconds: float
+    """Time since the beginning of this run [s]."""
+
+
+class ResultsStore(Generic[Outcome]):
+    """Outcomes by number, in a file; without a folder they stay in memory."""
+
+    def __init__(self, identity: Mapping[str, str], folder: Path | None, kind: Kind) -> None:
+        self._identity = dict(identity)
+        self._kind = kind
+        self._file = None if folder is None else folder / kind.file
+        self.outcomes: dict[int, Outcome] = {}
+        if self._file is not None and self._file.exists():
+            self.outcomes = _read(self._file, self._identity, kind)
+
+    def write(self) -> None:
+        """Write all outcomes, if there is a folder."""
+        if self._file is None:
+            return
+        rows = [{"number": number, **self._kind.encode(outcome)} for number, outcome in sorted(self.outcomes.items())]
+        table = {"format": _FORMAT, "experiment": self._identity, self._kind.what: rows}
+        with write_atomically(self._file) as temporary:
+            temporary.write_text(json.dumps(table, ensure_ascii=False, allow_nan=False), encoding="utf-8")
+
+
+@contextmanager
+def open_results_store(identity: Mapping[str, str], folder: Path | None, kind: Kind) -> Iterator[ResultsStore[Any]]:
+    """Open the results store in a folder, which is created if it does not exist; write it at the end of the block.
+
+    Parameters
+    ----------
+    identity : mapping of str to str
+        Description of all that the outcomes depend on.
+    folder : Path, optional
+        By default outcomes stay in memory.
+    kind : Kind
+        Its error is raised if the folder holds results of another experiment, or a file that cannot be read, or if
+        another run uses it.
+    """
+    if folder is None:
+        yield ResultsStore(identity, None, kind)
+        return
+    if folder.exists() and not folder.is_dir():
+        raise kind.error(f"{folder} is a file: give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    with alone_in(folder, kind.error):
+        store: ResultsStore[Any] = ResultsStore(identity, folder, kind)
+        try:
+            yield store
+        finally:
+            store.write()
+
+
+def keep_outcomes(
+    store: ResultsStore[Outcome],
+    function: Callable[[tuple[Task, int]], Outcome],
+    task: Task,
+    count: int,
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    progress: Callable[[TaskProgress], object] | None,
+) -> dict[int, Outcome]:
+    """Return the outcomes of a task for the numbers from 0 to `count` − 1, and compute those not in the store.
+
+    Parameters
+    ----------
+    store : ResultsStore
+    function : callable
+        Function of (task, number); a function of a module, not a local one.
+    task
+    count : int
+        Number of outcomes.
+    workers, scheduler
+        As in `run_tasks`.
+    progress : callable, optional
+        Called with a `TaskProgress` after each outcome.
+    """
+    began = time.monotonic()
+    kept = {number: outcome for number, outcome in store.outcomes.items() if number < count}
+    tasks = [(task, number) for number in range(count) if number not in kept]
+    next_write, done = began, len(kept)
+    with closing(run_tasks(function, tasks, workers=workers, scheduler=scheduler)) as results:
+        for made, ((_, number), outcome) in enumerate(results, start=1):
+            store.outcomes[number] = kept[number] = outcome
+            if (now := time.monotonic()) >= next_write:
+                store.write()
+                next_write = time.monotonic() + (time.monotonic() - now) / _WRITING_SHARE
+            if progress is not None:
+                progress(TaskProgress(done + made, count, made, time.monotonic() - began))
+    return kept
+
+
+def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]:
+    correction = f"give another folder, or remove {file.name} from it to begin anew"
+    try:
+        table = json.loads(file.read_text(encoding="utf-8"))
+        if table["format"] != _FORMAT:
+            raise kind.error(f"{file} has format {table['format']}, this version reads {_FORMAT}: {correction}")
+        there = dict(table["experiment"])
+        outcomes = {int(row["number"]): kind.decode(row) for row in table[kind.what]}
+    except TactileBayesError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise kind.error(f"{file} holds no {kind.what} that can be read ({error}): {correction}") from error
+    differ = [name for name in {**there, **identity} if there.get(name) != identity.get(name)]
+    if outcomes and differ:
+        named = ", ".join(
+            f"{name} is {_short(there.get(name))} there and {_short(identity.get(name))} here" for name in differ[:3]
+        )
+        more = f" and {len(differ) - 3} more" if len(differ) > 3 else ""
+        raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {named}{more}; {correction}")
+    return outcomes
+
+
+def _short(value: Any) -> str:
+    text = "left out" if value is None else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"
