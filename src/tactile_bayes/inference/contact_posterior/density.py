@@ -52,6 +52,11 @@ class ContactDensity:
         Friction angle [rad].
     prior : "flat", "polar" or callable
         Prior of contact point and slope angle; see `infer_contacts`.
+
+    Raises
+    ------
+    ParameterError
+        If the prior is none of these, or a function returns no log-density.
     """
 
     def __init__(

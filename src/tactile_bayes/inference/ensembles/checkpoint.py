@@ -181,7 +181,13 @@ def _name(begin: int, end: int) -> str:
 def open_checkpoint(
     path: str | os.PathLike[str], identity: Mapping[str, str], shape: tuple[int, int, int]
 ) -> Iterator[Checkpoint]:
-    """Open the checkpoint in a folder, created if missing, and lock it for this run."""
+    """Open the checkpoint in a folder, created if missing, and lock it for this run.
+
+    Raises
+    ------
+    InferenceError
+        If the path is a file, or the folder is in use, damaged, of another run, or holds other files.
+    """
     folder = Path(path).resolve()
     if folder.exists() and not folder.is_dir():
         raise InferenceError(f"{folder} is a file: give a folder as checkpoint")

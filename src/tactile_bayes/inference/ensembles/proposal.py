@@ -232,6 +232,7 @@ def approximate(
 ) -> Proposal:
     """Approximate a target by rounds of adaptive importance sampling, from a guess at mean and covariance.
 
+    The mean has shape (parameters,), the covariance (parameters, parameters), in the parameters' own units.
     The proposal of a round is fitted to the draws of the round before, weighted by the target; the most efficient round
     gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
     10.1198/106186004X12803). After the deadline there is no further round.
@@ -261,7 +262,7 @@ def approximate(
 
 
 def flattened(surplus: Floats, least: float) -> Floats:
-    """Return weights from their logarithms, made more equal until their effective number is at least `least`."""
+    """Return weights from their logarithms, shape (n,), made more equal until `least` of them are effective."""
     power = 1.0
     while effective(weights := normalised(power * surplus)) < least:
         power *= 0.8
@@ -269,6 +270,7 @@ def flattened(surplus: Floats, least: float) -> Floats:
 
 
 def normalised(surplus: Floats) -> Floats:
+    """Return weights of sum one from their logarithms, shape (n,)."""
     with np.errstate(invalid="ignore"):  # −inf less the largest remains −inf
         weights = np.exp(surplus - surplus.max())
     return np.asarray(weights / weights.sum())
@@ -286,6 +288,7 @@ def _whole(above: float, variance: float) -> tuple[float, float]:
 
 
 def effective(weights: Floats) -> float:
+    """Return the effective number of weights of sum one, shape (n,)."""
     return float(1.0 / np.sum(weights**2))
 
 

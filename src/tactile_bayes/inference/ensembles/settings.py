@@ -95,12 +95,13 @@ class SamplerSettings:
 
 
 def settings_of(settings: SamplerSettings | None) -> SamplerSettings:
-    """Return the given settings, or the default ones."""
+    """Return the given settings, or the default ones; refuse other objects."""
     check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
     return SamplerSettings() if settings is None else settings
 
 
 def refuse_few_walkers(walkers: int, parameters: int) -> None:
+    """Refuse fewer than two walkers per parameter."""
     if walkers < 2 * parameters:
         raise ParameterError(
             f"{walkers} walkers for {parameters} parameters: give at least {2 * parameters}, or the proposals of half "

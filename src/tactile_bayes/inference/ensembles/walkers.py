@@ -55,7 +55,7 @@ def first_random_state(seed: np.random.SeedSequence) -> RandomState:
 
 
 def seed_sequence(seed: Seed) -> np.random.SeedSequence:
-    """Return the seed as a sequence that has not spawned any."""
+    """Return the seed as a sequence that has not spawned any; refuse other objects."""
     if isinstance(seed, np.random.SeedSequence):
         return np.random.SeedSequence(seed.entropy, spawn_key=seed.spawn_key, pool_size=seed.pool_size)
     return np.random.SeedSequence(check_seed(seed, "give a whole number from 0 up, or a numpy.random.SeedSequence"))
@@ -67,6 +67,15 @@ def spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:
 
 
 def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:
+    """Return starting points, shape (ensembles, walkers, parameters), and refuse unsuitable ones.
+
+    Raises
+    ------
+    ParameterError
+        If the shape does not agree with names and settings, or there are too few walkers.
+    InferenceError
+        If a number is not finite, or the walkers of an ensemble lie in a plane.
+    """
     points = np.array(start, dtype=float)
     if points.ndim != 3 or points.shape[0] != settings.ensembles or points.shape[2] != len(names):
         raise ParameterError(
