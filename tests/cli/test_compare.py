@@ -215,6 +215,6 @@ def test_control_c_while_sampling_ends_all_of_it(record, tmp_path):
         process.send_signal(signal.SIGINT)
         out, errors = process.communicate(timeout=300)
     assert process.returncode == 130
-    assert errors == "tactile-bayes: interrupted while sampling shape-free: nothing comes of it\n"
+    assert errors == "tactile-bayes: interrupted while sampling shape-free: there is no result\n"
     assert set(out.splitlines()) <= {"sampling"}
     assert list((tmp_path / "run").iterdir()) == []

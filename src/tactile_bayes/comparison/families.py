@@ -152,9 +152,10 @@ def compare_families(
 
     Notes
     -----
-    So that no family is favoured by its prior, sizes have priors under which the expected mean curvature of a flank is
-    the same in all families (`matched_priors`); everything else has the defaults of `infer_contour`. The evidence is
-    that of contours within reach, computed by bridge sampling (Meng & Wong 1996) from the posterior's draws.
+    So that no family is favoured by its prior, sizes have priors under which the geometric mean radius of curvature of
+    a flank has the same median and spread in all families (`matched_priors`); everything else has the defaults of
+    `infer_contour`. The evidence is that of contours within reach, computed by bridge sampling (Meng & Wong 1996) from
+    the posterior's draws.
 
     Leave-one-out leaves out a sample with its three channels. If a load cell drifts or has an unknown bias, a sample's
     density is conditional on all other samples. Samples next to first contact and snap-off are predicted from a
