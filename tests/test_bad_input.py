@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from helpers.refusals import refused
 from tactile_bayes.cli import app
-from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw, paper_profile
-from tactile_bayes.errors import ContourError, ParameterError, ReachError, RecordError
+from tactile_bayes.contours import Ellipse, Parabola
+from tactile_bayes.errors import ContourError, ReachError, RecordError
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import present_channels, read_record, write_record
 from tactile_bayes.sweep import scan
@@ -129,7 +130,7 @@ def test_semicolons_and_decimal_commas_are_read_but_not_commas_for_both(table, t
     path.write_text("\n".join([*header, ",".join(NAMES), *map(",".join, rows)]), encoding="utf-8")
     assert record.identical(read_record(path))
     path.write_text("\n".join([*header, ",".join(NAMES), *(",".join(cells).replace(".", ",") for cells in rows)]))
-    with pytest.raises(RecordError, match=f"line {FIRST_ROW}: there are 1[0-9] cells in 8 columns .*with a point in"):
+    with refused(RecordError, f"line {FIRST_ROW}", "8 columns"):
         read_record(path)
 
 
@@ -162,84 +163,40 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
     assert "No contact points: Step 2 needs all three load channels." in result.stdout
 
 
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: Rod(True, 1.0), "the rod's length is True: give a positive number [m]"),
-        (lambda: Rod(1.0, True), "the rod's flexural_rigidity is True: give a positive number [N m²]"),
-        (lambda: Rod(1.0, 1.0, False), "the rod's diameter is False: give zero or a positive number [m]"),
-        (lambda: Rod(elastic_strain=True), "the rod's elastic strain is True: give a positive number, or none"),
-    ],
-)
-def test_true_is_no_number_of_a_rod(build, message):
-    with pytest.raises(ParameterError, match=re.escape(message)):
-        build()
-
-
 # --- Contours -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("contour", "base", "rod", "message"),
+    ("contour", "base", "rod", "named"),
     [
-        (
-            Parabola(0.5, 1.25),
-            (0.0, 0.0),
-            None,
-            "the contour is out of reach: its nearest point is 1.25 from the pivot at (0, 0), and the rod is 1 long",
-        ),
-        (
-            Parabola(2.5, 0.5),
-            (0.0, 0.1),
-            Rod(0.2, 2.4e-3),
-            "the contour is out of reach: its nearest point is 0.4 from the pivot at (0, 0.1), and the rod is 0.2 long",
-        ),
+        (Parabola(0.5, 1.25), (0.0, 0.0), None, ["1.25 from the pivot", "(0, 0)", "1 long"]),
+        (Parabola(2.5, 0.5), (0.0, 0.1), Rod(0.2, 2.4e-3), ["0.4 from the pivot", "(0, 0.1)", "0.2 long"]),
     ],
 )
-def test_a_contour_out_of_reach_says_how_far_and_how_long(contour, base, rod, message):
-    with pytest.raises(ReachError, match=re.escape(message)):
+def test_a_contour_out_of_reach_says_how_far_and_how_long(contour, base, rod, named):
+    with refused(ReachError, "out of reach", *named):
         scan(contour, base=base, rod=rod)
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_a_contour_that_is_hardly_touched_is_refused(direction):
-    with pytest.raises(ReachError, match="rounding hides where contact ends"):
+    with refused(ReachError, "rounding"):
         scan(Ellipse(0.25, 8e5, 1.0 - 2e-11), direction=direction, friction=0.3)
 
 
 def test_a_contour_at_the_end_of_reach_but_for_rounding_is_out_of_it():
-    with pytest.raises(ReachError, match="out of reach"):
+    with refused(ReachError, "out of reach"):
         scan(Parabola(2.0, np.nextafter(1.0, 0.0)))
 
 
 @pytest.mark.parametrize(
-    ("q", "base", "message"),
+    ("q", "base", "named"),
     [
-        (
-            -0.2,
-            (0.0, 0.0),
-            "the contour cuts the base: at x = 0 it is at y = -0.2, not above the pivot at y = 0; raise",
-        ),
-        (0.3, (1.0, 1.0), "the contour cuts the base: at x = 1 it is at y = 0.8, not above the pivot at y = 1; raise"),
-        (0.0, (0.0, 0.0), "the contour cuts the base: at x = 0 it is at y = 0, not above the pivot at y = 0; raise"),
+        (-0.2, (0.0, 0.0), ["x = 0", "y = -0.2", "y = 0"]),
+        (0.3, (1.0, 1.0), ["x = 1", "y = 0.8", "y = 1"]),
+        (0.0, (0.0, 0.0), ["x = 0", "y = 0"]),
     ],
 )
-def test_a_contour_that_cuts_the_base_is_refused(q, base, message):
-    with pytest.raises(ContourError, match=re.escape(message)):
+def test_a_contour_that_cuts_the_base_is_refused(q, base, named):
+    with refused(ContourError, "base", *named):
         scan(Parabola(0.5, q), base=base)
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: Parabola(-0.5, 0.5), "Parabola: a must be positive, else the object is not strictly convex; found a"),
-        (lambda: Parabola(0.0, 0.5), "Parabola: a must be positive, else the object is not strictly convex; found a"),
-        (lambda: Parabola(0.5, np.nan), "Parabola: q and x_c must be finite; found q = nan"),
-        (lambda: Circle(-1.0, 0.5), "r must be positive"),
-        (lambda: PowerLaw(1.0, 1.0, 0.5), "n"),
-        (lambda: paper_profile("V", q=0.3), "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
-    ],
-)
-def test_what_is_not_strictly_convex_is_refused(build, message):
-    with pytest.raises(ContourError, match=re.escape(message)):
-        build()

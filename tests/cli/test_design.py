@@ -57,7 +57,7 @@ def test_json_for_scripts(tmp_path):
         (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
         (["--family", "square"], "there is no family 'square'"),
         (["nowhere.nc"], "there is no file nowhere.nc"),
-        (["nowhere"], "there is no folder nowhere: give the folder that `tactile-bayes infer RECORD --out FOLDER` has"),
+        (["nowhere"], "there is no folder nowhere"),
         (["."], ". holds no posterior.nc"),
     ],
 )

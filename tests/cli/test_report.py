@@ -76,9 +76,9 @@ def test_json_for_scripts(folder, tmp_path, monkeypatch):
 
 def test_what_is_wrong_is_said_in_a_line(folder, tmp_path):
     for arguments, message in (
-        ([tmp_path / "nowhere"], f"there is no folder {tmp_path / 'nowhere'}: give the folder that"),
-        ([tmp_path], f"{tmp_path} holds no posterior.nc: give the folder that"),
-        ([folder, "--compare", tmp_path], f"{tmp_path} holds no comparison.nc: give --compare the folder that"),
+        ([tmp_path / "nowhere"], f"there is no folder {tmp_path / 'nowhere'}"),
+        ([tmp_path], f"{tmp_path} holds no posterior.nc"),
+        ([folder, "--compare", tmp_path], f"{tmp_path} holds no comparison.nc"),
         ([folder, "--out", tmp_path / "no" / "page.html"], f"{tmp_path / 'no'}: No such file or directory"),
     ):
         result = call(*arguments)

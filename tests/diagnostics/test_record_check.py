@@ -8,6 +8,7 @@ import xarray as xr
 from scipy import stats
 
 from helpers.predicted_records import CELL, ideal, predicted, with_readings
+from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -121,9 +122,9 @@ def test_a_channel_that_was_not_measured_is_left_out():
 
 def test_few_predictions_say_so_or_bound_the_false_alarms():
     assert check_record(predicted(chains=1, draws=199)).attrs["false_alarm"] == 1.0 / 200.0
-    with pytest.raises(InferenceError, match="holds 20 predictions of the record, too few to compare it with"):
+    with refused(InferenceError, "20 predictions"):
         check_record(predicted(chains=1, draws=20))
-    with pytest.raises(ParameterError, match=r"false_alarm is 1\.0: give a probability between 0 and 1"):
+    with refused(ParameterError, false_alarm=1.0):
         check_record(predicted(chains=1, draws=100), false_alarm=1.0)
 
 
