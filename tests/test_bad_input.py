@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from helpers import commands
 from helpers.refusals import refused
-from tactile_bayes.cli import app
 from tactile_bayes.contours import Ellipse, Parabola
 from tactile_bayes.errors import ContourError, ReachError, RecordError
 from tactile_bayes.mechanics.rod import Rod
@@ -56,66 +54,58 @@ FIRST_ROW = 9
 MISTAKES = {
     "a missing column": (
         lambda rows: (NAMES[:-1], without_last(rows)),
-        "there is no column 'force_y' (columns: sweep, direction, base_x, base_y, drive_angle, holding_moment, "
-        "force_x): add it, or say what stands for it, columns={'force_y': 'NAME[UNIT]'}, on the command line --column "
-        "'force_y=NAME[UNIT]', or declare the channel missing, with an empty column or missing=('force_y',), on the "
-        "command line --missing force_y",
+        ["column 'force_y'", "columns={'force_y': 'NAME[UNIT]'}", "--column 'force_y=NAME[UNIT]'", "--missing force_y"],
     ),
     "a misspelt column": (
         lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
-        "there is no column 'drive_angle', but a column 'drive_angel': did you mean 'drive_angle'? Rename it, or "
-        "say what stands for it, columns={'drive_angle': 'drive_angel'}, on the command line --column "
-        "drive_angle=drive_angel",
+        ["column 'drive_angel'", "columns={'drive_angle': 'drive_angel'}", "--column drive_angle=drive_angel"],
     ),
     "text in a row": (
         lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),
-        f"line {FIRST_ROW + 3}, column 'force_x': 'overload' is not a number: correct it, or remove the row",
+        [f"line {FIRST_ROW + 3}, column 'force_x'", "'overload'"],
     ),
     "NaN in a row": (
         lambda rows: (NAMES, edited(rows, 5, "holding_moment", "nan")),
-        f"line {FIRST_ROW + 5}, column 'holding_moment': the value is missing (nan): give a finite number, remove the "
-        "row, or empty the whole column if the channel is missing",
+        [f"line {FIRST_ROW + 5}, column 'holding_moment'", "nan"],
     ),
     "an empty cell": (
         lambda rows: (NAMES, edited(rows, 5, "drive_angle", "")),
-        f"line {FIRST_ROW + 5}, column 'drive_angle': the value is missing (nan): give a finite number, remove the row",
+        [f"line {FIRST_ROW + 5}, column 'drive_angle'", "missing"],
     ),
     "a row too short": (
         lambda rows: (NAMES, [*rows[:4], rows[4][:-1], *rows[5:]]),
-        f"line {FIRST_ROW + 4}: there are 7 cells in 8 columns ({', '.join(NAMES)}): write one per column, with a "
-        "point in decimals",
+        [f"line {FIRST_ROW + 4}", "7 cells", "8 columns", ", ".join(NAMES)],
     ),
     "angles in degrees": (
         lambda rows: (NAMES, mapped(rows, "drive_angle", lambda cell: f"{math.degrees(float(cell)):.4f}")),
-        "is more than a turn (2π), so the angles look like degrees: convert the column to radians, with numpy.radians "
-        "or times 0.017453292519943295",
+        ["degrees", "numpy.radians", "0.017453292519943295"],
     ),
     "a decreasing sweep labelled forward": (
         lambda rows: (NAMES, mapped(rows, "direction", lambda cell: "forward")),
-        "sweep 1 is labelled 'forward', but its drive angle decreases, from ",
+        ["sweep 1", "'forward'", "decreases"],
     ),
     "two strokes in one sweep": (
         lambda rows: (NAMES, mapped(rows, "sweep", lambda cell: "0")),
-        f"sweep 0 mixes two values of 'direction', 'forward' (line {FIRST_ROW}) and 'backward' (line ",
+        ["sweep 0", "'direction'", f"'forward' (line {FIRST_ROW})", "'backward' (line"],
     ),
     "no load at all": (
         lambda rows: (NAMES, [[*cells[:5], "", "", ""] for cells in rows]),
-        "every load channel is empty: a record needs measurements of at least one of holding_moment, force_x, force_y",
+        ["holding_moment, force_x, force_y"],
     ),
-    "no samples": (lambda rows: (NAMES, []), "there are no samples: give at least one row below the column names"),
+    "no samples": (lambda rows: (NAMES, []), ["no samples"]),
 }
 
 
-@pytest.mark.parametrize(("mistake", "message"), MISTAKES.values(), ids=MISTAKES)
-def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, message):
+@pytest.mark.parametrize(("mistake", "named"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, named):
     """By the library as an error, by the command as a line on stderr and exit code 2: the same words."""
     header, rows = table
     names, rows = mistake(rows)
     path = written(tmp_path / "record.csv", header, names, rows)
-    with pytest.raises(RecordError, match=re.escape(message)) as caught:
+    with refused(RecordError, *named) as caught:
         read_record(path)
     assert str(caught.value).startswith(f"{path}: ")
-    result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run")])
+    result = commands.call("infer", path, "--out", tmp_path / "run")
     assert (result.exit_code, result.stdout) == (2, "")
     assert result.stderr == f"tactile-bayes: {caught.value}\n"
     assert not (tmp_path / "run").exists()
@@ -136,7 +126,7 @@ def test_semicolons_and_decimal_commas_are_read_but_not_commas_for_both(table, t
 
 def test_si_without_a_rod_says_how_to_state_one(table, tmp_path):
     path = written(tmp_path / "record.csv", ["# units: SI"], NAMES, table[1])
-    result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run")])
+    result = commands.call("infer", path, "--out", tmp_path / "run")
     assert result.exit_code == 2
     assert "the record is SI, but rod_length and rod_flexural_rigidity of its rod are not stated: give " in (
         result.stderr
@@ -156,9 +146,7 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
         path = written(tmp_path / "record.csv", header, NAMES, mapped(rows, "force_y", lambda cell: ""))
         options = []
     assert present_channels(read_record(path, missing=options[1:])) == ("holding_moment", "force_x")
-    result = CliRunner().invoke(
-        app, ["infer", str(path), "--out", str(tmp_path / "run"), "-q", "--as-stated", *options]
-    )
+    result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--as-stated", *options)
     assert result.exit_code == 0, result.output
     assert "No contact points: Step 2 needs all three load channels." in result.stdout
 

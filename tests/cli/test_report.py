@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import json
 import shlex
+from functools import partial
 from typing import get_type_hints
 
 import pytest
-from typer.testing import CliRunner
 
+from helpers import commands
 from helpers.report_pages import Page, analysed_quickly, coarse_record
 from tactile_bayes.cli import report as report_command
-from tactile_bayes.cli.app import app
 from tactile_bayes.cli.command import Output
 from tactile_bayes.record import write_record
 
-
-def call(*arguments):
-    return CliRunner().invoke(app, ["report", *map(str, arguments)])
+call = partial(commands.call, "report")
 
 
 @pytest.mark.usefixtures("quick")
@@ -25,7 +23,7 @@ def test_infer_states_its_file_and_its_words(tmp_path):
     path, out = tmp_path / "my record.csv", tmp_path / "run"
     write_record(coarse_record(), path)
     words = ["infer", str(path), "--as-stated", "--out", str(out), "--quiet"]
-    assert CliRunner().invoke(app, words).exit_code == 0
+    assert commands.call(*words).exit_code == 0
     assert call(out).exit_code == 0
     page = Page((out / "report.html").read_text(encoding="utf-8"))
     assert page.texts["code"][0] == shlex.join(["tactile-bayes", *words])

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
 import tactile_bayes as tb
 import tactile_bayes.planning.error_map as error_map_module
-from tactile_bayes.cli.app import app
+from helpers import commands
 from tactile_bayes.contours import Joined, Parabola
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.planning.amplification import amplification
@@ -26,8 +26,7 @@ pytestmark = pytest.mark.usefixtures("coarse_pictures")
 FIGURES = {"amplification.png", "information.png", "noise_shares.png", "required_noise.png"}
 
 
-def call(*words):
-    return CliRunner().invoke(app, ["sensitivity", *map(str, words)])
+call = partial(commands.call, "sensitivity")
 
 
 @pytest.fixture(scope="module")

@@ -502,7 +502,8 @@ def test_friction_is_either_known_or_inferred():
     measured = coarse()
     assert "friction" in default_priors(measured, load_cell=CELL)
     for known in (0.0, 0.2):
-        result = infer_contour(CELL.measure(measured, seed=1), friction=known, seed=1, settings=FEW)
+        rubbed = CELL.measure(scanned(friction=known), seed=1)
+        result = infer_contour(rubbed, friction=known, seed=1, settings=FEW)
         assert "friction" not in result["posterior"].data_vars
         assert result.attrs["friction"] == known
     with refused(ParameterError, "friction", 0.2):

@@ -49,7 +49,7 @@ def test_variances_are_of_every_channel_and_finite(sheet, has_them):
         *((name, [0.1, (0.1, 0.2), (0.1, 0.2, np.nan), (0.1, 0.2, "3")]) for name in ("bias", "correlation")),
         ("bias_uncertainty", [0.1, None, (0.0, -0.1, 0.0)]),
         ("gain", [1.01, (1.0, 1.0, 1.0), np.eye(2), [[1, 0, 0], [0, 1, 0], 1], np.diag([1.0, 0.0, np.nan])]),
-        ("gain", [((0, 0, 0), (0, 0, 0), (0, 0, 0)), ((1, 0, 0), (0, 1, 1), (0, 1, 1))]),
+        ("gain", [((0.0, 0.0, 0.0),) * 3, ((1.0, 0.0, 0.0), (0.0, 1.0, 1.0), (0.0, 1.0, 1.0))]),
         ("correlation", [(1.0, 0.0, 0.0), (0.9, 0.9, -0.9), (-0.6, -0.6, -0.6), (0.0, 1.5, 0.0)]),
         ("drift", [0.1, "random_walk", RandomWalk, (0.1, 0.1)]),
         ("frame", ["rotating", "", 1, ["fixed"], np.array(["fixed"])]),
@@ -75,14 +75,14 @@ def test_an_impossible_drift_is_refused(law, name):
             law(**{name: value})
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "3"])
+@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, "3"])
 def test_an_impossible_time_is_refused(value):
     with refused(ParameterError, "OrnsteinUhlenbeck", time=value):
         OrnsteinUhlenbeck(moment=0.1, time=value)
 
 
 def test_outliers_that_are_correlated_are_refused():
-    with refused(ParameterError, "degrees_of_freedom", "correlation"):
+    with refused(ParameterError, "degrees_of_freedom", "correlated"):
         LoadCell(degrees_of_freedom=4.0, correlation=(0.0, 0.1, 0.0))
 
 

@@ -6,11 +6,10 @@ import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from helpers import commands
 from helpers.record_tables import WIRE
 from helpers.refusals import refused
-from tactile_bayes.cli import app
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record import read_record, record_hash
 
@@ -40,7 +39,7 @@ def test_decimal_commas_need_no_known_names_to_be_told_from_separators(tmp_path,
     path = tmp_path / "rig.csv"
     lines = ["Zeit;Winkel_grad;Mz_mNm;Fx_mN;Fy_mN", "0,00;74,0000;0,1864;-6,4649;-1,0087"]
     path.write_text("\n".join(lines).replace(";", sign), encoding="utf-8")
-    result = CliRunner().invoke(app, ["inspect", str(path)])
+    result = commands.call("inspect", path)
     message = "there is no column 'sweep' (columns: Zeit, Winkel_grad, Mz_mNm, Fx_mN, Fy_mN)"
     assert (result.exit_code, result.stdout) == (2, "")
     assert message in result.stderr

@@ -360,8 +360,7 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         ),
         (
             ["# units: dimensionless", "# column force_x: number [mN]", HEADER, ROW],
-            "line 2, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]"
-            "or state units 'SI' and the rod",
+            "line 2, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]",
         ),
         (["# units: SI"], "there is no line of column names"),
         ([HEADER], "there are no samples"),
