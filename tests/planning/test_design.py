@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour import infer_contour
@@ -142,8 +143,7 @@ def test_what_cannot_be_reached_tells_nothing(posterior):
 
 
 def test_candidates_that_are_all_out_of_reach_are_refused(posterior):
-    told = r"at x = 0 and y from -3 to -2, does the rod, 1 L long, reach .*: give pivots nearer to it"
-    with pytest.raises(ReachError, match=told):
+    with refused(ReachError, "x = 0", "y from -3 to -2", "1 L"):
         designed(posterior, bases=[(0.0, -2.0), (0.0, -3.0)])
 
 
@@ -168,7 +168,7 @@ def test_it_goes_on_where_it_was_stopped(tmp_path):
     assert found.identical(designed(**asked))
     by_gap = designed(out=tmp_path, criterion="gap", **asked)  # of the same numbers
     assert by_gap.width.identical(found.width)
-    with pytest.raises(StudyError, match=r"candidates of another experiment: what is known .*seed is 1 there and 2"):
+    with refused(StudyError, "another experiment", "seed is 1 there and 2 here"):
         designed(out=tmp_path, **asked, seed=2)
 
 
@@ -214,29 +214,31 @@ def test_weighted_bands():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    "wrong",
     [
-        ({"criterion": "best"}, "criterion is 'best': choose 'band', 'gap' or 'information'"),
-        ({"draws": 1}, "draws is 1: give a whole number from 2 up"),
-        ({"seed": -1}, "seed is -1: give a whole number from 0 up"),
-        ({"probability": 1.0}, "probability is 1.0: give a number between 0 and 1"),
-        ({"drive_steps": [0.0]}, "drive_steps is .*: give positive angles in radians"),
-        ({"drive_steps": []}, "drive_steps is .*: give positive angles in radians"),
-        ({"bases": [(0.0, 0.0), (0.0, 0.0)]}, "bases is .*: one of them is given twice"),
-        ({"bases": [0.0, 1.0]}, "bases is .*: give a list of pivots"),
-        ({"span": (1.0, 0.0)}, "span is .*: give two values of x"),
-        ({"priors": {"b": stats.norm()}}, "there is a prior of b, which is no parameter: there are a, q, x_c"),
+        {"criterion": "best"},
+        {"draws": 1},
+        {"seed": -1},
+        {"probability": 1.0},
+        {"drive_steps": [0.0]},
+        {"drive_steps": []},
+        {"bases": [(0.0, 0.0), (0.0, 0.0)]},
+        {"bases": [0.0, 1.0]},
+        {"span": (1.0, 0.0)},
     ],
+    ids=str,
 )
-def test_what_is_impossible_is_refused(wrong, message):
-    with pytest.raises(ParameterError, match=message):
+def test_what_is_impossible_is_refused(wrong):
+    with refused(ParameterError, **wrong):
         designed(**wrong)
 
 
 def test_what_is_no_knowledge_is_refused(posterior):
-    with pytest.raises(ParameterError, match="a design is for a family with parameters"):
+    with refused(ParameterError, "prior of b", "a, q, x_c"):
+        designed(priors={"b": stats.norm()})
+    with refused(ParameterError, "family"):
         designed("shape-free", priors={})
-    with pytest.raises(ParameterError, match="load_cell and a posterior, which has its own"):
+    with refused(ParameterError, "load_cell", "posterior"):
         designed(posterior, load_cell=CELL)
-    with pytest.raises(InferenceError, match="no posterior of a contour"):
+    with refused(InferenceError, "posterior", "contour"):
         designed(xr.DataTree())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola, paper_profile
@@ -149,5 +150,5 @@ def test_in_doubt_evidence_decides_which_side_it_was():
 
 def test_a_side_that_is_none_is_refused():
     record = scan(Parabola(0.5, 0.5), direction="forward").record
-    with pytest.raises(ParameterError, match="there is no side 'left' of sweep 0"):
+    with refused(ParameterError, "'left'", "sweep 0"):
         with_sides(record, {0: "left"})
