@@ -188,10 +188,10 @@ REFUSED = [
     (contour(q=10**400), ["contours[0].q", 10**400]),
     (contour(q=True), ["contours[0].q is True"]),
     (contour(q={"uniform": [0.3, 0.5], "normal": [0, 1]}), ["contours[0].q is {"]),
-    (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma'"]),
+    (contour(q={"gamma": [1, 2]}), ["contours[0].q has the distribution 'gamma', which is unknown"]),
     (
         contour(q={"uniform, log_uniform": [1, 2]}),
-        ["contours[0].q has the distribution 'uniform, log_uniform'"],
+        ["contours[0].q has the distribution 'uniform, log_uniform', which is unknown"],
     ),
     (contour(q={"uniform": 0.3}), ["contours[0].q.uniform is 0.3"]),
     (contour(q={"choice": []}), ["contours[0].q.choice is []"]),

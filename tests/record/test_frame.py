@@ -204,7 +204,7 @@ def test_words_of_ones_own_are_kept():
 def test_a_frame_that_is_none_is_refused(frame):
     message = (
         f"attribute 'load_cell_frame' is {frame!r}: write 'fixed' for a load cell that measures along the axes of the "
-        "world, or 'turning' for one that turns with the drive"
+        "laboratory, or 'turning' for one that turns with the drive"
     )
     record = make_record(columns()).assign_attrs(load_cell_frame=frame)
     for use in (validate, frame_of, record_hash, lambda record: in_frame(record, "fixed")):

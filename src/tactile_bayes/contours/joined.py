@@ -39,7 +39,7 @@ class Joined(Contour):
     left, right : Contour
         The halves; they meet at the joint.
     x : array_like, optional
-        Position of the joint [length]; by default the point at which both are level.
+        Position of the joint [length]; broadcasts with the halves. By default the point at which both are level.
 
     Raises
     ------

@@ -183,7 +183,7 @@ class _Smoothing(NamedTuple):
     design: Floats
     target: Floats
     rest: float
-    """Residual sum of squares of the unconstrained fit."""
+    """Residual sum of squares of the unpenalised fit."""
     points: int
     roughness: Floats
     """Matrix R with |R c|² = ∫ g⁗² du for coefficients c."""

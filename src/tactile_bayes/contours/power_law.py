@@ -80,7 +80,7 @@ class PowerLaw(Vertexed):
         Parameters
         ----------
         w : array_like
-            Width, > 0 [length].
+            Width, > 0 [length]; broadcasts with the others.
         n, q, x_c : array_like
             As in `PowerLaw`.
 

@@ -440,8 +440,8 @@ class LoadCell(DataSheet):
         Returns
         -------
         array, shape (..., n_samples)
-            Normalised log-densities; 0 where every channel is missing. For dependent samples they do not sum to the
-            log-likelihood.
+            Log-densities in the units of the load cell; 0 where every channel is missing. For dependent samples they do
+            not sum to the log-likelihood.
 
         Raises
         ------
