@@ -36,7 +36,7 @@ believed, and below which it is doubted."""
 
 _UNLIKELY, _IMPOSSIBLE = 3.0, 5.0
 """Standard deviations of a zero of which nothing is known: if the direction is right, and the zero no further off than
-the first, it is doubted at most; what is beyond the second is load and no zero."""
+the first, it is doubted at most; what is beyond the second is load and no zero, unless contact lies between."""
 
 _ZERO = 0.1
 """Standard deviation of a zero of which nothing is known [EI/L]."""
@@ -57,7 +57,8 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     It is the side of the sweep's direction, unless the moment contradicts that, since a drive may also turn back in
     contact: in contact the moment is on the other side of its zero by more than six standard errors. The zero is the
     mean of the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else none within a
-    standard deviation of 0.1 EI/L. As what looks unloaded may be a load that does not change, the moment must also be
+    standard deviation of 0.1 EI/L. A zero beyond five of these is believed only where it stands both before contact and
+    after it: elsewhere it is a load. As what looks unloaded may be a load that does not change, the moment must also be
     on the other side of all zeros within three of these. A record may state the sides of its sweeps (`with_sides`).
 
     Parameters
@@ -155,14 +156,15 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     readings = np.stack([record[name].values for name in present], axis=-1)
     readings /= np.maximum(np.abs(readings).max(axis=0), 1e-100 * unit)  # squares of large ones would overflow
     floor = np.full(len(present), _ROUNDING**2)
-    loaded, unloaded = [], []
+    loaded, unloaded, enclosed = [], [], []
     for rows in parts:
         bounds = contact_bounds(readings[rows], _FALSE_ALARM, floor)
         end = len(rows) - bounds.after
         loaded.append(rows[bounds.before : end] if bounds.found else rows)
         unloaded.append(np.concatenate([rows[: bounds.before], rows[end:]]))
+        enclosed.append(bounds.found and min(bounds.before, bounds.after) >= FEWEST)
     found = []
-    for rows, inside, own in zip(parts, loaded, unloaded, strict=True):
+    for rows, inside, own, is_enclosed in zip(parts, loaded, unloaded, enclosed, strict=True):
         noise = max(rough_noise(moment[rows]), known, _ROUNDING * float(np.abs(moment[rows]).max()), 1e-100 * unit)
         sign = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
 
@@ -175,7 +177,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
         absolute = score(inside, 0.0, unknown)
         zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else np.concatenate(unloaded)]
         zero = float(zeros.mean()) if zeros.size >= FEWEST else np.inf
-        if abs(zero) < _IMPOSSIBLE * unknown:
+        if is_enclosed or abs(zero) < _IMPOSSIBLE * unknown:
             relative = score(inside, zero, noise / np.sqrt(zeros.size))
         else:
             absolute = relative = score(rows, 0.0, unknown)
