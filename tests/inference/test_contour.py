@@ -518,7 +518,7 @@ class Clock:
 def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
     """Past it, only the step that is under way ends, a cloud is found, and walkers start and make one step."""
     clock, drawn = Clock(monkeypatch), []
-    settings = SamplerSettings(ensembles=2, walkers=80, max_seconds=seconds, min_ess=1e9)
+    settings = SamplerSettings(ensembles=2, walkers=90, max_seconds=seconds, min_ess=1e9)
     result = infer_contour(
         measured(), family=family, load_cell=CELL, seed=1, settings=settings, keep=lambda tree: drawn.append(clock.now)
     )

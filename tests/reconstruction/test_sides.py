@@ -74,6 +74,15 @@ def test_a_label_that_the_moment_contradicts_is_not_believed(bias):
     assert not doubtful_sweeps(wrong, CELL)
 
 
+@pytest.mark.parametrize("bias", [-2.0, -0.8, 0.8, 2.0])
+def test_a_zero_before_and_after_contact_is_one_however_far_off(bias):
+    """A load that does not change would not come back to the same level; contact is a third of the record here."""
+    record = scan(paper_profile("II", q=0.8), drive_angles=np.radians(np.arange(-30.0, 210.0, 2.0))).record
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, seed=1)
+    np.testing.assert_array_equal(contact_sides(measured, CELL) > 0.0, measured.direction.values == "forward")
+    assert not doubtful_sweeps(measured, CELL)
+
+
 def test_a_drive_that_turns_back_in_contact_stays_on_its_side():
     """Also where the way back begins with load, and ends without."""
     record = scan(paper_profile("II", q=0.5), direction="forward", drive_step=0.02).record

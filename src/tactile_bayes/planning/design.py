@@ -109,7 +109,9 @@ def design(
         Over "candidate", with base_x, base_y [length] and drive_step [rad]:
 
         width, width_error
-            Mean width of the band over the span that is to be expected [length], and its standard error over draws.
+            Mean width of the band over the span that is to be expected [length], and its standard error over draws. Of
+            objects that the rod does not reach it is the width of what is known, and few of them decide the mean: with
+            more draws, and a look at `reached`, it is told whether they are there.
         gap, gap_error
             Width of what no sweep touches, those so far included, between the outermost contacts [length].
         information, information_error

@@ -94,8 +94,17 @@ def funnel(x):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("steps", [60, 250])
-@pytest.mark.parametrize("log_probability", [banana, uneven, funnel])
+@pytest.mark.parametrize(
+    ("log_probability", "steps"),
+    [
+        (banana, 60),
+        (banana, 250),
+        (uneven, 60),
+        (uneven, 250),
+        (funnel, 60),
+        (funnel, 150),
+    ],  # a funnel is walked through in 250
+)
 def test_a_slow_run_is_not_taken_for_several_modes(log_probability, steps):
     """One mode each, hard to walk through, and ensembles that start as small clusters far from one another."""
     centres = 3.0 * np.random.default_rng(2).normal(size=(4, 1, 6))
