@@ -463,7 +463,7 @@ def test_what_an_experiment_is_follows_from_its_words():
         ({"load_cell": LoadCell()}, "the load cell has no noise, so that there is nothing to be calibrated: give"),
         (
             {"priors": {"b": stats.norm()}},
-            "there is a prior of b, which is no parameter: there are a, noise_scale, q, x_c",
+            "there is a prior of b, which is no parameter: there are a, q, x_c, noise_scale",
         ),
         (
             {"world": World(priors={"friction": stats.norm()})},
