@@ -32,8 +32,7 @@ class SimulatedExperiment:
     """One record, drawn, measured and inferred from; `calibrate` says what each entry means."""
 
     assumed: Experiment
-    """What inference is told, on the record without loads: its drive angles are those read where the encoder makes no
-    error of its own."""
+    """What inference assumes, on a template: its drive angles are those read where the encoder makes no error."""
     drive_angles: tuple[float, ...]
     bases: tuple[tuple[float, float], ...]
     directions: tuple[str, ...]
@@ -54,17 +53,17 @@ class SimulatedExperiment:
         refuse_strangers(self.world.priors, self.names, "of the world ")
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what follows from the rest, to travel lightly."""
+        """Return the fields alone: the model is built again where it is needed."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def load_cell(self) -> LoadCell:
-        """That inference is told."""
+        """The load cell that inference assumes."""
         return self.assumed.noise.cell
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What a truth has parameters of, in the order of the model."""
+        """Names of the parameters of a truth, in the order of the model."""
         family = family_named(self.world.family or self.assumed.family)
         return (*family.parameters, *self.assumed.rig.names, *self.assumed.noise.names)
 

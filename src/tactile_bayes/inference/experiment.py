@@ -1,4 +1,4 @@
-"""An experiment: a record, what is taken for known of the rig that made it, and priors of all else."""
+"""An experiment: a record, what is known of the rig that made it, and priors of all else."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ __all__ = ["Experiment", "default_priors", "prior_in_words", "priors_in_words", 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """A record, what is taken for known of a contour and of the rig that met it, and priors of what is not.
+    """A record, what is known of the contour and of the rig that touched it, and priors of what is not known.
 
     Parameters
     ----------
     record : xr.Dataset
-        Measured, or the empty template of one that is yet to be made.
+        Measured, or the template of one that is to be made.
     family, load_cell, priors, rod, friction, nuisances, events
         As in `infer_contour`.
 
@@ -72,35 +72,35 @@ class Experiment:
         refuse_strangers(self.priors, self.default_priors, more=more)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what follows from the rest, to travel lightly."""
+        """Return the fields alone: the model is built again where it is needed."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def noise(self) -> Noise:
-        """What is inferred of the load cell's noise."""
+        """The parameters of the noise."""
         return noise_of(self.record, self.load_cell)
 
     @cached_property
     def rig(self) -> Nuisances:
-        """What is inferred of the rig."""
+        """The nuisance parameters."""
         return nuisances_of(self.record, self.nuisances, self.priors, self.noise.cell, self.friction)
 
     @cached_property
     def default_priors(self) -> dict[str, Prior]:
-        """Of all parameters, from where the pivots are, how long the rod is, and the nuisances."""
+        """Default priors of all parameters: the contour's, the rig's and the noise's."""
         base = float(self.record.base_x.mean()), float(self.record.base_y.mean())
         of_contour = contour_priors(family_named(self.family), base, rod_of(self.record).length)
         return {**of_contour, **self.rig.priors, **self.noise.priors}
 
     @cached_property
     def model(self) -> ContourModel:
-        """Prior times likelihood, of all samples."""
+        """Prior times likelihood of all samples."""
         priors = {**self.default_priors, **self.priors}
         return ContourModel(self.record, family_named(self.family), self.rig, self.noise, priors)
 
     @property
     def about(self) -> dict[str, Any]:
-        """What a posterior follows from, as its attributes."""
+        """The attributes of a posterior: what it follows from."""
         attrs, cell = self.record.attrs, self.noise.cell
         rod = ("rod_length", "rod_flexural_rigidity", "rod_diameter")
         return {
@@ -119,7 +119,7 @@ class Experiment:
 
     @property
     def assumptions(self) -> dict[str, str]:
-        """What simulations follow from, whatever their records, as a ledger has it."""
+        """What simulations follow from besides their records, for the results store."""
         cell = self.load_cell or self.noise.cell
         return {
             "family": self.family,
@@ -133,7 +133,7 @@ class Experiment:
 
 
 def usual_load_cell(rod: Rod) -> LoadCell:
-    """Noise of 0.05 EI/L² and 0.02 EI/L, in the units of a rod."""
+    """Return a load cell with noise of 0.05 EI/L² and 0.02 EI/L, in the units of a rod."""
     return LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
 
 
@@ -156,7 +156,7 @@ def default_priors(
 
 
 def prior_in_words(prior: Prior) -> str:
-    """A distribution as an attribute."""
+    """Return a distribution as an attribute."""
     law = getattr(prior, "dist", None)
     if law is None:
         return repr(prior)
@@ -168,5 +168,5 @@ def prior_in_words(prior: Prior) -> str:
 
 
 def priors_in_words(priors: Mapping[str, Prior]) -> str:
-    """Distributions by name, as an attribute."""
+    """Return distributions by name as an attribute."""
     return json.dumps({name: prior_in_words(prior) for name, prior in priors.items()})

@@ -25,7 +25,7 @@ class Prior(Protocol):
 
 
 def check_priors(name: str, priors: Any) -> None:
-    """Refuse what is no mapping from names to distributions with fixed parameters."""
+    """Refuse what is no mapping of names to distributions with fixed parameters."""
     remedy = "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}"
     check_kind(name, priors, Mapping, remedy)
     check_mapping(name, priors, remedy)

@@ -37,7 +37,7 @@ class Knowledge:
     Attributes
     ----------
     experiment : Experiment
-        On an empty record from the pivots so far, or from the origin.
+        On an empty record from the pivots so far, or from the origin where there are none.
     points : ndarray, shape (n, d)
         Draws of the contour's parameters, the rig's and the noise's, in the order of the names of `model`.
     precision : ndarray, shape (d, d)
@@ -56,26 +56,26 @@ class Knowledge:
         return rod_of(self.experiment.record)
 
     def model_from(self, bases: Sequence[Base], drive_step: float) -> ContourModel:
-        """The model of a record that is yet to be made from these pivots."""
+        """Return the model of an empty record from these pivots."""
         cell = self.experiment.noise.cell
         return self.model(empty_record(bases, drive_step, self.experiment.rod, cell))
 
     def model(self, record: xr.Dataset) -> ContourModel:
-        """Of a record, empty or measured."""
+        """Return the model of a record, empty or measured."""
         return replace(self.experiment, record=record).model
 
 
 def empty_record(bases: Sequence[Base], drive_step: float, rod: Rod | None, load_cell: LoadCell) -> xr.Dataset:
-    """A record from these pivots, each swept forward and backward, that is yet to be made.
+    """Return an empty record from these pivots, each swept forward and backward.
 
-    From before any first contact to after any snap-off, where the object lies above the pivot.
+    Sweeps go from before any first contact to after any snap-off, where the object lies above the pivot.
     """
     angles = np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)
     return record_template(bases, ("forward", "backward"), angles, rod, load_cell)
 
 
 def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Truths drawn from the prior, of those that the rod reaches in an experiment that is yet to be made.
+    """Truths drawn from an experiment's prior, of those that the rod reaches.
 
     Raises
     ------

@@ -113,7 +113,7 @@ class Plan:
         return certain.measure(record, seed=0)
 
     def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:
-        """Contact points of a record that is made so, as `reconstruct` finds them."""
+        """Contact points of a record of this plan."""
         return reconstruct(record, method=method, load_cell=self.cell, rod=self.rod, friction=self.taken_friction)
 
     @cached_property
@@ -122,12 +122,12 @@ class Plan:
 
     @cached_property
     def experiment(self) -> Experiment:
-        """What is inferred from such a record, of the contour's own family."""
+        """What is inferred from the record, of the contour's own family."""
         return Experiment(self.record, self.family, self.cell, self.priors, self.rod, self.friction, self.nuisances)
 
     @cached_property
     def model(self) -> ContourModel:
-        """That of the experiment, to full accuracy."""
+        """The model of the experiment, to full accuracy."""
         model = self.experiment.model
         model.likelihood.exact = True
         return model
