@@ -25,7 +25,7 @@ from benchmarks.shooting import (
 from benchmarks.starting import starting
 from benchmarks.table import Row, best_time, print_growth, print_ratios
 from tactile_bayes.contours import Parabola
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import spawn
 from tactile_bayes.inference.likelihood import RecordLikelihood
@@ -288,8 +288,8 @@ def reconstruct(count: int) -> Callable[[], Any]:
 def loads(count: int) -> Callable[[], Any]:
     """As a likelihood asks for them."""
     zero = np.zeros(count)
-    seen = SeenContour(contours(count), zero, zero, 1.0, 0.0, zero > 0.0)
-    return lambda: trace(seen, tolerance=np.array([4e-5, 1e-4, 1e-4]), drive_angles=ANGLES, polished=False)
+    sweep_frame = SweepFrame(contours(count), zero, zero, 1.0, 0.0, zero > 0.0)
+    return lambda: trace(sweep_frame, tolerance=np.array([4e-5, 1e-4, 1e-4]), drive_angles=ANGLES, polished=False)
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ _HOMES = {
     "calibrate": "calibration.calibrate",
     "calibration_replicate": "calibration.calibrate",
     "check_record": "diagnostics.record_check",
+    "check_units_and_signs": "diagnostics.units_and_signs",
     "compare_families": "comparison.families",
     "contact_moments": "uncertainty.contact_moments",
     "contact_region": "uncertainty.contact_region",
@@ -56,7 +57,6 @@ _HOMES = {
     "scan": "sweep",
     "scan_many": "sweep",
     "sensitivity": "planning.sensitivity",
-    "suspicions": "diagnostics.suspicions",
     "to_arviz": "inference.result",
     "verdicts": "diagnostics.verdicts",
     "write_record": "record",
@@ -79,7 +79,7 @@ if TYPE_CHECKING:
     from tactile_bayes.comparison.families import compare_families as compare_families
     from tactile_bayes.diagnostics.inspection import inspect_record as inspect_record
     from tactile_bayes.diagnostics.record_check import check_record as check_record
-    from tactile_bayes.diagnostics.suspicions import suspicions as suspicions
+    from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs as check_units_and_signs
     from tactile_bayes.diagnostics.verdicts import verdicts as verdicts
     from tactile_bayes.inference.contact_posterior import infer_contacts as infer_contacts
     from tactile_bayes.inference.contour import infer_contour as infer_contour

@@ -113,7 +113,7 @@ def test_all_shapes_are_compared_unless_some_are_named(instead, record, tmp_path
     assert asked["leave_one_out"] is False
 
 
-def test_the_table_says_how_samples_are_foretold(instead, record, tmp_path, monkeypatch):
+def test_the_table_says_how_samples_are_predicted(instead, record, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     flags = {"sampled": [False, True, True], "fits": [False, True, False]}
     instead(made_up([0.0, 0.9997, 0.0003], **flags, elpd=[0.0, 0.0, -9.0], k=0.9))

@@ -118,13 +118,13 @@ def test_json_has_the_same_in_numbers(rig):
     assert answer["files"] == {}
 
 
-def test_what_is_wrong_is_the_first_line_and_is_to_be_mended(rig):
+def test_what_is_wrong_is_the_first_line_and_is_to_be_corrected(rig):
     signs = [word.replace("=-Fx", "=Fx") if isinstance(word, str) else word for word in READING]
     result = call("inspect", rig, *signs)
     assert result.exit_code == 0
     first, *_, last = result.stdout.splitlines()
     assert first.endswith("fit no contact of such a rod: nearly all would if force_x had the other sign.")
-    assert last.startswith("Once that is mended: tactile-bayes infer ")
+    assert last.startswith("Once that is corrected: tactile-bayes infer ")
 
 
 def test_a_rig_that_measures_the_moment_only(measured, tmp_path):
@@ -188,7 +188,7 @@ def test_contact_points_of_a_rigs_file(rig, tmp_path):
     result = call("reconstruct", rig, *READING, "--out", tmp_path)
     assert result.exit_code == 0, result.output
     assert "contact points by the constrained method; samples: " in result.stdout.splitlines()[0]
-    assert "they share an unknown bias, so that no probability is told" in result.stdout
+    assert "they share an unknown bias, so that no probability can be stated" in result.stdout
     assert "No noise is stated: bias and noise are taken from the unloaded samples." in result.stdout
     assert (tmp_path / "contacts.png").read_bytes().startswith(b"\x89PNG\r\n")
     contacts = pd.read_csv(tmp_path / "contacts.csv")

@@ -293,7 +293,7 @@ def test_no_rod_that_serves_is_said():
     rods = xr.Dataset(
         {"status": (("length", "diameter"), [["bent too far", "does not reach"]]), "best_width": ((), np.nan)}
     )
-    words = sensitivity_run.rod_in_words(rods)
+    words = sensitivity_run.rod_message(rods)
     assert words == "None of 2 rods of this material serves (1 bent too far, 1 does not reach)."
 
 

@@ -385,7 +385,7 @@ def test_weights_that_were_not_found_are_not_given(monkeypatch):
         (lambda: left_out(np.zeros((4, 100))), r"shape \(4, 100\): give \(chains, draws, samples\)"),
         (lambda: left_out(np.zeros((4, 6, 2))), "has 24 draws: give 25 at least"),
         (lambda: left_out(np.full((4, 50, 2), -np.inf)), "sample 0 is -inf at draw 0 of chain 0: give draws of the"),
-        (lambda: left_out_from_wider(np.zeros((4, 50, 2)), 2), "chosen is 2: give the place of one of 2 samples"),
+        (lambda: left_out_from_wider(np.zeros((4, 50, 2)), 2), "chosen is 2: give the index of one of 2 samples"),
         (lambda: left_out_from_wider(np.full((4, 50, 2), np.nan), 1), "log_weights is nan at draw 0 of chain 0"),
         (lambda: reweighted(np.zeros((4, 50)), np.full((4, 50), np.inf)), "log_density is inf at draw 0 of chain 0"),
         (lambda: reweighted(np.zeros((4, 50)), np.zeros((4, 51))), r"\(4, 50\) and log_density \(4, 51\): give"),

@@ -1,4 +1,4 @@
-"""Samples of a record foretold from the others: next to events by inferring again, elsewhere by importance sampling."""
+"""Samples of a record predicted from the others: by inferring again next to events, else by importance sampling."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.special import logsumexp
 
 from helpers.contour_posteriors import CELL, swept
-from tactile_bayes.comparison.left_out import foretold_samples
+from tactile_bayes.comparison.left_out import predicted_samples
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_problem import contour_problem
@@ -29,8 +29,8 @@ def problem():
 
 
 @pytest.fixture(scope="module")
-def foretold(problem):
-    return foretold_samples(problem, sampled(problem, seed=1, settings=SETTINGS), seed=2, settings=SETTINGS)
+def predicted(problem):
+    return predicted_samples(problem, sampled(problem, seed=1, settings=SETTINGS), seed=2, settings=SETTINGS)
 
 
 def inferred_without(problem, sample):
@@ -46,22 +46,22 @@ def inferred_without(problem, sample):
     return logsumexp(of_sample) - np.log(of_sample.size), 3.0 * np.std(weights) / np.mean(weights) / weights.size**0.5
 
 
-def test_samples_at_events_are_foretold_as_if_inferred_without_them(problem, foretold):
+def test_samples_at_events_are_predicted_as_if_inferred_without_them(problem, predicted):
     """After snap-off, where importance sampling from the posterior is off; 3 times the error for autocorrelation."""
     events = problem.model.likelihood.event_samples(problem.loaded)
     for sample in events[:1, 3]:
         exact, error = inferred_without(problem, sample)
-        assert np.isnan(foretold.pareto_k[sample])
-        assert abs(foretold.log_density[sample] - exact) < 4.0 * np.hypot(error, foretold.standard_error[sample])
+        assert np.isnan(predicted.pareto_k[sample])
+        assert abs(predicted.log_density[sample] - exact) < 4.0 * np.hypot(error, predicted.standard_error[sample])
 
 
 @pytest.mark.slow
-def test_other_samples_are_foretold_by_importance_sampling(problem, foretold):
+def test_other_samples_are_predicted_by_importance_sampling(problem, predicted):
     sample = int(problem.model.likelihood.event_samples(problem.loaded)[0, 1]) + 5
     exact, error = inferred_without(problem, sample)
-    assert foretold.pareto_k[sample] < 0.5
-    assert abs(foretold.log_density[sample] - exact) < 4.0 * np.hypot(error, foretold.standard_error[sample])
-    assert np.isfinite(foretold.standard_error).all()
+    assert predicted.pareto_k[sample] < 0.5
+    assert abs(predicted.log_density[sample] - exact) < 4.0 * np.hypot(error, predicted.standard_error[sample])
+    assert np.isfinite(predicted.standard_error).all()
 
 
 @pytest.mark.slow
@@ -69,7 +69,7 @@ def test_of_a_cell_that_drifts_samples_at_events_are_left_out():
     cell = LoadCell(force_noise=0.05, moment_noise=0.02, drift=RandomWalk(force=0.002, moment=0.001))
     problem = problem_of(cell)
     brief = SamplerSettings(ensembles=2, max_steps=40)
-    found = foretold_samples(problem, sampled(problem, seed=1, settings=brief), seed=2, settings=brief)
+    found = predicted_samples(problem, sampled(problem, seed=1, settings=brief), seed=2, settings=brief)
     events = np.zeros(problem.loaded.size, dtype=bool)
     events[problem.model.likelihood.event_samples(problem.loaded)] = True
     np.testing.assert_array_equal(np.isnan(found.log_density), events)

@@ -33,7 +33,7 @@ from tactile_bayes.contours import (
     from_function,
     paper_profile,
 )
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ContourError
 
 EPS = np.finfo(float).eps
@@ -323,8 +323,8 @@ def test_arrays_of_parameters_are_many_contours(family, make, data):
                 np.testing.assert_allclose(ask(flat)[number], single, rtol=1e-12, atol=1e-14)
     if shape:
         # Lanes along one axis and several slope angles along another.
-        lanes = np.arange(flat.shape[0])[:, None]
-        table = flat.take(lanes).point(np.array([-0.3, 0.0, alpha]))
+        index = np.arange(flat.shape[0])[:, None]
+        table = flat.take(index).point(np.array([-0.3, 0.0, alpha]))
         assert np.shape(table) == (2, flat.shape[0], 3)
         np.testing.assert_array_equal(table[0][:, 2], flat.point(alpha)[0])
 
@@ -471,15 +471,15 @@ def test_shape_free_finds_the_circle_and_the_parabola():
 
 @pytest.mark.parametrize("mirror", [pytest.param(False, marks=pytest.mark.slow), True])
 @every
-def test_seen_from_the_pivot(family, mirror, data):
+def test_in_the_sweep_frame(family, mirror, data):
     """Relative to the pivot, in rod lengths, mirrored: the same points, and rates that are derivatives still."""
     contour, alpha = drawn(data, family)
     length, standoff, base, side = 0.25, 0.02, (0.1, -0.2), -1.0 if mirror else 1.0
     bases = np.full((2, 3), np.array(base)[:, None])
-    seen = SeenContour(contour.broadcast_to((3,)), *bases, length, standoff, np.full(3, mirror))
+    sweep_frame = SweepFrame(contour.broadcast_to((3,)), *bases, length, standoff, np.full(3, mirror))
     stops = side * smooth_stretches(contour, contour.parameter_of_slope(alpha))[:: int(side)]
     here = contour.locate(side * stops)
-    locus = seen.locate(np.ones(stops.size, dtype=np.intp), stops)
+    locus = sweep_frame.locate(np.ones(stops.size, dtype=np.intp), stops)
     rounding = 64 * EPS * (1.0 + size_of(contour)) / length
     u, v = here.x + standoff * np.sin(here.slope_angle), here.y - standoff * np.cos(here.slope_angle)
     assert np.all(np.abs(locus.x - side * (u - base[0]) / length) <= rounding)
@@ -491,17 +491,19 @@ def test_seen_from_the_pivot(family, mirror, data):
         lambda at: at.slope_rate,
     )
     for rate, value in zip(rates, locus[:3], strict=True):
-        integral, off = integrals(lambda p, rate=rate: rate(seen.locate(np.zeros(p.shape, dtype=np.intp), p)), stops)
+        integral, off = integrals(
+            lambda p, rate=rate: rate(sweep_frame.locate(np.zeros(p.shape, dtype=np.intp), p)), stops
+        )
         assert np.all(np.abs(integral - np.diff(value)) <= off + rounding + 64 * EPS * locus.arclength_rate.max())
-    lo, hi = seen.domain()
+    lo, hi = sweep_frame.domain()
     assert np.all(lo < hi)
 
 
 def test_an_open_end_is_brought_in_to_beyond_the_rods_reach():
     contour = PowerLaw(np.array([0.5, 2.0]), 4.0, 0.3, np.array([0.0, 3.0])).broadcast_to((2,))
-    seen = SeenContour(contour, np.zeros(2), np.zeros(2), 1.0, 0.0, np.array([False, True]))
-    lo, hi = seen.domain()
-    lanes = np.arange(2)
-    assert np.all(seen.locate(lanes, lo).x < -1)
-    assert np.all(seen.locate(lanes, hi).x > 1)
+    sweep_frame = SweepFrame(contour, np.zeros(2), np.zeros(2), 1.0, 0.0, np.array([False, True]))
+    lo, hi = sweep_frame.domain()
+    index = np.arange(2)
+    assert np.all(sweep_frame.locate(index, lo).x < -1)
+    assert np.all(sweep_frame.locate(index, hi).x > 1)
     assert np.all(np.isfinite([lo, hi]))

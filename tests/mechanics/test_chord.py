@@ -40,8 +40,8 @@ def _lying(row):
 
 @numba.njit(error_model="numpy")
 def _ending(row):
-    chi, tilt1, arc, _, _ = _tip_arc(row[0], row[1], row[2], row[3])
-    return chi, tilt1, arc.length, arc.shortfall, arc.offset, arc.turn
+    chi, epsilon1, arc, _, _ = _tip_arc(row[0], row[1], row[2], row[3])
+    return chi, epsilon1, arc.length, arc.shortfall, arc.offset, arc.turn
 
 
 class Arcs(NamedTuple):
@@ -66,9 +66,9 @@ def tangential_arcs(angle, m):
     return chi, Arcs(*rest)
 
 
-def tip_arcs(lack, tilt, chi, tilt1):
+def tip_arcs(deficit, chord_angle, chi, epsilon1):
     """Amplitudes, directions at the contact, and arcs, from a guess."""
-    found, found1, *rest = by_number(_ending, 6)(lack, tilt, chi, tilt1).T
+    found, found1, *rest = by_number(_ending, 6)(deficit, chord_angle, chi, epsilon1).T
     return found, found1, Arcs(*rest)
 
 
@@ -133,21 +133,25 @@ def test_tangential_map_of_nearly_straight_rods(delta):
     assert amplitudes[0] == arc.length[0] == arc.turn[0] == 0
 
 
-TIPS = [(chi, tilt) for chi in (0.05, 0.4, 0.9, 1.3, 2.0, 2.8, 3.1) for tilt in (0.01, 0.3, 0.9, 1.3, 1.5, HALF)]
+TIPS = [
+    (chi, chord_angle)
+    for chi in (0.05, 0.4, 0.9, 1.3, 2.0, 2.8, 3.1)
+    for chord_angle in (0.01, 0.3, 0.9, 1.3, 1.5, HALF)
+]
 
 
 def test_tip_map_over_its_domain():
     """Begun with an amplitude and a direction at the contact; told only how the ends lie, the map finds them again."""
-    chi, tilt1 = np.transpose(TIPS)
-    arc = arc_to(chi, np.sin(0.5 * tilt1) ** 2)
+    chi, epsilon1 = np.transpose(TIPS)
+    arc = arc_to(chi, np.sin(0.5 * epsilon1) ** 2)
     chord = np.hypot(arc.length - arc.shortfall, arc.offset) / arc.length
-    lack = np.sqrt((1 - chord) * (1 + chord))
-    tilt = tilt1 - np.arctan2(arc.offset, arc.length - arc.shortfall)
-    found, found1, of = tip_arcs(lack, tilt, 1.01 * chi, 0.99 * tilt1)
+    deficit = np.sqrt((1 - chord) * (1 + chord))
+    chord_angle = epsilon1 - np.arctan2(arc.offset, arc.length - arc.shortfall)
+    found, found1, of = tip_arcs(deficit, chord_angle, 1.01 * chi, 0.99 * epsilon1)
     # chord is rounded to ε: lack to ε/lack, and amplitude and direction follow.
-    worth = 1e-13 + 8 * EPS / lack**2
+    worth = 1e-13 + 8 * EPS / deficit**2
     assert np.all(np.abs(found - chi) <= worth * 20)
-    assert np.all(np.abs(found1 - tilt1) <= worth * 20)
+    assert np.all(np.abs(found1 - epsilon1) <= worth * 20)
     for one, other in zip(of, arc_to(found, np.sin(0.5 * found1) ** 2), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-15)
 
@@ -158,8 +162,8 @@ def test_tip_map_against_legendre(chi, psi1):
     m = 0.5 * (1 - np.sin(psi1))
     theta = float(np.arctan2(np.cos(chi), np.sqrt(1 - m) * np.sin(chi)))
     tau, u, v = piece(theta, m)
-    lack, tilt = np.sqrt(1 - (u * u + v * v) / tau**2), np.arctan2(u, v)
-    found, found1, arc = tip_arcs(np.array([lack]), np.array([tilt]), chi + 0.02, HALF - psi1 - 0.02)
+    deficit, chord_angle = np.sqrt(1 - (u * u + v * v) / tau**2), np.arctan2(u, v)
+    found, found1, arc = tip_arcs(np.array([deficit]), np.array([chord_angle]), chi + 0.02, HALF - psi1 - 0.02)
     np.testing.assert_allclose(found, chi, rtol=0, atol=1e-11)
     np.testing.assert_allclose(found1, HALF - psi1, rtol=0, atol=1e-11)
     np.testing.assert_allclose(arc.length, tau, rtol=0, atol=1e-11)

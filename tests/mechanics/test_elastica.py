@@ -38,9 +38,9 @@ TIP_SHAPES = [
 ]
 # Force nearly along the rod: nearly straight whatever the force, up to Euler's load at χ = π.
 THRUST_SHAPES = [
-    Shape(chi, np.pi / 2 - tilt, 0.2, 1.0, delta)
+    Shape(chi, np.pi / 2 - chord_angle, 0.2, 1.0, delta)
     for chi in (0.5, 1.5, 2.6, 3.1)
-    for tilt in (1e-2, 1e-4)
+    for chord_angle in (1e-2, 1e-4)
     for delta in (0.0, 0.3)
 ]
 # The tip has just touched: chord 1 − 1e-8, at several leans of the rod over the contour's tangent.
@@ -273,7 +273,11 @@ AMPLITUDE_ENDS = [
     for beta in (-0.4, 0.03)
 ]
 NEAR_STRAIGHT = [
-    *(Shape(chi, np.pi / 2 - tilt, 0.3, 1.0, 0.0) for chi in (0.5, 1.5, 2.6, 3.1) for tilt in (1e-2, 1e-4)),
+    *(
+        Shape(chi, np.pi / 2 - chord_angle, 0.3, 1.0, 0.0)
+        for chi in (0.5, 1.5, 2.6, 3.1)
+        for chord_angle in (1e-2, 1e-4)
+    ),
     *(Shape(chi, 0.0, 0.3, 0.7, 0.0) for chi in (1e-2, 1e-3, 1e-5)),
 ]
 # Where quadrature may give way to a closed form that still cancels.
@@ -411,10 +415,10 @@ def test_the_axial_force_tells_the_phase_and_the_friction():
     force = np.hypot(out.force_x, out.force_y)
     moment2 = 0.5 * out.holding_moment**2
     axial = out.force_x * np.cos(out.drive_angle) + out.force_y * np.sin(out.drive_angle) - moment2
-    tilt = out.tip_angle - alpha - delta
+    chord_angle = out.tip_angle - alpha - delta
     # A few roundings in every factor; an error of φ0 counts in full.
     atol = 16 * EPS * (force * (1 + np.abs(out.drive_angle)) + moment2)
-    assert np.all(np.abs(axial - force * np.sin(tilt)) <= atol)
+    assert np.all(np.abs(axial - force * np.sin(chord_angle)) <= atol)
     tangential = out.phase == TANGENTIAL
     assert np.all(np.abs(axial + force * np.sin(delta))[tangential] <= atol[tangential])
     assert np.all(axial[~tangential & (delta == 0.0)] > 0)

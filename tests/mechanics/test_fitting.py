@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.special import ellipkinc
 
+from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, FORCE, PSI1, contact_states
 from tactile_bayes.mechanics.elastica import contact_from_wrench, tangential_arclength, wrench_from_contact
 from tactile_bayes.mechanics.fitting import ContactFit, Reading, fit_contacts, fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.touching import ARCLENGTH, FORCE, PSI1, touching
 
 NOISES = (0.005, 0.02, 0.06, 0.3)
 """Standard deviations of the forces; of the moment 0.4 times as much."""
@@ -45,7 +45,7 @@ def some_coordinates(count, rng, delta):
     chi = rng.uniform(0.4, 2.9, count)
     force = (ellipkinc(chi, 0.5 * (1.0 - np.sin(psi1))) / arclength) ** 2
     z = np.stack([force, psi1, arclength, np.zeros(count)], axis=-1)
-    z[:, 3] = rng.uniform(-1.0, 1.0, count) - touching(z, delta).place[2]
+    z[:, 3] = rng.uniform(-1.0, 1.0, count) - contact_states(z, delta).place[2]
     return z
 
 
@@ -62,7 +62,7 @@ def some_case(count, *, seed, noises=NOISES, encoder=False, correlated=False, fr
     leaning = rng.normal(0.0, 2.0, (count, 3)) if encoder and correlated else np.zeros((count, 3))
     off = sigma * rng.standard_normal(count)
     noise = (np.linalg.cholesky(covariance) @ rng.standard_normal((count, 3, 1)))[..., 0]
-    loads = touching(z, delta).loads.T + leaning * off[:, None] + noise
+    loads = contact_states(z, delta).loads.T + leaning * off[:, None] + noise
     return Case(Reading(z[:, 3] + off, loads, sigma, leaning, covariance), delta, z)
 
 
@@ -163,7 +163,7 @@ KINDS = {
 
 def assert_nothing_is_better(case, starts):
     found = fit(case)
-    place = touching(found.coordinates, case.delta).place.T
+    place = contact_states(found.coordinates, case.delta).place.T
     for k in range(case.delta.size):
         least, right = Reference(case, k).best(starts)
         assert found.misfit[k] <= least + 1e-6 * (1.0 + least), k
@@ -195,7 +195,7 @@ def test_what_is_told_of_a_contact_is_true_of_it(kind):
     z, tip = found.coordinates, found.phase == TIP
     assert np.isfinite(z).all()
     turned = z[:, 3] - case.reading.drive_angle
-    off = touching(z, case.delta).loads.T - case.reading.loads - case.reading.leaning * turned[:, None]
+    off = contact_states(z, case.delta).loads.T - case.reading.loads - case.reading.leaning * turned[:, None]
     weighed = np.linalg.solve(case.reading.covariance, off[..., None])[..., 0]
     misfit = (off * weighed).sum(axis=1)
     if np.any(case.reading.angle_deviation):
@@ -222,7 +222,7 @@ def test_the_truth_is_never_more_likely(kind):
     case = some_case(2000, seed=8, **KINDS[kind][0])
     found = fit(case)
     turned = case.true[:, 3] - case.reading.drive_angle
-    off = touching(case.true, case.delta).loads.T - case.reading.loads - case.reading.leaning * turned[:, None]
+    off = contact_states(case.true, case.delta).loads.T - case.reading.loads - case.reading.leaning * turned[:, None]
     of_truth = (off * np.linalg.solve(case.reading.covariance, off[..., None])[..., 0]).sum(axis=1)
     if np.any(case.reading.angle_deviation):
         of_truth += (turned / case.reading.angle_deviation) ** 2
@@ -232,11 +232,11 @@ def test_the_truth_is_never_more_likely(kind):
 @pytest.mark.parametrize("encoder", [False, True])
 def test_exact_data_come_back(encoder):
     case = some_case(500, seed=9, encoder=encoder, friction=True)
-    exact = case.reading._replace(drive_angle=case.true[:, 3], loads=touching(case.true, case.delta).loads.T)
+    exact = case.reading._replace(drive_angle=case.true[:, 3], loads=contact_states(case.true, case.delta).loads.T)
     found = fit_contacts(exact, case.delta)
     assert (found.misfit < 1e-16).all()
-    place = touching(found.coordinates, case.delta).place
-    np.testing.assert_allclose(place, touching(case.true, case.delta).place, rtol=0.0, atol=1e-8)
+    place = contact_states(found.coordinates, case.delta).place
+    np.testing.assert_allclose(place, contact_states(case.true, case.delta).place, rtol=0.0, atol=1e-8)
     assert not found.at_edge.any()
     np.testing.assert_array_equal(found.phase == TIP, case.true[:, ARCLENGTH] == 1.0)
 
@@ -246,11 +246,11 @@ def test_the_edge_is_found_where_the_sheets_meet():
     case = some_case(200, seed=10, noises=(0.02,))
     case.true[:, PSI1], case.true[:, ARCLENGTH] = 0.0, 1.0
     reading = case.reading._replace(drive_angle=case.true[:, 3])
-    loads = touching(case.true, case.delta).loads.T
+    loads = contact_states(case.true, case.delta).loads.T
     ways = []
     for phase in (TIP, TANGENTIAL):
         tiny = case.true + np.where(np.arange(4) == (PSI1 if phase == TIP else ARCLENGTH), 1e-6, 0.0)
-        way = (touching(tiny, case.delta).loads.T - loads) / 1e-6
+        way = (contact_states(tiny, case.delta).loads.T - loads) / 1e-6
         ways.append(way / np.linalg.norm(way, axis=1, keepdims=True) * (1.0 if phase == TIP else -1.0))
     against = reading._replace(loads=loads - 1e-3 * (ways[0] + ways[1]))
     found = fit_contacts(against, case.delta)
@@ -334,7 +334,7 @@ def test_the_misfit_is_chi_square_far_from_the_edge_and_clearance_is_in_standard
         psi1, arclength = (0.4, 1.0) if phase == TIP else (0.0, 0.8)
         z = np.array([[2.0, psi1, arclength, 1.3]])
         spread = 1e-4 * np.array([0.4, 1.0, 1.0])
-        loads = touching(z).loads.T + spread * rng.standard_normal((4000, 3))
+        loads = contact_states(z).loads.T + spread * rng.standard_normal((4000, 3))
         covariance = np.broadcast_to(np.diag(spread**2), (4000, 3, 3))
         zero = np.zeros(4000)
         reading = Reading(np.full(4000, 1.3), loads, zero, np.zeros((4000, 3)), covariance)

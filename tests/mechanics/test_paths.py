@@ -8,27 +8,27 @@ from scipy.optimize import brentq
 
 from helpers.legendre import equilibrium, tangential_arclength
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.curves import DIP
-from tactile_bayes.mechanics.fates import CLEARANCE, Reach, SnapOff
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability, SnapOff
 from tactile_bayes.record import CHANNELS
 
 SCAN = {}
 LIKELIHOOD = {"tolerance": np.array([4e-5, 1e-4, 1e-4])}
 
 
-def seen_from(contour, base_x=0.0, base_y=0.0, mirrored=False, standoff=0.0):
+def sweep_frame_of(contour, base_x=0.0, base_y=0.0, mirrored=False, standoff=0.0):
     n = contour.shape[0] if contour.shape else 1
-    lanes = (n,)
-    return SeenContour(
-        contour.broadcast_to(lanes),
+    index = (n,)
+    return SweepFrame(
+        contour.broadcast_to(index),
         np.full(n, base_x) if np.ndim(base_x) == 0 else base_x,
         np.full(n, base_y) if np.ndim(base_y) == 0 else base_y,
         1.0,
         standoff,
-        np.broadcast_to(np.asarray(mirrored), lanes),
+        np.broadcast_to(np.asarray(mirrored), index),
     )
 
 
@@ -53,16 +53,16 @@ def wide(family, n, seed):
 FAMILIES = ("parabola", "circle", "power", "joined")
 
 
-def paths_of(seen, lane, friction_angle=0.0, **options):
+def paths_of(sweep_frame, i, friction_angle=0.0, **options):
     """The path of one lane, alone."""
-    pick = np.array([lane])
-    alone = SeenContour(
-        seen.contour.take(pick),
-        seen.base_x[pick],
-        seen.base_y[pick],
-        seen.length,
-        seen.standoff,
-        seen.mirrored[pick],
+    pick = np.array([i])
+    alone = SweepFrame(
+        sweep_frame.contour.take(pick),
+        sweep_frame.base_x[pick],
+        sweep_frame.base_y[pick],
+        sweep_frame.length,
+        sweep_frame.standoff,
+        sweep_frame.mirrored[pick],
     )
     return trace(alone, friction_angle=friction_angle, **options)
 
@@ -81,24 +81,24 @@ def paths_of(seen, lane, friction_angle=0.0, **options):
 def test_invariants_on_random_contours(family, standoff):
     """No surprises on any contour: states everywhere, one after the other, loaded the right way."""
     contour, mirrored = wide(family, 250, FAMILIES.index(family))
-    seen = seen_from(contour, mirrored=mirrored, standoff=standoff)
-    paths = trace(seen, **SCAN)
-    lanes = np.flatnonzero(paths.reach == Reach.TOUCHES)
-    assert lanes.size > 100
+    sweep_frame = sweep_frame_of(contour, mirrored=mirrored, standoff=standoff)
+    paths = trace(sweep_frame, **SCAN)
+    index = np.flatnonzero(paths.reach == Reachability.TOUCHES)
+    assert index.size > 100
     height = contour.height(np.zeros(1)) - standoff
-    assert not np.any(height[lanes] <= 0)
-    first, snap = paths.first_angle[lanes], paths.snap_angle[lanes]
+    assert not np.any(height[index] <= 0)
+    first, snap = paths.first_angle[index], paths.snap_angle[index]
     assert np.all(np.isfinite(first) & (first < snap) & (snap < 2 * np.pi))
-    assert np.all(paths.snap_off[lanes] != SnapOff.NEVER)
-    out = np.setdiff1d(np.arange(250), lanes)
+    assert np.all(paths.snap_off[index] != SnapOff.NEVER)
+    out = np.setdiff1d(np.arange(250), index)
     assert np.isnan(paths.first_angle[out]).all()
     assert np.all(paths.snap_off[out] == SnapOff.NEVER)
     assert np.all(paths.observables(np.linspace(-7, 7, 5))[out] == 0)
 
     # Along the contour, from just after first contact up to snap-off.
     ways = np.linspace(0.02, 1.0, 60) ** 2
-    parameter = paths.first_parameter[lanes, None] + (paths.snap_parameter - paths.first_parameter)[lanes, None] * ways
-    w = paths.states_at(lanes[:, None], parameter).wrench
+    parameter = paths.first_parameter[index, None] + (paths.snap_parameter - paths.first_parameter)[index, None] * ways
+    w = paths.states_at(index[:, None], parameter).wrench
     assert np.all(w.phase != NONE)
     loads = np.stack([w.drive_angle, w.holding_moment, w.force_x, w.force_y])
     assert np.isfinite(loads).all()
@@ -121,30 +121,30 @@ def test_invariants_on_random_contours(family, standoff):
 def test_snap_off_is_the_first_maximum(family, options):
     """Against a dense scan of exact states; a maximum missed or imagined would be off by tenths."""
     contour, mirrored = wide(family, 150, 10 + FAMILIES.index(family))
-    seen = seen_from(contour, mirrored=mirrored)
-    paths = trace(seen, **options)
+    sweep_frame = sweep_frame_of(contour, mirrored=mirrored)
+    paths = trace(sweep_frame, **options)
     # With the pivot this close below the contour the path is a needle that 16 nodes do not resolve.
-    lanes = np.flatnonzero(
-        (paths.reach == Reach.TOUCHES) & (paths.distance > (0.02 if options is LIKELIHOOD else 5e-3))
+    index = np.flatnonzero(
+        (paths.reach == Reachability.TOUCHES) & (paths.distance > (0.02 if options is LIKELIHOOD else 5e-3))
     )
-    seen_end = _nearest_parameter(seen, lanes)
+    seen_end = _nearest_parameter(sweep_frame, index)
     ways = np.linspace(0.002, 1.0, 400) ** 2
-    begin = paths.first_parameter[lanes]
+    begin = paths.first_parameter[index]
     parameter = begin[:, None] + (seen_end - begin)[:, None] * ways
-    angle = np.nan_to_num(paths.states_at(lanes[:, None], parameter).wrench.drive_angle, nan=-9.0)
+    angle = np.nan_to_num(paths.states_at(index[:, None], parameter).wrench.drive_angle, nan=-9.0)
     falls = np.diff(angle, axis=1) < -1e-9
     at = np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)
-    dense = angle[np.arange(lanes.size), at]
-    miss = paths.snap_angle[lanes] - dense
+    dense = angle[np.arange(index.size), at]
+    miss = paths.snap_angle[index] - dense
     # A corner between two points of the dense scan is missed by it by up to a step's rise.
-    room = np.abs(angle[np.arange(lanes.size), np.maximum(at - 1, 0)] - dense) + 1e-3
+    room = np.abs(angle[np.arange(index.size), np.maximum(at - 1, 0)] - dense) + 1e-3
     # A maximum may be too flat for the dense scan, which then goes on to the next one: it must be one, though.
     side = 2e-5 * (begin - seen_end)
-    beside = paths.snap_parameter[lanes] + side * np.array([[1.0], [-1.0]])
-    around = paths.states_at(np.broadcast_to(lanes, beside.shape), beside).wrench.drive_angle
-    flat = (miss < 0) & np.all(around < paths.snap_angle[lanes] + (0 if options is SCAN else 1e-4), axis=0)
+    beside = paths.snap_parameter[index] + side * np.array([[1.0], [-1.0]])
+    around = paths.states_at(np.broadcast_to(index, beside.shape), beside).wrench.drive_angle
+    flat = (miss < 0) & np.all(around < paths.snap_angle[index] + (0 if options is SCAN else 1e-4), axis=0)
     bad = ~(np.abs(miss) < room) & ~flat
-    assert not bad.any(), [(int(i), float(m)) for i, m in zip(lanes[bad], miss[bad], strict=True)]
+    assert not bad.any(), [(int(i), float(m)) for i, m in zip(index[bad], miss[bad], strict=True)]
 
 
 def test_a_shallow_dip_is_passed_over():
@@ -152,33 +152,33 @@ def test_a_shallow_dip_is_passed_over():
     rng = np.random.default_rng(0)
     n = np.linspace(1.75, 1.99, 400)
     contour = PowerLaw(rng.uniform(0.1, 1.5, 400), n, rng.uniform(0.4, 0.7, 400), rng.normal(0.0, 0.15, 400))
-    seen = seen_from(contour)
-    paths = trace(seen, **SCAN)
-    lanes = np.flatnonzero(paths.reach == Reach.TOUCHES)
-    begin, end = paths.first_parameter[lanes, None], _nearest_parameter(seen, lanes)[:, None]
+    sweep_frame = sweep_frame_of(contour)
+    paths = trace(sweep_frame, **SCAN)
+    index = np.flatnonzero(paths.reach == Reachability.TOUCHES)
+    begin, end = paths.first_parameter[index, None], _nearest_parameter(sweep_frame, index)[:, None]
     away = np.geomspace(1e-6, 1.0, 300)
     parameter = np.concatenate([begin * away[::-1], np.zeros_like(begin), end * away], axis=1)
-    angle = paths.states_at(lanes[:, None], parameter).wrench.drive_angle
+    angle = paths.states_at(index[:, None], parameter).wrench.drive_angle
     angle = np.where(np.isnan(angle), -9.0, angle)
     most = np.maximum.accumulate(angle, axis=1)
     lost = most - angle > DIP
     last = np.where(lost.any(axis=1), lost.argmax(axis=1), angle.shape[1] - 1)
-    dense = most[np.arange(lanes.size), last]
+    dense = most[np.arange(index.size), last]
     dips = np.array([np.any(np.diff(row[: np.argmax(row[:k])]) < -1e-8) for row, k in zip(angle, last, strict=True)])
-    assert 3 <= dips.sum() < lanes.size
+    assert 3 <= dips.sum() < index.size
     # The dense scan misses a corner by up to a step's rise.
-    np.testing.assert_array_less(dense - paths.snap_angle[lanes], 1e-10)
-    np.testing.assert_array_less(paths.snap_angle[lanes] - dense, 5e-3)
-    likely = trace(seen, **LIKELIHOOD)
-    np.testing.assert_allclose(likely.snap_angle[lanes], paths.snap_angle[lanes], rtol=0, atol=5e-5)
+    np.testing.assert_array_less(dense - paths.snap_angle[index], 1e-10)
+    np.testing.assert_array_less(paths.snap_angle[index] - dense, 5e-3)
+    likely = trace(sweep_frame, **LIKELIHOOD)
+    np.testing.assert_allclose(likely.snap_angle[index], paths.snap_angle[index], rtol=0, atol=5e-5)
 
 
-def _nearest_parameter(seen, lanes):
+def _nearest_parameter(sweep_frame, index):
     """Where the contour is nearest to the pivot: there the line of force passes through the pivot."""
-    lo, hi = (end[lanes] for end in seen.domain())
+    lo, hi = (end[index] for end in sweep_frame.domain())
     for _ in range(70):
         middle = 0.5 * (lo + hi)
-        locus = seen.locate(lanes, middle)
+        locus = sweep_frame.locate(index, middle)
         right = locus.x * np.cos(locus.slope_angle) + locus.y * np.sin(locus.slope_angle) > 0
         lo, hi = np.where(right, lo, middle), np.where(right, middle, hi)
     return 0.5 * (lo + hi)
@@ -198,15 +198,15 @@ def test_tip_and_tangent_touch_at_almost_the_same_time(beyond, options):
     keep = (a * x_c**2 + q > 0.1) & (np.abs(x_c) < 0.7) & (q > -0.3)
     contour = Parabola(a[keep], q[keep], x_c[keep])
     assert keep.sum() > 60
-    near = trace(seen_from(contour), **options)
-    assert np.all(near.reach == Reach.TOUCHES)
-    lanes = np.arange(near.seen.lanes)
-    end = _nearest_parameter(near.seen, lanes)
+    near = trace(sweep_frame_of(contour), **options)
+    assert np.all(near.reach == Reachability.TOUCHES)
+    index = np.arange(near.sweep_frame.size)
+    end = _nearest_parameter(near.sweep_frame, index)
     ways = np.linspace(0.002, 1.0, 400) ** 2
     parameter = near.first_parameter[:, None] + (end - near.first_parameter)[:, None] * ways
-    angle = np.nan_to_num(near.states_at(lanes[:, None], parameter).wrench.drive_angle, nan=-9.0)
+    angle = np.nan_to_num(near.states_at(index[:, None], parameter).wrench.drive_angle, nan=-9.0)
     falls = np.diff(angle, axis=1) < -1e-9
-    dense = angle[lanes, np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)]
+    dense = angle[index, np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)]
     assert np.all(np.abs(near.snap_angle - dense) < 1e-2)
 
 
@@ -214,16 +214,16 @@ def test_tip_and_tangent_touch_at_almost_the_same_time(beyond, options):
 def test_a_pivot_just_below_the_contour_still_has_a_path(clearance):
     contour = Parabola(np.geomspace(0.1, 5.0, 60), clearance, 0.0)
     for options in (SCAN, LIKELIHOOD):
-        paths = trace(seen_from(contour), **options)
-        assert np.all(paths.reach == Reach.TOUCHES)
+        paths = trace(sweep_frame_of(contour), **options)
+        assert np.all(paths.reach == Reachability.TOUCHES)
         assert np.all(paths.first_angle < paths.snap_angle)
         assert np.isfinite(paths.observables(np.linspace(0, 3.2, 30))).all()
 
 
 def test_nearer_than_the_clearance_there_is_no_path():
     distance = CLEARANCE * np.array([0.01, 0.99, 1.01])
-    paths = trace(seen_from(Parabola(np.full(3, 0.3), distance, 0.0)))
-    np.testing.assert_array_equal(paths.reach, [Reach.TOO_CLOSE, Reach.TOO_CLOSE, Reach.TOUCHES])
+    paths = trace(sweep_frame_of(Parabola(np.full(3, 0.3), distance, 0.0)))
+    np.testing.assert_array_equal(paths.reach, [Reachability.TOO_CLOSE, Reachability.TOO_CLOSE, Reachability.TOUCHES])
     assert np.isnan(paths.snap_angle[:2]).all()
     assert not np.any(paths.observables(np.linspace(0.0, 3.2, 30))[:2])
 
@@ -233,20 +233,26 @@ def test_nearer_than_the_clearance_there_is_no_path():
 
 def test_reach():
     paths = trace(
-        seen_from(
+        sweep_frame_of(
             Circle(
                 np.array([1.0, 1.0, 0.2, 1.0, 1.0]), np.array([0.5, 1.1, 0.3, -0.1, -1.5]), np.array([0, 0, -0.6, 0, 0])
             )
         )
     )
-    assert [Reach(int(r)).name for r in paths.reach] == ["TOUCHES", "TOO_FAR", "ENDS", "CUTS_PIVOT", "CUTS_PIVOT"]
+    assert [Reachability(int(r)).name for r in paths.reach] == [
+        "TOUCHES",
+        "TOO_FAR",
+        "ENDS",
+        "CUTS_PIVOT",
+        "CUTS_PIVOT",
+    ]
     np.testing.assert_allclose(paths.distance[:2], [0.5, 1.1], rtol=1e-14)
 
 
 def test_how_near_decides_whether_it_is_reached():
     distance = 1 + np.array([-1e-6, -1e-9, 1e-9, 1e-6])
-    paths = trace(seen_from(Parabola(np.full(4, 0.5), distance, 0.0)))
-    np.testing.assert_array_equal(paths.reach, [Reach.TOUCHES] * 2 + [Reach.TOO_FAR] * 2)
+    paths = trace(sweep_frame_of(Parabola(np.full(4, 0.5), distance, 0.0)))
+    np.testing.assert_array_equal(paths.reach, [Reachability.TOUCHES] * 2 + [Reachability.TOO_FAR] * 2)
     assert np.all(np.isfinite(paths.snap_angle[:2]))
 
 
@@ -256,22 +262,29 @@ def test_how_near_decides_whether_it_is_reached():
 def interpolation_errors(family, options, count=150, samples=20):
     """Largest error of every lane's observables, over the greatest value on its path; and how near its pivot is."""
     contour, mirrored = wide(family, count, 20 + FAMILIES.index(family))
-    seen = seen_from(contour, mirrored=mirrored)
-    paths, exact = trace(seen, **options), trace(seen, **SCAN)
-    lanes = np.flatnonzero(paths.reach == Reach.TOUCHES)
+    sweep_frame = sweep_frame_of(contour, mirrored=mirrored)
+    paths, exact = trace(sweep_frame, **options), trace(sweep_frame, **SCAN)
+    index = np.flatnonzero(paths.reach == Reachability.TOUCHES)
     share = np.linspace(0.01, 0.99, samples)
     snap = np.minimum(paths.snap_angle, exact.snap_angle)
     angle = exact.first_angle[:, None] + (snap - exact.first_angle)[:, None] * share
-    told = paths.observables(np.where(np.isfinite(angle), angle, 0.0))[lanes]
+    told = paths.observables(np.where(np.isfinite(angle), angle, 0.0))[index]
     truth = np.empty_like(told)
-    for block in np.array_split(np.arange(lanes.size), max(1, lanes.size // 25)):
-        some = lanes[block]
-        few = SeenContour(seen.contour.take(some), seen.base_x[some], seen.base_y[some], 1.0, 0.0, seen.mirrored[some])
-        lane = np.repeat(np.arange(some.size), samples)
-        wrench = trace(few, **SCAN).states(lane, angle[some].ravel()).wrench
+    for block in np.array_split(np.arange(index.size), max(1, index.size // 25)):
+        some = index[block]
+        few = SweepFrame(
+            sweep_frame.contour.take(some),
+            sweep_frame.base_x[some],
+            sweep_frame.base_y[some],
+            1.0,
+            0.0,
+            sweep_frame.mirrored[some],
+        )
+        i = np.repeat(np.arange(some.size), samples)
+        wrench = trace(few, **SCAN).states(i, angle[some].ravel()).wrench
         truth[block] = np.stack([getattr(wrench, name) for name in CHANNELS], -1).reshape(some.size, samples, 3)
     error = np.abs(told - truth) / np.abs(truth).max(axis=1, keepdims=True)
-    return error.max(axis=(1, 2)), paths.distance[lanes], 1 - lanes.size / count
+    return error.max(axis=(1, 2)), paths.distance[index], 1 - index.size / count
 
 
 @pytest.mark.slow
@@ -292,22 +305,22 @@ def test_what_the_likelihood_interpolates(family):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
-def test_many_lanes_at_once_equal_one_at_a_time(family):
+def test_many_contours_at_once_equal_one_at_a_time(family):
     contour, mirrored = wide(family, 40, 30)
-    seen = seen_from(contour, mirrored=mirrored)
+    sweep_frame = sweep_frame_of(contour, mirrored=mirrored)
     angle = np.linspace(0.0, 3.5, 40)
     for options in (SCAN, LIKELIHOOD):
-        many = trace(seen, **options)
+        many = trace(sweep_frame, **options)
         table = many.observables(angle)
-        for lane in range(0, 40, 4):
-            one = paths_of(seen, lane, **options)
-            assert one.reach[0] == many.reach[lane]
-            assert one.snap_off[0] == many.snap_off[lane]
+        for i in range(0, 40, 4):
+            one = paths_of(sweep_frame, i, **options)
+            assert one.reach[0] == many.reach[i]
+            assert one.snap_off[0] == many.snap_off[i]
             for name in ("first_angle", "snap_angle", "distance"):
-                np.testing.assert_allclose(getattr(one, name)[0], getattr(many, name)[lane], rtol=0, atol=1e-12)
-            scale = 1 + np.abs(table[lane]).max()
+                np.testing.assert_allclose(getattr(one, name)[0], getattr(many, name)[i], rtol=0, atol=1e-12)
+            scale = 1 + np.abs(table[i]).max()
             # Newton's steps settle together; what they leave is far below the interpolation's error.
-            off = np.abs(one.observables(angle)[0] - table[lane]) / scale
+            off = np.abs(one.observables(angle)[0] - table[i]) / scale
             assert np.all(off < 1e-6)
 
 
@@ -319,15 +332,15 @@ def test_first_contact_with_an_edge_straight_above_the_pivot():
     sizes = np.exp(rng.uniform(np.log(0.05), np.log(10.0), (2, count)))
     vertices = -np.tan([before, after]) / (2.0 * sizes)
     halves = [Parabola(a, y - a * x_c**2, x_c) for a, x_c in zip(sizes, vertices, strict=True)]
-    lanes, zero = np.arange(count), np.zeros(count)
-    seen = SeenContour(Joined(*halves, x=zero), zero, zero, 1.0, 0.0, np.zeros(count, dtype=bool))
-    paths = trace(seen, tolerance=np.full(3, 1e-3))
+    index, zero = np.arange(count), np.zeros(count)
+    sweep_frame = SweepFrame(Joined(*halves, x=zero), zero, zero, 1.0, 0.0, np.zeros(count, dtype=bool))
+    paths = trace(sweep_frame, tolerance=np.full(3, 1e-3))
     first = paths.first_parameter
-    end = seen.domain()[1]
+    end = sweep_frame.domain()[1]
     touched = np.isfinite(first)
     assert touched.mean() > 0.9
     for share in np.linspace(0.0, 1.0, 200)[1:] ** 2:
-        locus = seen.locate(lanes, first + (end - first) * share)
+        locus = sweep_frame.locate(index, first + (end - first) * share)
         within = touched & (np.hypot(locus.x, locus.y) <= 1.0)
         assert np.all(np.arctan2(locus.y, locus.x)[within] >= paths.first_angle[within] - 1e-9)
 
@@ -338,15 +351,15 @@ def test_first_contact_is_not_sought_where_directions_are_rounding():
     right = Parabola(2.978468290506286, -0.06176136045269866, -0.20572941132934008)
     zero, forward = np.zeros(1), np.zeros(1, dtype=bool)
     joined, alone = (
-        trace(SeenContour(contour.broadcast_to((1,)), zero, zero, 1.0, 0.0, forward)).first_angle
+        trace(SweepFrame(contour.broadcast_to((1,)), zero, zero, 1.0, 0.0, forward)).first_angle
         for contour in (Joined(left, right, x=0.0), right)
     )
     assert joined == pytest.approx(alone, rel=1e-14)
 
 
-def test_own_angles_for_every_lane():
+def test_own_angles_for_every_contour():
     contour = Parabola(np.array([0.5, 0.7, 0.6]), np.array([0.5, 0.3, 1.5]), 0.0)
-    paths = trace(seen_from(contour))
+    paths = trace(sweep_frame_of(contour))
     rows = np.array([[0.5, 1.5, 2.5], [1.0, 2.0, 9.0], [1.0, 2.0, 3.0]])
     own = paths.observables(rows)
     for k in range(3):
@@ -362,9 +375,9 @@ def test_own_angles_for_every_lane():
 def test_states_against_bracketed_legendre():
     """At drive angles over the path; judged by bisection on another closed form, to 1e-9 of the load."""
     contour = Parabola(np.array([0.5, 0.7, 0.5, 2.0]), np.array([0.5, 0.3, 0.7, 0.6]), np.array([0.0, 0.1, -0.2, 0.0]))
-    for lane in range(4):
-        one = contour.broadcast_to((4,)).take(np.array([lane]))
-        paths = trace(seen_from(one), **SCAN)
+    for i in range(4):
+        one = contour.broadcast_to((4,)).take(np.array([i]))
+        paths = trace(sweep_frame_of(one), **SCAN)
         angle = np.linspace(paths.first_angle[0] + 0.15, paths.snap_angle[0] - 1e-3, 7)
         states = paths.states(np.zeros(7, dtype=np.intp), angle)
         for k in range(7):
@@ -378,7 +391,7 @@ def test_states_against_bracketed_legendre():
 
 
 def test_out_of_contact_there_is_no_state():
-    paths = trace(seen_from(Parabola(np.array([0.5, 0.5]), np.array([0.5, 1.2]), 0.0)))
+    paths = trace(sweep_frame_of(Parabola(np.array([0.5, 0.5]), np.array([0.5, 1.2]), 0.0)))
     angle = np.array([paths.first_angle[0] - 1e-9, paths.snap_angle[0] + 1e-9, 2.0, np.nan])
     states = paths.states(np.array([0, 0, 1, 0]), angle)
     assert np.all(states.wrench.phase == NONE)
@@ -396,7 +409,7 @@ def test_the_dense_corner_is_where_arc_length_is_one():
         return tangential_arclength(x, 0.5 * x * x + 0.5, alpha) - 1
 
     corner = brentq(excess, 0.02, 0.2, xtol=1e-15)
-    paths = trace(seen_from(Parabola(0.5, 0.5)), **SCAN)
+    paths = trace(sweep_frame_of(Parabola(0.5, 0.5)), **SCAN)
     assert SnapOff(int(paths.snap_off[0])) == SnapOff.CORNER
     assert paths.snap_parameter[0] == pytest.approx(corner, abs=1e-12)
     phases = paths.states_at(np.zeros(2, dtype=np.intp), corner + np.array([1e-9, -1e-9])).wrench.phase

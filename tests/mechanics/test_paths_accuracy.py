@@ -29,8 +29,8 @@ from helpers.exact_rod import mp
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, paper_profile
 from tactile_bayes.errors import ContourError
 from tactile_bayes.mechanics.elastica import tangential_arclength
-from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.phases import NONE
+from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import equilibria, scan
 from tactile_bayes.sweep.path import sweep_paths

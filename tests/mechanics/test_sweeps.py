@@ -14,13 +14,13 @@ from numba.core.errors import TypingError
 
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, Smooth
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.priors import default_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics import compiler, sweeps
-from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import trace
+from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import in_frame
 from tactile_bayes.sweep import scan
@@ -141,11 +141,11 @@ def test_a_contour_by_its_table_is_the_contour_by_its_formula(name, backward, fr
     found = []
     for one in (contours, without_a_formula(contours)):
         zero, side = np.zeros(COUNT), np.full(COUNT, backward)
-        seen = SeenContour(one, zero, zero, length, standoff, side)
-        found.append(trace(seen, friction_angle=np.arctan(friction), drive_angles=angles))
+        sweep_frame = SweepFrame(one, zero, zero, length, standoff, side)
+        found.append(trace(sweep_frame, friction_angle=np.arctan(friction), drive_angles=angles))
     known, tabled = found
     np.testing.assert_array_equal(tabled.reach, known.reach)
-    there = known.reach == Reach.TOUCHES
+    there = known.reach == Reachability.TOUCHES
     assert np.count_nonzero(there) > 20
     np.testing.assert_array_equal(tabled.snap_off, known.snap_off)
     for event in ("first_angle", "snap_angle", "first_parameter", "snap_parameter"):
@@ -187,11 +187,11 @@ def test_forces_are_in_the_frame_of_the_record(friction):
 
 def test_samples_may_come_in_any_order():
     """Also twice, and with angles that are no numbers, which are never loaded."""
-    seen = SeenContour(FORMULAS["parabola"].broadcast_to((COUNT,)), Q * 0.0, Q * 0.0, 1.0, 0.0, Q > 0.5)
+    sweep_frame = SweepFrame(FORMULAS["parabola"].broadcast_to((COUNT,)), Q * 0.0, Q * 0.0, 1.0, 0.0, Q > 0.5)
     angles = np.linspace(0.3, 3.6, 40)
     order = np.random.default_rng(2).permutation(np.r_[np.arange(40), 7, 7])
     mixed = np.append(angles[order], np.nan)
-    one, other = (trace(seen, drive_angles=each).sampled for each in (angles, mixed))
+    one, other = (trace(sweep_frame, drive_angles=each).sampled for each in (angles, mixed))
     np.testing.assert_array_equal(other[:, :-1], one[:, order])
     assert not np.any(other[:, -1])
 
@@ -199,7 +199,7 @@ def test_samples_may_come_in_any_order():
 # --- Compiling --------------------------------------------------------------------------------------------------------
 
 
-def test_where_nothing_can_be_kept_it_is_compiled_each_time(monkeypatch):
+def test_where_nothing_can_be_cached_it_is_compiled_each_time(monkeypatch):
     njit = compiler.numba.njit
 
     def without_a_place(function, *, cache=False, **options):
@@ -212,16 +212,16 @@ def test_where_nothing_can_be_kept_it_is_compiled_each_time(monkeypatch):
     def twice(x):
         return 2.0 * x
 
-    assert compiler.kept(twice)(2.0) == 4.0
+    assert compiler.cached(twice)(2.0) == 4.0
 
 
 def test_states_of_scans_and_loads_of_likelihoods_are_compiled_once():
     """Other types than the first ones would take as long again, for instance arrays that are read-only."""
-    seen = SeenContour(FORMULAS["parabola"].broadcast_to((COUNT,)), Q * 0.0, Q * 0.0, 1.0, 0.0, Q > 0.5)
-    trace(seen, drive_angles=np.linspace(0.3, 3.6, 40), relative=True, polished=False)
+    sweep_frame = SweepFrame(FORMULAS["parabola"].broadcast_to((COUNT,)), Q * 0.0, Q * 0.0, 1.0, 0.0, Q > 0.5)
+    trace(sweep_frame, drive_angles=np.linspace(0.3, 3.6, 40), relative=True, polished=False)
     for contours in (drawn("circle", THIN, 10), without_a_formula(drawn("circle", THIN, 10))):
         likelihood_of(THIN, is_always_clear=False).log_likelihood(contours.broadcast_to(contours.shape))
-    assert len(sweeps._sweep.signatures) == 1
+    assert len(sweeps._solve.signatures) == 1
 
 
 @pytest.mark.parametrize("awake", [True, False])
@@ -249,7 +249,7 @@ def test_the_garbage_collector_rests_while_functions_are_compiled(awake):
         rest.on_end(ours)
         assert (known, gc.isenabled()) == ([False] * 4, awake)
         with pytest.raises(TypingError):
-            compiler.kept(ill_typed)(1.0)
+            compiler.cached(ill_typed)(1.0)
         assert gc.isenabled() == awake
     finally:
         gc.enable()
@@ -278,11 +278,11 @@ print("done")
 @pytest.mark.slow
 @pytest.mark.parametrize("places", ["beside the source", "the user's"])
 def test_it_is_compiled_once_and_says_so_at_a_terminal(places, tmp_path):
-    """The second process finds what the first has kept, also where beside the source nothing may be written."""
+    """The second process finds what the first has cached, also where beside the source nothing may be written."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
     environment |= {"XDG_CACHE_HOME": str(tmp_path), "HOME": str(tmp_path)}
     if places == "beside the source":
-        environment["NUMBA_CACHE_DIR"] = str(tmp_path / "kept")
+        environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
     else:
         environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "UserWideCacheLocator"
     said = [

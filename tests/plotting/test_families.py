@@ -86,7 +86,7 @@ def test_where_none_fits_that_is_what_the_figure_says_first():
 
 def test_where_there_are_no_probabilities_the_axes_say_so():
     (ax,) = plotting.families(made_up([np.nan, np.nan]))
-    assert [text.get_text() for text in ax.texts] == ["no probabilities to be had"]
+    assert [text.get_text() for text in ax.texts] == ["no probabilities"]
     assert not ax.patches
 
 

@@ -18,7 +18,7 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides, doubtful_sweeps, reconstruct, with_sides
 from tactile_bayes.record import make_record
-from tactile_bayes.runs.reconstruction import reconstruction_in_words
+from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
@@ -119,7 +119,7 @@ def test_step_2_takes_the_side_that_fits_and_says_so():
     measured = in_contact_throughout(-0.3)
     contacts = reconstruct(measured, method="constrained", load_cell=CELL)
     assert json.loads(contacts.attrs["doubtful_sides"]) == {"0": "forward"}
-    assert "sweep 0 as a forward one" in reconstruction_in_words(contacts)[0]
+    assert "sweep 0 as a forward one" in reconstruction_messages(contacts)[0]
     assert "doubtful_sides" not in reconstruct(in_contact_throughout(0.3), load_cell=CELL).attrs
 
 

@@ -54,8 +54,8 @@ from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.page import page_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import hindrances
-from tactile_bayes.report.trust import contacts_words
-from tactile_bayes.runs.reconstruction import reconstruction_in_words
+from tactile_bayes.report.trust import contacts_messages
+from tactile_bayes.runs.reconstruction import reconstruction_messages
 from tactile_bayes.uncertainty.summary import gap_if_any, summary
 
 
@@ -106,11 +106,11 @@ def test_the_page_is_well_formed_and_its_headings_are_in_order(page, text):
     assert levels.count(1) == 1
     assert all(after <= before + 1 for before, after in pairwise(levels))
     assert page.texts["h2"] == [
-        "What was found",
-        "Can it be trusted?",
-        "What was measured",
+        "Results",
+        "Can the results be trusted?",
+        "Readings",
         "Details",
-        "Making it again",
+        "Reproducing the run",
     ]
 
 
@@ -234,15 +234,15 @@ def test_the_gap_is_told_as_far_as_convexity_confines_it_with_uncertain_ends(pag
 @pytest.mark.parametrize("score", [-7.0, -5.9, -4.0, 4.0, 5.9, 7.0])
 def test_the_force_along_the_rod_is_judged_as_by_reconstruct(findings, score):
     contacts = findings.contacts.assign_attrs(axial_score=score)
-    said = contacts_words(dataclasses.replace(findings, contacts=contacts))[-1]
-    elsewhere = " ".join(reconstruction_in_words(contacts))
+    said = contacts_messages(dataclasses.replace(findings, contacts=contacts))[-1]
+    elsewhere = " ".join(reconstruction_messages(contacts))
     for words in ("agrees with the moment", "too small", "too large", "as friction makes it", "check the zero"):
         assert (words in said) == (words in elsewhere)
     assert "the friction that was stated" in said
     tree = findings.posterior.copy()
     tree.attrs["nuisances"] = '["friction"]'
     found = dataclasses.replace(findings, contacts=contacts, posterior=tree)
-    assert "the friction that was found" in contacts_words(found)[-1]
+    assert "the friction that was found" in contacts_messages(found)[-1]
 
 
 def test_the_verdicts_come_first_and_say_whether_to_trust(page, folder, text):
@@ -337,7 +337,7 @@ def test_what_hinders_that_is_said(posterior):
 # --- The moving rod -----------------------------------------------------------------------------------------------
 
 
-def test_the_rod_moves_as_a_scan_of_the_likeliest_contour_has_it(posterior):
+def test_the_rod_moves_as_a_scan_of_the_most_probable_contour_has_it(posterior):
     motion = motion_of(posterior)
     record, rod = record_of(posterior), rod_of(record_of(posterior))
     for number_, direction in ((0, "forward"), (1, "backward")):
@@ -357,7 +357,7 @@ def test_the_rod_moves_as_a_scan_of_the_likeliest_contour_has_it(posterior):
     np.testing.assert_allclose(lengths, rod.length, rtol=2e-3)
 
 
-def test_the_rig_of_the_likeliest_draw_moves_it(posterior):
+def test_the_rig_of_the_most_probable_draw_moves_it(posterior):
     """Against the loads by which the likelihood judges that draw, which are interpolated."""
     rig = {
         "rigidity_scale": 1.05,
@@ -427,7 +427,7 @@ def with_rig(posterior, rig, **attrs):
 
 
 def predicted(tree, rig):
-    """Loads of the likeliest draw by which the likelihood judges the record, shape (samples, 3)."""
+    """Loads of the most probable draw by which the likelihood judges the record, shape (samples, 3)."""
     record = record_of(tree)
     best = posterior_draws(tree).isel(tree["sample_stats"]["lp"].argmax(("chain", "draw")))
     cell, rod = LoadCell.from_record(record), rod_of(record)
@@ -516,10 +516,10 @@ def test_no_text_of_a_record_becomes_an_element(hostile):
     assert page.open == []
     assert len(page.all("script")) == 2
     assert page.all("img") == page.all("b") == []
-    assert "49" not in [cell for row in page.table("What the record says") for cell in row]
+    assert "49" not in [cell for row in page.table("Attributes of the record") for cell in row]
     assert "onerror" not in {name for _, attrs in page.elements for name in attrs}
     assert page.table("Further columns")[1:] == [[COLUMN, UNIT, LONG_NAME]]
-    assert [ENTRY, VALUE] in page.table("What the record says of itself")
+    assert [ENTRY, VALUE] in page.table("Attributes of the record")
     assert page.texts["h1"] == [f"The contour from {FILE}"]
     assert page.texts["title"][0] == f"Contour from {FILE} – tactile_bayes"
     assert f"tactile_bayes, report of the run {FOLDER}" in page.texts["p"]

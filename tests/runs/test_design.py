@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tactile_bayes.runs.design import design_in_words
+from tactile_bayes.runs.design import design_messages
 
 
 def found(places, widths, gaps):
@@ -39,7 +39,7 @@ GRID = [(-0.1, 0.0), (0.0, 0.0), (0.1, 0.0), (-0.1, 0.02), (0.0, 0.02), (0.1, 0.
 def test_the_outermost_candidate_is_said_to_be_so(best, outermost):
     widths = np.full(len(GRID), 2e-3)
     widths[best] = 1e-3
-    words = design_in_words(found(GRID, widths, np.full(len(GRID), 3e-3)))
+    words = design_messages(found(GRID, widths, np.full(len(GRID), 3e-3)))
     said = [sentence for sentence in words if sentence.startswith("It is the ")]
     if outermost is None:
         assert said == []
@@ -48,5 +48,5 @@ def test_the_outermost_candidate_is_said_to_be_so(best, outermost):
 
 
 def test_a_gap_that_is_not_known_is_not_told():
-    first, *_ = design_in_words(found(GRID[:2], [1e-3, 2e-3], [np.nan, 3e-3]))
+    first, *_ = design_messages(found(GRID[:2], [1e-3, 2e-3], [np.nan, 3e-3]))
     assert first.endswith("band is then to be expected 1 mm wide; now it is 5 mm.")

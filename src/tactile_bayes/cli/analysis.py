@@ -40,12 +40,12 @@ def infer(
     ] = "parabola",
     reading: RecordOptions,
     unknown: UnknownOptions,
-    probability: Annotated[float, typer.Option(help="Of band and intervals.", min=0.0, max=1.0)] = 0.95,
-    max_steps: Annotated[int, typer.Option(help="Steps of each walker, at most.", min=1)] = 20_000,
+    probability: Annotated[float, typer.Option(help="Probability of band and intervals.", min=0.0, max=1.0)] = 0.95,
+    max_steps: Annotated[int, typer.Option(help="Largest number of steps of each walker.", min=1)] = 20_000,
     max_seconds: Annotated[
         float | None,
         typer.Option(
-            help="Time for the search for a start and for sampling, at most [s]; what is there by then is the result. "
+            help="Time limit for the search for a start and for sampling [s]; the draws made by then are the result. "
             "Checks, files and figures come after it."
         ),
     ] = None,
@@ -94,7 +94,7 @@ def demo(
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """A steel wire sweeps along a parabola; its noisy record is turned into a contour with a band."""
+    """Simulate a steel wire that sweeps along a parabola, and infer the contour with a band from its noisy record."""
     from tactile_bayes.record import read_record
     from tactile_bayes.runs.contour import analyse
     from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD, TRUTH, measure_demo
@@ -127,7 +127,7 @@ def demo(
 def _answer(
     ctx: typer.Context, run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float], go_on: str
 ) -> Answer:
-    """What came out; what is left out is among the verdicts, and with --debug its traceback is on stderr."""
+    """Return the answer; verdicts name what is left out, and with --debug its traceback goes to stderr."""
     if run.left_out:
         _trace_back(run, in_full=ctx.find_root().params["debug"])
     interrupted = "interrupted" in run.posterior.attrs["message"]
@@ -180,16 +180,16 @@ def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float
     yield ""
     yield table_of(heads, _rows(run, truth), left=["quantity", "unit"], may_wrap=True)
     attrs = run.posterior.attrs
-    if attrs["converged"]:  # else it is among the verdicts
+    if attrs["converged"]:  # else the verdicts contain it
         yield attrs["message"]
     if run.contacts is not None:
         fates = Counter(run.contacts.status.values.tolist()).most_common()
         words = "Samples: " + ", ".join(f"{count} {fate}" for fate, count in fates)
         chance = run.contacts.attrs.get("misfit_probability")
         if chance is not None and chance == chance:
-            words += f"; noise of the size that was found explains their misfit with probability {chance:.2g}"
+            words += f"; noise of the inferred scale explains their misfit with probability {chance:.2g}"
         yield words
-    elif "contacts" not in run.left_out:  # else it is said above
+    elif "contacts" not in run.left_out:  # else the verdicts say so
         yield "No contact points: Step 2 needs all three load channels."
     yield ""
     yield files
@@ -198,7 +198,7 @@ def _words(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float
 def _rows(run: ContourRun, truth: Mapping[str, float]) -> Iterable[list[str]]:
     numbers = run.summary
     for name in numbers.quantity.values:
-        if name.startswith("z_"):  # a direction of a random function, which says nothing by itself
+        if name.startswith("z_"):  # a weight of a random function, which has no meaning by itself
             continue
         row: Any = numbers.sel(quantity=name)
         digits = _digits(float(row["upper"] - row["lower"]))
@@ -211,5 +211,5 @@ def _rows(run: ContourRun, truth: Mapping[str, float]) -> Iterable[list[str]]:
 
 
 def _digits(width: float) -> int:
-    """Decimals that show an interval of this width to two figures."""
+    """Return the number of decimals that show an interval of this width to two digits."""
     return max(0, min(12, 1 - math.floor(math.log10(width)))) if width > 0.0 else 6

@@ -20,31 +20,31 @@ __all__ = ["Answer", "columns_of", "print_answer", "table_of"]
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command has found.
+    """Result of a command.
 
     Attributes
     ----------
-    words : iterable of str, Table, or mapping of str to Path
-        For people: sentences, tables, and files by what they hold, in their order.
+    parts : iterable of str, Table, or mapping of str to Path
+        Output for people: sentences, tables, and files by content, in this order.
     numbers : callable
-        Returns the object for programs.
+        Function that returns the object for programs.
     interrupted : str
-        Where an interrupt has cut the work short: what to do, which goes to stderr, with the exit code of an interrupt.
+        If an interrupt has cut the work short, the message for stderr; the exit code is then that of an interrupt.
     """
 
-    words: Iterable[str | Table | Mapping[str, Path]]
+    parts: Iterable[str | Table | Mapping[str, Path]]
     numbers: Callable[[], Mapping[str, Any]]
     interrupted: str = ""
 
 
 def print_answer(answer: Answer, as_json: bool) -> None:
-    """Print an answer in words, or as one JSON object in which null stands for what is no finite number."""
+    """Print an answer as text, or as one JSON object in which null stands for numbers that are not finite."""
     if as_json:
         import json
 
         typer.echo(json.dumps(_plain(answer.numbers()), ensure_ascii=False, indent=2, allow_nan=False))
     else:
-        for part in answer.words:
+        for part in answer.parts:
             _print_part(part)
     if answer.interrupted:
         typer.echo(f"tactile-bayes: {answer.interrupted}", err=True)
@@ -63,7 +63,7 @@ def _print_part(part: str | Table | Mapping[str, Path]) -> None:
 
 
 def _print_table(table: Table) -> None:
-    """Print a table, whole, also where no terminal says how wide it may be."""
+    """Print a whole table, also if no terminal states its width."""
     from rich.console import Console
 
     console = Console(markup=False)  # units are in brackets
@@ -75,7 +75,7 @@ def _print_table(table: Table) -> None:
 def table_of(
     heads: Iterable[str], rows: Iterable[Iterable[str]], *, left: Iterable[str] = (), may_wrap: bool = False
 ) -> Table:
-    """A table without frame, with numbers to the right."""
+    """Return a table without frame; columns are right-aligned unless named in `left`."""
     from rich.table import Table
 
     table, to_the_left = Table(box=None, pad_edge=False), set(left)
@@ -87,14 +87,14 @@ def table_of(
 
 
 def columns_of(dataset: Any, dim: str) -> list[dict[str, Any]]:
-    """A row for every place along a dimension, of the coordinate and of all that lies along this dimension alone."""
+    """Return a row for every label of a dimension, with its coordinate and all variables along this dimension alone."""
     columns = {dim: dataset[dim], **dataset.data_vars, **dataset.coords}
     table = {name: values.values for name, values in columns.items() if values.dims == (dim,)}
     return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
 
 
 def _plain(value: Any) -> Any:
-    """The same in what JSON has: no arrays, no paths, and null for what is no finite number."""
+    """Return the value in types of JSON: no arrays, no paths, and null for numbers that are not finite."""
     if hasattr(value, "items"):
         return {str(name): _plain(part) for name, part in value.items()}
     if isinstance(value, Path):

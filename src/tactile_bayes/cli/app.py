@@ -1,4 +1,4 @@
-"""The command `tactile-bayes` and what all its parts have in common: refusals, interrupts, version."""
+"""The command `tactile-bayes`, with its treatment of errors, interrupts and warnings."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ __all__ = ["app", "main"]
 
 
 class _Commands(TyperGroup):
-    """What goes wrong is a line on stderr, and an exit code: 2 for a refusal, 130 for an interrupt, 1 for the rest."""
+    """Commands whose errors are a line on stderr and an exit code: 2 if refused, 130 if interrupted, else 1."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Keep the words of the call, which a run states."""
+        """Keep the words of the call, which a posterior states."""
         ctx.meta["words"] = ("tactile-bayes", *args)
         return super().parse_args(ctx, args)
 
@@ -43,14 +43,14 @@ class _Commands(TyperGroup):
         try:
             with _warnings_in_a_line():
                 return super().invoke(ctx)
-        except (BrokenPipeError, typer.Exit, typer.Abort):  # whoever was reading has read enough, or all is said
+        except (BrokenPipeError, typer.Exit, typer.Abort):  # the reader has closed the pipe, or a message was printed
             raise
         except KeyboardInterrupt as interrupt:
             words, code = str(interrupt) or "interrupted, results are incomplete", 130
         except Exception as error:
-            if hasattr(error, "exit_code"):  # a call that is none, which typer shows with the usage
+            if hasattr(error, "exit_code"):  # a wrong call, which typer reports with the usage
                 raise
-            words, code = _told(error)
+            words, code = _message(error)
             if ctx.params["debug"]:
                 import traceback
 
@@ -61,8 +61,8 @@ class _Commands(TyperGroup):
         raise typer.Exit(code)
 
 
-def _told(error: Exception) -> tuple[str, int]:
-    """What went wrong in words, and the exit code."""
+def _message(error: Exception) -> tuple[str, int]:
+    """Return the message and the exit code of an error."""
     from tactile_bayes.errors import TactileBayesError
 
     if isinstance(error, TactileBayesError):
@@ -76,7 +76,7 @@ def _told(error: Exception) -> tuple[str, int]:
 
 @contextmanager
 def _warnings_in_a_line() -> Iterator[None]:
-    """This package's warnings are a line on stderr; those of others look as always."""
+    """Print warnings of this package as a line on stderr; warnings of other packages keep their form."""
     import warnings
 
     usual = warnings.showwarning
@@ -97,8 +97,8 @@ def _warnings_in_a_line() -> Iterator[None]:
 
 
 _EXIT_CODES = """Exit codes: 0 for done, 1 for an unexpected error, 2 for input or options that are refused, 130 for
-Ctrl-C, 143 for a run that was terminated. A result that is not to be trusted says so in its first line, and in "words"
-and "converged" of --json; its exit code is 0. What cannot be made of a posterior is named there and in "left_out".
+Ctrl-C, 143 for a run that was terminated. A result that must not be trusted says so in its first line, and in "words"
+and "converged" of --json; its exit code is 0. Parts that fail after sampling are named there and in "left_out".
 
 Example: tactile-bayes demo --out results/demo
 
@@ -133,8 +133,8 @@ app.add_typer(dataset, name="dataset")
 
 
 def main() -> None:
-    """Entry point."""
-    os.environ["MPLBACKEND"] = "agg"  # figures go to files, whether or not there is a screen
+    """Run the command line."""
+    os.environ["MPLBACKEND"] = "agg"  # figures go to files, also without a screen
     app()
 
 

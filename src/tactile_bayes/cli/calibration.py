@@ -1,4 +1,4 @@
-"""The command `calibrate`: whether intervals hold, over records that are simulated."""
+"""The command `calibrate`: coverage of intervals over simulated records."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def calibrate(
     ctx: typer.Context,
     out: Out,
     family: Annotated[str, typer.Option(help="Shape of the contours, as for infer, shape-free too.")] = "parabola",
-    replicates: Annotated[int, typer.Option(help="How many records.", min=1)] = 200,
+    replicates: Annotated[int, typer.Option(help="Number of records.", min=1)] = 200,
     noise: NoiseOptions,
     rig: RigOptions,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].", min=0.05, max=30.0)] = 2.0,
@@ -38,26 +38,24 @@ def calibrate(
     world: Annotated[
         list[str] | None,
         typer.Option(
-            help="What the world has otherwise than inference assumes: friction=0.3, rigidity_scale=1.05, "
-            "drive_angle_offset=0.02, base_shift=0.01,0, bias=0.02,0.05,0.05, drift=0.04,0.1,0.1, "
+            help="Misspecification, the rig's difference from what inference assumes: friction=0.3, "
+            "rigidity_scale=1.05, drive_angle_offset=0.02, base_shift=0.01,0, bias=0.02,0.05,0.05, drift=0.04,0.1,0.1, "
             "flat_spot=ANGLE,FACTOR; give it again for another."
         ),
     ] = None,
-    probability: Annotated[float, typer.Option(help="Of the bands and regions that are judged.")] = 0.9,
+    probability: Annotated[float, typer.Option(help="Probability of the bands and regions that are judged.")] = 0.9,
     work: WorkerOptions,
     seed: Seed = 1,
     replicate: Annotated[
         int | None,
-        typer.Option(
-            help="Make this replicate alone, once more, and print what comes of it; nothing is written.", min=0
-        ),
+        typer.Option(help="Make this replicate alone, once more, and print its result; nothing is written.", min=0),
     ] = None,
     debug: Annotated[
         bool, typer.Option("--debug", help="Show where an error comes from; with --replicate, the one that lost it.")
     ] = False,
     output: Output,
 ) -> Answer:
-    """Show whether intervals hold: simulate records, infer from each, and compare with the truth.
+    """Measure how often intervals hold: simulate records, infer from each, and compare with the truth.
 
     A run that was stopped goes on by the same command; with more replicates it begins with those that are there. An
     error in a replicate does not end the run, but counts against it; --replicate shows which error it was.
@@ -127,7 +125,7 @@ def _of_replicate(made: Replicate) -> Answer:
             (name, f"{made.truth[name]:.6g}" if name in made.truth else "", str(outcome.ranks.get(name, "")))
             for name in dict.fromkeys([*made.truth, *outcome.ranks])
         ]
-        # NaN is what could not be had
+        # NaN stands for a number that could not be computed
         numbers = [(name, f"{value:.6g}") for name, value in outcome.numbers.items() if value == value]
         yield ""
         if quantities:

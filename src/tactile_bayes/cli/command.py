@@ -1,7 +1,7 @@
 """The skeleton of a command: options, one call of the library, one answer.
 
-A command is a function. Its parameters are options, or groups of them: a group is a dataclass whose fields are options
-and whose properties say what they mean. The last group is `Output`. The function returns an `Answer`.
+A command is a function. Its parameters are options or groups of options: a group is a dataclass whose fields are
+options and whose properties interpret them. The last group is `Output`. The function returns an `Answer`.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 
 __all__ = ["Out", "Output", "Seed", "as_command"]
 
-Out = Annotated[Path, typer.Option(help="Folder for results; made if it is not there.", file_okay=False)]
-Seed = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
+Out = Annotated[Path, typer.Option(help="Folder for results; created if missing.", file_okay=False)]
+Seed = Annotated[int, typer.Option(help="Seed of random numbers; the same seed gives the same numbers.", min=0)]
 
 
 @dataclass(frozen=True)
 class Output:
-    """How a command shows its progress and its answer."""
+    """Options for the progress and the answer of a command."""
 
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the result.")] = False
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object in place of sentences.")] = False
 
     @property
     def is_silent(self) -> bool:
-        """Whether there is no progress."""
+        """True if no progress is shown."""
         return self.quiet or self.json
 
 
@@ -56,7 +56,7 @@ def as_command(function: Callable[..., Answer]) -> Callable[..., None]:
 
 
 def _options(owner: Callable[..., Any]) -> Iterator[Parameter]:
-    """The options of a command, or of a group, one by one."""
+    """Yield the options of a command, or of a group."""
     hints = get_type_hints(owner, include_extras=True)
     for name, parameter in signature(owner).parameters.items():
         if is_dataclass(hints[name]):

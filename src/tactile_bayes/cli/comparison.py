@@ -1,4 +1,4 @@
-"""The command `compare`: which shape a record is of."""
+"""The command `compare`: comparison of families of contours for a record."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ def compare(
         bool,
         typer.Option(
             "--leave-one-out/--no-leave-one-out",
-            help="Ask of every family how well it foretells a sample from all the others; takes as long again.",
+            help="Compute how well each family predicts a sample from all the others; this doubles the time.",
         ),
     ] = True,
     max_seconds: Annotated[
         float | None,
-        typer.Option(help="Time for sampling each family, at most [s]; what is there by then is compared."),
+        typer.Option(help="Time limit for sampling each family [s]; the draws made by then are compared."),
     ] = None,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """Compare shapes of contours: which of them a measured record is of, and whether any fits."""
+    """Compare shapes of contours for a measured record: the probability of each, and whether any fits."""
     from tactile_bayes.comparison.families import SHAPES
     from tactile_bayes.inference.ensembles import SamplerSettings
     from tactile_bayes.runs.comparison import compare_into
@@ -102,7 +102,7 @@ def _reservations(found: xr.Dataset) -> Iterator[str]:
 
 
 def _table(found: xr.Dataset) -> Table:
-    """No wider than 80 columns; errors of the evidence are in the files."""
+    """Return a table of at most 80 columns; the files hold the errors of the evidence."""
     left_out = "elpd" in found
     rows = []
     for row in columns_of(found, "family"):
@@ -115,7 +115,7 @@ def _table(found: xr.Dataset) -> Table:
 
 
 def _share(value: float) -> str:
-    """A probability to three decimals, which nothing but none and all are rounded to."""
+    """Return a probability to three decimals; only exact 0 and 1 are written so."""
     if value != value:
         return "–"
     if 0.0 < value < 1.0:

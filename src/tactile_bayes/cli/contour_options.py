@@ -27,7 +27,7 @@ class ContourOptions:
         typer.Option(help="Profile of Merker et al. 2018, scaled to the rod; by default II."),
     ] = None
     distance: Annotated[
-        float | None, typer.Option(help="Of the profile's vertex above the x axis [rod lengths]; by default 0.5.")
+        float | None, typer.Option(help="Height of the profile's vertex [rod lengths]; by default 0.5.")
     ] = None
     family: Annotated[
         str | None,
@@ -39,8 +39,8 @@ class ContourOptions:
     parameter: Annotated[
         list[str] | None,
         typer.Option(
-            help="Of the family, by the names and in the units that infer prints: a=0.7, q=0.5; give it again for "
-            "another. x_c is 0 if it is left out."
+            help="Parameter of the family, by the name and in the unit that infer prints: a=0.7, q=0.5; give it again "
+            "for another. x_c is 0 if it is left out."
         ),
     ] = None
     points: Annotated[
@@ -52,12 +52,12 @@ class ContourOptions:
     ] = None
 
     def contour(self, rod_length: float) -> Contour:
-        """The contour that the options choose.
+        """Return the contour that the options choose, scaled to the rod's length.
 
         Raises
         ------
         ParameterError
-            If they choose more than one, or not all of it.
+            If the options choose more than one contour, or lack a parameter.
         ContourError
             If there is no such contour.
         """
@@ -87,7 +87,7 @@ def _of_family(name: str, options: Sequence[str] | None) -> Contour:
 
     family = family_named(name)
     if family.roughness:
-        raise ParameterError(f"--family {name}: such a contour is no few numbers, so give --points")
+        raise ParameterError(f"--family {name}: a few parameters do not define such a contour, so give --points")
     values = {"x_c": 0.0}
     for parameter, value in assigned("--parameter", options, known=family.parameters).items():
         (values[parameter],) = numbers_asked(value, f"--parameter {parameter}", 1)
@@ -99,7 +99,7 @@ def _of_family(name: str, options: Sequence[str] | None) -> Contour:
 
 
 def _read_points(path: Path) -> tuple[list[float], list[float]]:
-    """The columns x and y of a file, or its first two; a line without numbers in them may be the head."""
+    """Read the columns x and y of a file, or its first two; the first line may hold their names."""
     import csv
 
     from tactile_bayes.errors import ParameterError

@@ -33,7 +33,7 @@ Folder = Annotated[Path, typer.Argument(help="Folder of the data set.")]
 def example() -> None:
     """Print a commented specification to start from.
 
-    It explains every section, law and unit.
+    It explains every section, distribution and unit.
     """
     from importlib.resources import files
 
@@ -47,7 +47,7 @@ def generate(
     specification: Annotated[
         Path, typer.Argument(metavar="SPEC.toml", help="What to draw, sweep and measure: see dataset example.")
     ],
-    out: Annotated[Path, typer.Option(help="Folder for the data set; made if it is not there.", file_okay=False)],
+    out: Annotated[Path, typer.Option(help="Folder for the data set; created if missing.", file_okay=False)],
     work: WorkerOptions,
     output: Output,
 ) -> Answer:
@@ -86,7 +86,7 @@ def verify(
 ) -> Answer:
     """Check every byte of a data set.
 
-    Files are compared with the checksums in the manifest, which also says what the data set was made from.
+    Files are compared with the checksums in the manifest, which also states the specification of the data set.
     """
     from tactile_bayes import datasets
 
@@ -107,7 +107,7 @@ def record(
     index: Annotated[int, typer.Argument(help="Number of the record; the first is 0.")],
     out: Annotated[Path, typer.Option(help="File for the record, .csv or .nc.", dir_okay=False)],
     truth: Annotated[
-        bool, typer.Option("--truth/--no-truth", help="With the columns of the truth, or as a laboratory has it.")
+        bool, typer.Option("--truth/--no-truth", help="Write the columns of the truth, or leave them out.")
     ] = True,
     output: Output,
 ) -> Answer:

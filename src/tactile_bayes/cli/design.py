@@ -1,4 +1,4 @@
-"""The command `design`: where to put the whisker, or its next base."""
+"""The command `design`: the best pivot and drive step for the next record."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Criterion = Literal["band", "gap", "information"]
 
 @dataclass(frozen=True)
 class _NoiseOptions(NoiseOptions):
-    """Noise of the load cell, where no run states it."""
+    """Noise of the load cell, if no run states it."""
 
     force_noise: Annotated[
         float | None, typer.Option(help="Without a run: noise of the forces [N, or EI/L²]; by default 0.05 EI/L².")
@@ -39,7 +39,7 @@ class _NoiseOptions(NoiseOptions):
 
 @dataclass(frozen=True)
 class _RodOptions(RodOptions):
-    """The rod, likewise."""
+    """The rod, if no run states it."""
 
     length: Annotated[float | None, typer.Option(help="Likewise the rod's length [m].")] = None
 
@@ -49,11 +49,9 @@ def design(
     out: Out,
     run: Annotated[
         Path | None,
-        typer.Argument(help="Folder of a run of infer, or its posterior.nc: what is known so far. Without, a prior."),
+        typer.Argument(help="Folder of a run of infer, or its posterior.nc, as present knowledge; else the prior."),
     ] = None,
-    family: Annotated[
-        str, typer.Option(help="Shape of the contours, where nothing but a prior is known.")
-    ] = "parabola",
+    family: Annotated[str, typer.Option(help="Shape of the contours, if only a prior is known.")] = "parabola",
     base: Annotated[
         list[str] | None,
         typer.Option(
@@ -74,7 +72,7 @@ def design(
             "was stopped.",
         ),
     ] = False,
-    draws: Annotated[int, typer.Option(help="Objects drawn from what is known.", min=2)] = 24,
+    draws: Annotated[int, typer.Option(help="Number of objects drawn from posterior or prior.", min=2)] = 24,
     noise: _NoiseOptions,
     rod: _RodOptions,
     unknown: UnknownOptions,
@@ -82,7 +80,7 @@ def design(
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """Choose the next record: from which pivot, and in which steps, it makes the contour's band narrowest."""
+    """Choose the pivot and the drive step of the next record, so that the contour's band becomes narrowest."""
     import numpy as np
 
     from tactile_bayes.planning.design import ABOVE, ACROSS

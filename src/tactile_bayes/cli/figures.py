@@ -1,4 +1,4 @@
-"""The command `figures`: those of Merker et al. 2018, computed anew."""
+"""The command `figures`: the figures of Merker et al. 2018, computed anew."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["figures"]
 
 @dataclass(frozen=True)
 class _NoiseOptions(NoiseOptions):
-    """Noise of the one figure that has some."""
+    """Noise of figure 11."""
 
     force_noise: Annotated[
         float | None, typer.Option(help="Noise of the forces in figure 11 [EI/L²]; by default none.")
@@ -34,18 +34,20 @@ def figures(
     ] = None,
     format: Annotated[
         list[str] | None,
-        typer.Option("--format", help="Of the files, pdf, svg or png; again for another. By default pdf and png."),
+        typer.Option("--format", help="Format of the files, pdf, svg or png; again for another; default pdf and png."),
     ] = None,
     distance: Annotated[
         list[float] | None,
-        typer.Option(help="Of the profile from the pivot, q [L]; again for another. By default the figure's own."),
+        typer.Option(
+            help="Distance of the profile from the pivot, q [L]; again for another; default the figure's own."
+        ),
     ] = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].")] = 1.0,
-    rods: Annotated[int, typer.Option(help="Rods drawn of a sweep in figures 7 to 10.", min=1)] = 15,
+    rods: Annotated[int, typer.Option(help="Number of rods drawn of a sweep in figures 7 to 10.", min=1)] = 15,
     noise: _NoiseOptions,
     seed: Seed = 1,
     column: Annotated[
-        bool, typer.Option("--column", help="As wide as a column, 3.5 inches, in place of a page, 7 inches.")
+        bool, typer.Option("--column", help="Draw for a column, 3.5 inches wide, instead of a page, 7 inches.")
     ] = False,
     style: Annotated[
         Literal["print", "screen"], typer.Option(help="Letters of 8 points for print, or of 10 for the screen.")

@@ -1,4 +1,4 @@
-"""The command `inspect`: what is in a file, and what looks wrong, before anything is inferred from it."""
+"""The command `inspect`: the contents of a file, and what looks wrong, before anything is inferred from it."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def inspect(
     record: Record,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for a picture, tables and these words; made if it is not there.", file_okay=False),
+        typer.Option(help="Folder for a figure, tables and this text; created if missing.", file_okay=False),
     ] = None,
     reading: RecordOptions,
     friction: Friction = 0.0,
     output: Output,
 ) -> Answer:
-    """Look at a record before anything is inferred: what is in the file, and what looks wrong, first.
+    """Inspect a record before anything is inferred: what looks wrong, and the contents of the file.
 
     It takes the options of infer that say how a file is read; the last line is the command to go on with.
     """
@@ -64,18 +64,18 @@ def inspect(
 
 
 def _words(found: Inspection, contents: list[str], again: str, files: Mapping[str, Path]) -> Iterator[Any]:
-    yield from (*found.words, "", *contents, "", _sweeps(found.sweeps), "", _channels(found.channels), "")
+    yield from (*found.messages, "", *contents, "", _sweeps(found.sweeps), "", _channels(found.channels), "")
     if found.statuses:
         yield "Raw Step 2: " + ", ".join(f"{count} {fate}" for fate, count in found.statuses.items())
     else:
         yield "No Step 2, which needs all three load channels; infer works without."
     if files:
         yield from ("", files)
-    yield from ("", f"{'Once that is mended' if found.is_suspect else 'Next'}: {again}")
+    yield from ("", f"{'Once that is corrected' if found.is_suspect else 'Next'}: {again}")
 
 
 def _as_options(reading: RecordOptions, friction: float) -> str:
-    """The options that were given, as words of a command."""
+    """Return the given options as words of a command."""
     words = ""
     for name, value in {**vars(reading), "friction": friction}.items():
         option = f" --{name.replace('_', '-')}"
@@ -85,8 +85,8 @@ def _as_options(reading: RecordOptions, friction: float) -> str:
 
 
 def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
-    """What is in the file, except its sweeps and channels; origins are what the options say of columns."""
-    from tactile_bayes.diagnostics.inspection.words import quantity
+    """Return the contents of the file, except its sweeps and channels; origins are those of `RecordOptions`."""
+    from tactile_bayes.diagnostics.inspection.messages import quantity
     from tactile_bayes.record import MEASURED, frame_of, present_channels, rod_of
 
     record, rod = found.record, rod_of(found.record)
@@ -114,7 +114,7 @@ def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
 
 
 def _sweeps(sweeps: xr.Dataset) -> Table:
-    """Angles in degrees; contact between the samples beside its ends."""
+    """Return the table of sweeps, with angles in degrees; events lie midway between the samples beside them."""
     import numpy as np
 
     pivots = [f"{x:g},{y:g}" for x, y in zip(sweeps.base_x.values, sweeps.base_y.values, strict=True)]
@@ -142,14 +142,14 @@ def _sweeps(sweeps: xr.Dataset) -> Table:
 
 
 def _place(beside: Any) -> str:
-    """The middle between the samples beside an event."""
+    """Return the middle between the samples beside an event."""
     middle = float(beside.mean())
     return "–" if middle != middle else f"{middle:.1f}"
 
 
 def _channels(channels: xr.Dataset) -> Table:
-    """Numbers of a channel all in one unit; the last is the correlation of unloaded neighbours."""
-    from tactile_bayes.diagnostics.inspection.words import prefix_of
+    """Return the table of channels, each in one unit; the last column is the correlation of unloaded neighbours."""
+    from tactile_bayes.diagnostics.inspection.messages import prefix_of
 
     rows = []
     for row in columns_of(channels, "channel"):
@@ -176,7 +176,7 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
     ):
         row |= {"onset_drive_angle": onset, "snap_off_drive_angle": snap}
     return {
-        "words": found.words,
+        "words": found.messages,
         "is_suspect": found.is_suspect,
         "samples": record.sizes["sample"],
         "columns": [str(name) for name in record.data_vars],
@@ -196,7 +196,7 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
 
 
 def _suspicious(samples: xr.Dataset) -> dict[str, Any]:
-    """Numbers of samples by kind, and by channel where a kind has them."""
+    """Return the numbers of suspicious samples by kind, and by channel if a kind has channels."""
     by_channel = {
         kind: {
             str(channel): samples[kind].sel(channel=channel).values.nonzero()[0].tolist()

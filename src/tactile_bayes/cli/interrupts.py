@@ -1,4 +1,4 @@
-"""Interrupts of long runs: what is there, and what the same command then does."""
+"""Interrupts of long runs, with messages on what was kept and how to resume."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _USUAL: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, 
 
 @contextmanager
 def resumable(have: Callable[[], str], *, then: str = "the same command goes on") -> Iterator[Callable[[], object]]:
-    """A run that an interrupt ends with words that say what is there, and what the same command then does.
+    """Run a block that an interrupt ends with a message on what was kept, and what the same command then does.
 
-    What is yielded is to be called now and then: it raises an interrupt that was lost.
+    Call the yielded function regularly: it raises an interrupt that was lost.
     """
     try:
         with _interrupts_kept() as raise_lost:
@@ -40,7 +40,7 @@ def resumable(have: Callable[[], str], *, then: str = "the same command goes on"
 
 @contextmanager
 def acknowledge_interrupt(words: str) -> Iterator[None]:
-    """The first interrupt is answered at once, with words on stderr, as what comes of it takes a while."""
+    """Print a message on stderr at the first interrupt, since the end of the run takes a while."""
 
     def answer(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -57,7 +57,7 @@ class _Terminated(KeyboardInterrupt):
 
 @contextmanager
 def _interrupts_kept() -> Iterator[Callable[[], object]]:
-    """Raises an interrupt that was lost: Python ignores one that comes in the callback of a weak reference."""
+    """Yield a function that raises a lost interrupt: Python ignores one in the callback of a weak reference."""
     come: list[type[KeyboardInterrupt]] = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
@@ -71,14 +71,14 @@ def _interrupts_kept() -> Iterator[Callable[[], object]]:
     with _handled(interrupt, signal.SIGINT, signal.SIGTERM):
         try:
             yield raise_lost
-        except KeyboardInterrupt:  # it may be another that stands for the one that came
+        except KeyboardInterrupt:  # it may replace the one that came first
             raise_lost()
             raise
 
 
 @contextmanager
 def _handled(handler: Callable[[int, FrameType | None], None], *signals: signal.Signals) -> Iterator[None]:
-    """Signals have this handler, those of them that nobody else handles, in the main thread."""
+    """Handle signals in the main thread, except those with another handler."""
     is_main = threading.current_thread() is threading.main_thread()
     ours = [number for number in signals if is_main and signal.getsignal(number) is _USUAL[number]]
     for number in ours:

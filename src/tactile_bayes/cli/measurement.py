@@ -1,4 +1,4 @@
-"""The command `measure`: what a load cell makes of an ideal record."""
+"""The command `measure`: an ideal record as a load cell reads it."""
 
 from __future__ import annotations
 
@@ -32,18 +32,21 @@ class FlawOptions:
     force_noise: Annotated[
         float, typer.Option(help="Standard deviation of the forces' noise [N, or EI/L²].", min=0.0)
     ] = 0.0
-    moment_noise: Annotated[float, typer.Option(help="Of the moment's noise [N m, or EI/L].", min=0.0)] = 0.0
+    moment_noise: Annotated[
+        float, typer.Option(help="Standard deviation of the moment's noise [N m, or EI/L].", min=0.0)
+    ] = 0.0
     relative_noise: Annotated[float, typer.Option(help="Noise in proportion to the load, over it.", min=0.0)] = 0.0
     degrees_of_freedom: Annotated[
-        float, typer.Option(help="Of Student's t, which the noise follows: 3 to 10 for knocks; inf is normal.")
+        float, typer.Option(help="Degrees of freedom of Student's t noise: 3 to 10 for outliers; inf is normal.")
     ] = math.inf
     correlation: Annotated[
         str | None,
         typer.Option(
-            help="Of the noises of moment and force_x, moment and force_y, force_x and force_y, as 0.1,0,0.5."
+            help="Correlations of the noises of moment and force_x, moment and force_y, force_x and force_y, as "
+            "0.1,0,0.5."
         ),
     ] = None
-    bias: Annotated[str | None, typer.Option(help=f"What is read without load, {_THREE}.")] = None
+    bias: Annotated[str | None, typer.Option(help=f"Reading without load, {_THREE}.")] = None
     bias_uncertainty: Annotated[
         str | None, typer.Option(help=f"Standard deviation of a bias that is drawn for this record, {_THREE}.")
     ] = None
@@ -63,21 +66,23 @@ class FlawOptions:
     ] = None
     lever: Annotated[
         str | None,
-        typer.Option(help="Where the moment is taken, from the pivot, along the axes of the cell: X,Y."),
+        typer.Option(help="Reference point of the moment, from the pivot, along the axes of the cell: X,Y."),
     ] = None
     force_range: Annotated[float, typer.Option(help="Largest force that is read [N, or EI/L²].")] = math.inf
     moment_range: Annotated[float, typer.Option(help="Largest moment that is read [N m, or EI/L].")] = math.inf
     force_resolution: Annotated[float, typer.Option(help="Step of the forces [N, or EI/L²].", min=0.0)] = 0.0
     moment_resolution: Annotated[float, typer.Option(help="Step of the moment [N m, or EI/L].", min=0.0)] = 0.0
-    drive_angle_offset: Annotated[float, typer.Option(help="What the encoder reads at zero [degrees].")] = 0.0
+    drive_angle_offset: Annotated[float, typer.Option(help="Encoder reading at zero [degrees].")] = 0.0
     drive_angle_backlash: Annotated[
-        float, typer.Option(help="What it reads more in forward than in backward motion [degrees].")
+        float, typer.Option(help="Encoder reading in forward motion less that in backward motion [degrees].")
     ] = 0.0
-    drive_angle_noise: Annotated[float, typer.Option(help="Of the encoder [degrees].", min=0.0)] = 0.0
+    drive_angle_noise: Annotated[float, typer.Option(help="Noise of the encoder [degrees].", min=0.0)] = 0.0
     drive_angle_resolution: Annotated[float, typer.Option(help="Step of the encoder [degrees].", min=0.0)] = 0.0
     load_cell_frame: Annotated[
         Literal["fixed", "turning"] | None,
-        typer.Option(help="Axes of the cell: the world's, or turning with the drive; by default the record's."),
+        typer.Option(
+            help="Axes of the cell: fixed in the laboratory, or turning with the drive; default the record's."
+        ),
     ] = None
 
     @property
@@ -114,10 +119,10 @@ def measure(
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """Read an ideal record with a load cell that is not: noise, bias, drift, gain, lever, range, steps and encoder.
+    """Measure an ideal record with a real load cell: noise, bias, drift, gain, lever, range, resolution and encoder.
 
-    A record whose header states a load cell is refused, as noise would be there twice; one that states none is taken
-    to be ideal.
+    A record whose header states a load cell is refused, since it would have noise twice; a record without one is
+    assumed to be ideal.
     """
     refuse_other_suffix(out)
     from tactile_bayes.errors import ParameterError

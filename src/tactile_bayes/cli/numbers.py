@@ -11,7 +11,7 @@ __all__ = ["assigned", "numbers_asked"]
 
 
 def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
-    """As many numbers, with commas between them.
+    """Parse a given number of numbers, with commas between them.
 
     Raises
     ------
@@ -33,12 +33,12 @@ def numbers_asked(text: str, option: str, count: int) -> tuple[float, ...]:
 def assigned(
     option: str, texts: Sequence[str] | None, form: str = "", *, known: Collection[str] = ()
 ) -> dict[str, str]:
-    """Values by name, of an option that is given as NAME=VALUE, several times.
+    """Parse the values of a repeated option NAME=VALUE, by name.
 
     Raises
     ------
     ParameterError
-        If one is written otherwise, its name is not known, or it is given twice.
+        If a text has another form, its name is not known, or it is given twice.
     """
     from tactile_bayes.errors import ParameterError
 

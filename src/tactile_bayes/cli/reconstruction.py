@@ -34,25 +34,25 @@ def reconstruct(
     method: Annotated[
         Literal["raw", "constrained"] | None,
         typer.Option(
-            help="raw takes the four numbers of a sample at their word; constrained, the default where there is noise, "
-            "finds the most likely contact that a rod can make."
+            help="raw uses the four numbers of a sample as they are; constrained, the default if there is noise, finds "
+            "the most probable contact that a rod can make."
         ),
     ] = None,
     reading: RecordOptions,
     friction: Friction = 0.0,
     output: Output,
 ) -> Answer:
-    """Find contact points (Step 2): from every sample where the rod touched, with standard deviations.
+    """Find contact points with standard deviations (Step 2), from every sample in contact.
 
-    What noise is not stated is taken from the samples before first contact and after snap-off.
+    Noise that is not stated is estimated from the samples before first contact and after snap-off.
     """
     with step_bar(output.is_silent) as show:
-        from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_in_words
+        from tactile_bayes.runs.reconstruction import reconstruct_into, reconstruction_messages
 
         measured, cell = reading.read(record)
         show(1, 2)
         run = reconstruct_into(measured, out, method=method, load_cell=cell, friction=friction)
-    words = reconstruction_in_words(run.result)
+    words = reconstruction_messages(run.result)
     source = [_SOURCES[run.source]] if run.source in _SOURCES else []
     return Answer([*words, *source, "", run.files], lambda: _numbers(run, words))
 

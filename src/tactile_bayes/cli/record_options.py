@@ -1,4 +1,4 @@
-"""Options of every command that reads a record, and what they make of it."""
+"""Options of every command that reads a record."""
 
 from __future__ import annotations
 
@@ -23,18 +23,20 @@ Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc.")]
 
 @dataclass(frozen=True)
 class RecordOptions:
-    """How a file is read, and what the rig is that it does not state."""
+    """Options for reading a file, and for parts of the rig that it does not state."""
 
     column: Annotated[
         list[str] | None,
         typer.Option(
-            help="What the file has for a column, where it has another name, unit, sign or zero: force_x=Fx[mN], "
+            help="Source of a column with another name, unit, sign or zero in the file: force_x=Fx[mN], "
             "force_y=-Fy[N], drive_angle=90-Angle[deg], base_x=12[mm]; give it again for another."
         ),
     ] = None
     split_sweeps: Annotated[
         bool,
-        typer.Option("--split-sweeps", help="Find sweeps and directions where the drive turns, if there are none."),
+        typer.Option(
+            "--split-sweeps", help="Find sweeps and directions by the turns of the drive, if not in the file."
+        ),
     ] = False
     length: Annotated[float | None, typer.Option(help="Rod length [m], for SI files that do not state it.")] = None
     flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], likewise.")] = None
@@ -53,11 +55,13 @@ class RecordOptions:
     ] = None
     load_cell_frame: Annotated[
         Literal["fixed", "turning"] | None,
-        typer.Option(help="Axes of the forces, if the file does not say: the world's, or turning with the drive."),
+        typer.Option(
+            help="Axes of the forces, if not in the file: fixed in the laboratory, or turning with the drive."
+        ),
     ] = None
 
     def read(self, path: Path) -> tuple[xr.Dataset, LoadCell | None]:
-        """The record, and the load cell if the options say anything of it; tells where units had to be guessed.
+        """Read the record, and return it with the load cell that the options state, if any; report assumed units.
 
         Raises
         ------
@@ -87,7 +91,7 @@ class RecordOptions:
 
     @property
     def origins(self) -> dict[str, str]:
-        """What the file has, by the columns that it is for."""
+        """Sources in the file by column of the record."""
         return assigned("--column", self.column, "COLUMN=NAME[UNIT], like force_x=Fx[mN]")
 
     def _load_cell(self, record: xr.Dataset) -> LoadCell | None:

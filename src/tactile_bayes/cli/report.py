@@ -1,4 +1,4 @@
-"""The command `report`: what a run has found, as one page."""
+"""The command `report`: the results of a run as one page."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def report(
     ] = None,
     output: Output,
 ) -> Answer:
-    """Write a page on a run: what was found, whether it can be trusted, what was measured, how to make it again."""
+    """Write a page on a run: its results, how far to trust them, the readings, and how to reproduce it."""
     with step_bar(output.is_silent) as show:
         from tactile_bayes.report import write_report
 

@@ -1,4 +1,4 @@
-"""Options that describe a rig: what is simulated, and what is not known of it."""
+"""Options that describe a rig: its simulated parts, and its unknowns."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", m
 
 @dataclass(frozen=True)
 class NoiseOptions:
-    """Noise of a load cell that is simulated."""
+    """Noise of a simulated load cell."""
 
     force_noise: Annotated[
         float | None, typer.Option(help="Standard deviation of the forces [N, or EI/L²]; by default 0.05 EI/L².")
@@ -31,12 +31,12 @@ class NoiseOptions:
 
     @property
     def load_cell(self) -> LoadCell | None:
-        """The load cell, if one is given.
+        """The load cell, or None if no option gives one.
 
         Raises
         ------
         ParameterError
-            If it is not given whole.
+            If one of the two options is missing.
         """
         from tactile_bayes.errors import ParameterError
         from tactile_bayes.load_cell import LoadCell
@@ -50,7 +50,7 @@ class NoiseOptions:
 
 @dataclass(frozen=True)
 class RodOptions:
-    """A rod that is simulated."""
+    """A simulated rod."""
 
     length: Annotated[
         float | None, typer.Option(help="Rod length [m]; by default everything is dimensionless, in units of the rod.")
@@ -60,13 +60,13 @@ class RodOptions:
 
     @property
     def rod(self) -> Rod | None:
-        """The rod, if one is given."""
+        """The rod, or None if no option gives one."""
         return rod_asked(self.length, self.flexural_rigidity, self.diameter)
 
 
 @dataclass(frozen=True)
 class RigOptions(RodOptions):
-    """A rod that is simulated, and where it pivots."""
+    """A simulated rod and its pivots."""
 
     base: Annotated[
         list[str] | None, typer.Option(help="A pivot, X,Y; give it again for another. By default one at 0,0.")
@@ -74,33 +74,33 @@ class RigOptions(RodOptions):
 
     @property
     def pivots(self) -> list[tuple[float, ...]]:
-        """Places of the pivots."""
+        """Coordinates of the pivots."""
         return [numbers_asked(pivot, "--base", 2) for pivot in self.base or ["0,0"]]
 
 
 @dataclass(frozen=True)
 class UnknownOptions:
-    """What is not known of a rig, and inferred beside a contour."""
+    """Unknowns of a rig that are inferred beside a contour."""
 
     friction: Annotated[
         float | None,
-        typer.Option(help="Coulomb's coefficient, where it is known; else it is inferred.", min=0.0, max=0.84),
+        typer.Option(help="Coulomb's coefficient, if known; else it is inferred.", min=0.0, max=0.84),
     ] = None
     nuisance: Annotated[
         list[str] | None,
         typer.Option(
-            help="What is not known of the rig and inferred too, in place of rigidity_scale, drive_angle_offset, bias, "
-            "lever, backlash and friction: one of these, or drift, gain, suspension_compliance, base (where further "
-            "pivots stand); give it again for another."
+            help="Unknown of the rig to be inferred, in place of rigidity_scale, drive_angle_offset, bias, lever, "
+            "backlash and friction: one of these, or drift, gain, suspension_compliance, base (positions of further "
+            "pivots); give it again for another."
         ),
     ] = None
     as_stated: Annotated[
-        bool, typer.Option("--as-stated", help="Take everything about the rig as stated: fewer parameters, narrower.")
+        bool, typer.Option("--as-stated", help="Assume the rig as stated: fewer parameters, narrower bands.")
     ] = False
 
     @property
     def nuisances(self) -> list[str]:
-        """Names of what is inferred.
+        """Names of the nuisance parameters that are inferred.
 
         Raises
         ------
@@ -116,12 +116,12 @@ class UnknownOptions:
 
 
 def rod_asked(length: float | None, flexural_rigidity: float | None, diameter: float) -> Rod | None:
-    """The rod, if one is given.
+    """Return the rod, or None if no option gives one.
 
     Raises
     ------
     ParameterError
-        If it is not given whole.
+        If an option of the rod is missing.
     """
     from tactile_bayes.errors import ParameterError
     from tactile_bayes.mechanics.rod import Rod

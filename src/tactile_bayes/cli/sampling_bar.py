@@ -1,4 +1,4 @@
-"""The bar that shows how far sampling has come, and about how long it will take."""
+"""The progress bar of sampling, with an estimate of the remaining time."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ if TYPE_CHECKING:
 __all__ = ["remaining_seconds", "sampling_bar"]
 
 _GOAL = 1000.0
-"""Effective draws that sampling goes on for, and R̂ below which it stops: those of `SamplerSettings`."""
+"""Effective sample size at which sampling stops, as in `SamplerSettings`."""
 
-_SETTLED = 1.01
+_MAX_R_HAT = 1.01
+"""R̂ below which sampling stops, as in `SamplerSettings`."""
 
 
 class Show(Protocol):
-    """What moves a bar of sampling on."""
+    """Function that updates the progress bar."""
 
     def __call__(self, progress: Progress, what: str = "", /) -> object:
-        """Show progress, and of what it is where there is more than one thing."""
+        """Show progress; `what` names one of several runs."""
 
 
 @contextmanager
 def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[Show | None]:
-    """A bar that fills with the effective sample size; none where nobody sees it move."""
+    """Show a bar that fills with the effective sample size; no bar if quiet or without a terminal."""
     from rich.progress import BarColumn, TextColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(12))
@@ -41,7 +42,7 @@ def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[S
 
         def show(progress: Progress, what: str = "", /) -> None:
             words = f"step {progress.steps}: R̂ {progress.r_hat:.3f}, effective draws {progress.ess:.0f}"
-            if progress.ess >= _GOAL and progress.r_hat <= _SETTLED:
+            if progress.ess >= _GOAL and progress.r_hat <= _MAX_R_HAT:
                 words, left = "sampled" if what else "sampled; checks, band and figures follow", ""
             else:
                 seconds = remaining_seconds(progress, max_seconds)
@@ -53,9 +54,9 @@ def sampling_bar(quiet: bool, *, max_seconds: float | None = None) -> Iterator[S
 
 
 def remaining_seconds(progress: Progress, max_seconds: float | None = None) -> float | None:
-    """About how long sampling will still take, if effective draws come as they came so far; None if nothing is known.
+    """Estimate the remaining time of sampling [s] from the rate of effective draws so far; None if it is unknown.
 
-    At most until the steps, or the time, are used up.
+    It is at most the time until the steps, or the time limit, are used up.
     """
     if not (progress.steps and progress.seconds > 0.0):
         return None
@@ -63,7 +64,7 @@ def remaining_seconds(progress: Progress, max_seconds: float | None = None) -> f
     most = rate * (progress.max_steps - progress.steps)
     if max_seconds is not None:
         most = min(most, max_seconds - progress.seconds)
-    if progress.ess >= _GOAL:  # R̂ has still to settle: a fifth more, and then again
+    if progress.ess >= _GOAL:  # R̂ has still to settle, which may take a fifth more
         return max(0.0, min(0.2 * progress.seconds, most))
     if not (math.isfinite(progress.ess) and progress.ess > 0.0):
         return None
@@ -71,7 +72,7 @@ def remaining_seconds(progress: Progress, max_seconds: float | None = None) -> f
 
 
 def _in_words(seconds: float) -> str:
-    """Like "40 s", "5 min" and "2 h 10 min"."""
+    """Return text like "40 s", "5 min" and "2 h 10 min"."""
     if seconds < 90.0:
         return f"{max(1, round(seconds))} s"
     minutes = round(seconds / 60.0)

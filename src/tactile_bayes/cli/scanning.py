@@ -1,4 +1,4 @@
-"""The command `scan`: what the base of an ideal rod feels along a contour."""
+"""The command `scan`: the loads at the base of an ideal rod along a contour."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["RecordFile", "refuse_other_suffix", "scan"]
 
 RecordFile = Annotated[
     Path,
-    typer.Option(help="File for the record, .csv or .nc; its folder is made if it is not there.", dir_okay=False),
+    typer.Option(help="File for the record, .csv or .nc; its folder is created if missing.", dir_okay=False),
 ]
 
 
@@ -43,12 +43,12 @@ def scan(
     figure: Annotated[
         Path | None,
         typer.Option(
-            help="File for a picture of rod and loads along the sweeps, .png, .pdf or .svg; likewise.", dir_okay=False
+            help="File for a figure of rod and loads along the sweeps, .png, .pdf or .svg; likewise.", dir_okay=False
         ),
     ] = None,
     output: Output,
 ) -> Answer:
-    """Sweep an ideal rod along a contour (Step 1): the record of its base, without noise, and its events."""
+    """Sweep an ideal rod along a contour (Step 1), and write the record of its base, without noise, and its events."""
     refuse_other_suffix(out)
     if figure is not None:
         refuse_other_suffix(figure, (".png", ".pdf", ".svg"), "a figure")
@@ -79,12 +79,12 @@ def scan(
 
 
 def refuse_other_suffix(path: Path, known: tuple[str, ...] = (".csv", ".nc"), what: str = "a record") -> None:
-    """Refuse a file of another kind, or below another file, before anything is computed.
+    """Refuse a file with another suffix, or below another file, before anything is computed.
 
     Raises
     ------
     ParameterError
-        If the name ends otherwise, or there is a file where its folder would be.
+        If the name has another suffix, or its folder is a file.
     """
     from tactile_bayes.errors import ParameterError
 
@@ -108,7 +108,7 @@ def _headline(made: Scan, rod: Rod) -> str:
 
 
 def _table(made: Scan, rod: Rod) -> Table:
-    """First contact, changes and snap-off of every sweep, in the order in which they happen."""
+    """Return first contact, phase changes and snap-off of every sweep, in this order."""
     scale, units = (1.0, ("", "", "")) if rod.is_dimensionless else (1e3, (" [mm]", " [mN m]", " [mN]"))
     length, moment, force = units
     rows = []
@@ -153,7 +153,7 @@ def _numbers(made: Scan, rod: Rod, files: Mapping[str, Path]) -> dict[str, Any]:
 
 
 def _draw(made: Scan, path: Path) -> None:
-    """Rods of every sweep from the first pivot, and the loads below."""
+    """Draw rods of every sweep from the first pivot, and the loads below."""
     from matplotlib.figure import Figure
 
     from tactile_bayes import plotting

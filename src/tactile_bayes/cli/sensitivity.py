@@ -1,4 +1,4 @@
-"""The command `sensitivity`: how good a load cell must be, before anything is measured."""
+"""The command `sensitivity`: the load cell that a measurement requires."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Profile = Literal["I", "II", "III", "IV"]
 
 @dataclass(frozen=True)
 class StudyOptions:
-    """A study: records that are simulated as well."""
+    """A study with simulated records."""
 
     study: Annotated[
         bool,
@@ -43,11 +43,11 @@ class StudyOptions:
     ] = None
     study_distance: Annotated[
         list[float] | None,
-        typer.Option(help="Of the vertex above the pivot [rod lengths]; again for another; by default --distance."),
+        typer.Option(help="Height of the vertex above the pivot [rod lengths]; again for another; default --distance."),
     ] = None
     noise_factor: Annotated[
         list[float] | None,
-        typer.Option(help="On the load cell's noise; again for another. By default 0.1, 0.3, 1 and 3."),
+        typer.Option(help="Factor on the load cell's noise; again for another. By default 0.1, 0.3, 1 and 3."),
     ] = None
     replicates: Annotated[int | None, typer.Option(help="Records in each cell of the study; by default 20.", min=1)] = (
         None
@@ -63,7 +63,7 @@ def sensitivity(
     profile: Annotated[
         Profile, typer.Option(help="Profile of Merker et al. 2018; with --length scaled to the rod.")
     ] = "II",
-    distance: Annotated[float, typer.Option(help="Of its vertex above the x axis [rod lengths].")] = 0.5,
+    distance: Annotated[float, typer.Option(help="Height of its vertex above the x axis [rod lengths].")] = 0.5,
     noise: NoiseOptions,
     drive_angle_noise: Annotated[
         float, typer.Option(help="Standard deviation of the drive angle [degrees].", min=0.0)
@@ -81,19 +81,19 @@ def sensitivity(
     youngs_modulus: Annotated[
         float | None,
         typer.Option(
-            help="With --elastic-strain, of the rod's material [Pa]: which length and diameter does the load cell want?"
+            help="Young's modulus of the rod [Pa], with --elastic-strain: find the rod that suits the load cell."
         ),
     ] = None,
     elastic_strain: Annotated[
-        float | None, typer.Option(help="Bending strain that the material takes: 0.005 spring steel, 0.05 nitinol.")
+        float | None, typer.Option(help="Largest elastic bending strain: 0.005 spring steel, 0.05 nitinol.")
     ] = None,
-    samples: Annotated[int, typer.Option(help="For shares of the variance, a power of two.", min=2)] = 1024,
+    samples: Annotated[int, typer.Option(help="Samples for shares of the variance, a power of two.", min=2)] = 1024,
     studying: StudyOptions,
     work: WorkerOptions,
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """Say what errors of the sensor do to contact points and to a contour, and how small they have to be.
+    """Compute the effect of the sensor's errors on contact points and contour, and how small they have to be.
 
     A study that was stopped goes on by the same command.
     """
@@ -181,39 +181,39 @@ def _load_cell(rod: Rod | None, cell: LoadCell | None, drive_angle_noise: float)
 
 
 def _answer(run: SensitivityRun) -> Answer:
-    from tactile_bayes.runs.sensitivity import rod_in_words
+    from tactile_bayes.runs.sensitivity import rod_message
 
     words = run.result.attrs["words"].splitlines()
     if run.rods is not None:
-        words.append(rod_in_words(run.rods))
+        words.append(rod_message(run.rods))
     table = _table(run.result["information"].to_dataset())
     return Answer([*words, "", table, "", run.files], lambda: _numbers(run, words))
 
 
-def _table(told: xr.Dataset) -> Table:
+def _table(information: xr.Dataset) -> Table:
     rows = []
-    for row in columns_of(told, "parameter"):
+    for row in columns_of(information, "parameter"):
         numbers = (f"{row[name]:.3g}" for name in ("value", "bound_with_priors"))
         rows.append((row["parameter"], *numbers, "" if row["unit"] == "1" else row["unit"]))
     return table_of(["parameter", "value", "known to ±", "unit"], rows, left=["parameter", "unit"])
 
 
 def _numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any]:
-    """The main ones, as JSON can hold them."""
+    """Return the main results for JSON."""
     found = run.result
-    told, needed = found["information"].to_dataset(), found["required_noise"].to_dataset()
+    information, needed = found["information"].to_dataset(), found["required_noise"].to_dataset()
     answer: dict[str, Any] = {
         "words": words,
         **{name: found.attrs[name] for name in ("contour", "units", "rod_length", "rod_flexural_rigidity")},
         **{name: float(found.attrs[name]) for name in ("force_noise", "moment_noise")},
         "parameters": {
             row["parameter"]: {name: row[name] for name in ("value", "bound", "bound_with_priors", "unit")}
-            for row in columns_of(told, "parameter")
+            for row in columns_of(information, "parameter")
         },
         "band": {
-            "touched": told["touched_width"],
-            "gap": told["gap_width"],
-            "probability": told.attrs["probability"],
+            "touched": information["touched_width"],
+            "gap": information["gap_width"],
+            "probability": information.attrs["probability"],
         },
         "required_noise": [
             {name: needed[name][i] for name in ("band_width", "noise_factor", "force_noise", "moment_noise")}
@@ -229,7 +229,7 @@ def _numbers(run: SensitivityRun, words: list[str]) -> dict[str, Any]:
 
 
 def _cells(study: xr.Dataset) -> list[dict[str, Any]]:
-    """Errors of constrained contacts and widths of bands, by cell."""
+    """Return errors of constrained contacts and widths of bands, by cell."""
     names = ["message", "rms_along", "rms_across", "ok", "expected_touched_width", "expected_gap_width"]
     of_method = study[names].sel(reconstruction="constrained", drop=True)
     table = of_method.to_dataframe(dim_order=["contour", "distance", "noise_factor"])

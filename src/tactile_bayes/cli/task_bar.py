@@ -1,4 +1,4 @@
-"""Bars that show how many of many tasks, or of a few steps, are done, and how long the rest will take."""
+"""Progress bars of tasks and steps, with the remaining time."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ def resumable_bar(
     *,
     then: str = "the same command goes on",
 ) -> Iterator[Callable[[int], object]]:
-    """A bar that is told how many are done; where an interrupt comes, `have` says what is there of this last number.
+    """Show a bar, and yield a function that takes the number of tasks done; at an interrupt, report what was kept.
 
-    It is None before the first is told. `then` is what the same command does after the interrupt.
+    `have` returns that report from the last number done, None if there was none. `then` says what the same command does
+    after the interrupt.
     """
     last: int | None = None
     with resumable(lambda: have(last), then=then) as raise_lost, task_bar(total, noun, quiet) as show:
@@ -44,7 +45,7 @@ def resumable_bar(
 
 @contextmanager
 def task_bar(total: int, noun: str, quiet: bool) -> Iterator[Callable[[int], object]]:
-    """A bar that is told how many are done, and shows how fast; none where nobody sees it move."""
+    """Show a bar with its rate, and yield a function that takes the number done; no bar if quiet."""
     with step_bar(quiet, noun, at_first=f"{counted(total, noun)} to be made", has_rate=True) as show:
         yield lambda done: show(done, total)
 
@@ -53,7 +54,7 @@ def task_bar(total: int, noun: str, quiet: bool) -> Iterator[Callable[[int], obj
 def step_bar(
     quiet: bool, noun: str = "step", *, at_first: str = "beginning", has_rate: bool = False
 ) -> Iterator[Callable[[int, int], object]]:
-    """A bar that is told how many of how many are done, and that moves before the first of them is."""
+    """Show a bar, and yield a function that takes the number done and the total; a spinner moves meanwhile."""
     from rich.progress import BarColumn, ProgressColumn, TextColumn, TimeRemainingColumn
     from rich.text import Text
 
@@ -77,7 +78,7 @@ def step_bar(
 
 @contextmanager
 def moving_bar(quiet: bool, at_first: str, *columns: ProgressColumn) -> Iterator[Callable[..., object] | None]:
-    """A bar of a spinner, some columns, and what is left; what is yielded moves it, or is None where nobody sees it."""
+    """Show a bar with a spinner, columns and remaining time; yield its update function, or None without a terminal."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn
 
@@ -91,5 +92,5 @@ def moving_bar(quiet: bool, at_first: str, *columns: ProgressColumn) -> Iterator
 
 
 def counted(count: int, noun: str) -> str:
-    """Like "1 record" and "2,000 records"."""
+    """Return text like "1 record" and "2,000 records"."""
     return f"{count:,} {noun}" + "s" * (count != 1)

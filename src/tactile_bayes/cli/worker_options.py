@@ -1,4 +1,4 @@
-"""Options of every command that does many tasks: by how many processes, and where."""
+"""Options for the processes of a command with many tasks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["WorkerOptions"]
 
 @dataclass(frozen=True)
 class WorkerOptions:
-    """Where the work is done; two places are refused."""
+    """Local processes or a Dask scheduler; both together are refused."""
 
     workers: Annotated[
-        int | None, typer.Option(help="Processes on this machine; by default one for each core.", min=1)
+        int | None, typer.Option(help="Number of local processes; by default one for each core.", min=1)
     ] = None
     scheduler: Annotated[
         str | None,

@@ -1,1 +1,1 @@
-"""The comparison of families of contours: cross-validation, stacking, evidence and what they say."""
+"""Comparison of families of contours: cross-validation, stacking, evidence and a verdict."""

@@ -1,4 +1,4 @@
-"""Which shape it was: families of contours compared by how well they explain a record."""
+"""Comparison of families of contours by evidence, cross-validation and the check of the record."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from tactile_bayes.checks import check_function, check_mapping, check_names, check_probability, check_switch
 from tactile_bayes.comparison.leave_one_out import difference, stacking_weights
-from tactile_bayes.comparison.left_out import ForetoldSamples, foretold_samples
+from tactile_bayes.comparison.left_out import PredictedSamples, predicted_samples
 from tactile_bayes.comparison.verdict import verdict_on
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
@@ -37,27 +37,27 @@ from tactile_bayes.record import record_hash, rod_of
 __all__ = ["SHAPES", "compare_families"]
 
 SHAPES = ("parabola", "circle", "ellipse", "power-law", "power-law/power-law", "shape-free")
-"""Families that are compared by default: the last but one has flanks of two shapes."""
+"""Families that are compared by default; the last but one has flanks of two shapes."""
 
 _USUAL = WIDTHS.index(1.0)
 
 _GIVEN_UP = 100.0
-"""By how much the likeliest contour of a family may be below the best evidence for the family not to be sampled."""
+"""Distance of a family's largest log-likelihood below the best log-evidence from which the family is not sampled."""
 
 _HOPELESS = 20.0
-"""By how much the largest log-likelihood of a family whose evidence is not to be had may be below the best evidence
-for its probability to be none."""
+"""Distance of the largest log-likelihood of a family without evidence below the best log-evidence from which the
+family's probability is zero."""
 
 
 class _Tried(NamedTuple):
-    """What became of one family; of one that was given up, the first entry is all there is."""
+    """Result of one family; a family that is not sampled has the first entry alone."""
 
     ceiling: float
-    """Largest log-likelihood that was seen, which the evidence cannot exceed unless a better contour was missed."""
+    """Largest log-likelihood found, which the evidence cannot exceed unless a better contour was missed."""
     draws: Draws | None = None
     evidence: ContourEvidence | None = None
-    """None also where it is not to be had from the draws."""
-    foretold: ForetoldSamples | None = None
+    """None also where it cannot be computed from the draws."""
+    predicted: PredictedSamples | None = None
     p_value: float = np.nan
     passed: bool = False
 
@@ -77,34 +77,34 @@ def compare_families(
     settings: SamplerSettings | None = None,
     progress: Callable[[str, Progress], object] | None = None,
 ) -> xr.Dataset:
-    """Which shape a record is of: the probability of each of several families of contours.
+    """Compare families of contours for a record, and return the probability of each.
 
-    Each family's posterior is inferred, and three things are asked of it, which need not agree. Its *evidence*, the
+    The posterior of each family is inferred and judged by three criteria, which need not agree. Its *evidence*, the
     density of the record under the family's prior, gives the probability that the contour is of this family if it is
-    of one of them, all being as likely beforehand. *Leave-one-out* densities tell how well the family foretells a
-    sample from all the others, and hardly depend on the prior. The *check* tells whether the record looks like one of
-    the family at all: a family may be the most probable one and wrong.
+    of one of them, with equal prior probabilities. *Leave-one-out* densities measure how well the family predicts a
+    sample from all the others, and hardly depend on the prior. The *check* tests whether the record looks like one of
+    the family at all: the most probable family may be wrong.
 
     Parameters
     ----------
     measured : xr.Dataset
-        A record, as of `infer_contour`.
+        A record, as for `infer_contour`.
     families : sequence of str
-        Two at least; families of `infer_contour`.
+        Two or more families of `infer_contour`.
     load_cell, rod, friction, nuisances
-        As of `infer_contour`, and the same for all families.
+        As for `infer_contour`, the same for all families.
     priors : mapping of str to mapping, optional
-        By family, in place of some of the default priors (see Notes).
+        Priors by family and parameter that replace default priors (see Notes).
     seed : int or numpy.random.SeedSequence
-        The same seed, the same result.
+        Seed of all random numbers; the same seed gives the same result.
     leave_one_out : bool
-        Whether leave-one-out densities are asked for, which takes as long again.
+        If True, leave-one-out densities are computed, which doubles the time.
     false_alarm : float
-        Probability at which the check finds fault with the family that is right.
+        Probability at which the check rejects the right family, in (0, 1).
     settings : SamplerSettings, optional
-        Of every posterior.
+        Settings of the sampler for every posterior.
     progress : callable, optional
-        Is given a family and a `Progress` after each look at the diagnostics.
+        Called with a family and a `Progress` after each diagnosis.
 
     Returns
     -------
@@ -112,53 +112,55 @@ def compare_families(
         Over "family":
 
         probability
-            Given that the contour is of one of them; NaN throughout if the evidence of one is not to be had that might
-            count.
+            Probability of the family if the contour is of one of them; NaN throughout if the evidence of a family that
+            might count is missing.
         log_evidence, log_evidence_error
-            Logarithm of the evidence, and the error of its computation; NaN where walkers did not find together.
+            Logarithm of the evidence, and the error of its computation; NaN where the ensembles did not agree.
         probability_by_width (prior_width, family)
-            The same with priors of sizes, exponents, amplitude and length scale of ½, 1 and 2 times the width: where it
-            depends on that much, the record says little.
+            Probability with priors of sizes, exponents, amplitude and length scale of ½, 1 and 2 times the width: if it
+            depends on the width, the record says little.
         elpd, elpd_error
-            Sum of the samples' leave-one-out log-densities, and the Monte-Carlo error of that.
+            Expected log predictive density: the sum of the samples' leave-one-out log-densities, and its Monte-Carlo
+            error.
         elpd_difference, elpd_difference_error
-            Less that of the family with the largest, and its standard error from the scatter between samples. A
-            difference of less than 4 is little (Sivula et al. 2020, arXiv:2008.10296).
+            elpd less that of the family with the largest, and its standard error from the scatter between samples. A
+            difference of less than 4 is small (Sivula et al. 2020, arXiv:2008.10296).
         weight
-            Of the mixture of families that foretells best (stacking; Yao et al. 2018, doi 10.1214/17-BA1091).
+            Weight of the family in the mixture that predicts best (stacking; Yao et al. 2018, doi 10.1214/17-BA1091).
         largest_k (family)
-            Largest Pareto k̂ of the importance sampling; above 0.7 its density cannot be trusted.
+            Largest Pareto k̂ of the importance sampling; above 0.7 its density cannot be trusted (Vehtari et al. 2024,
+            JMLR 25(72)).
         p_value, fits
-            Of `check_record`, and whether it passes.
+            Overall p-value of `check_record`, and True if the check passes.
         log_likelihood
-            The largest where walkers start: near the family's best.
+            Largest log-likelihood among the starting points of the walkers, which is near the family's maximum.
         sampled
-            Whether the family was sampled: one whose largest log-likelihood is 100 below the best evidence is not, has
-            no probability, and does not fit.
+            True if the family was sampled. A family whose largest log-likelihood is 100 below the best evidence is not
+            sampled, has no probability, and does not fit.
         converged, steps, seconds
-            Of the posterior.
+            Convergence, number of steps and time [s] of the posterior.
 
-        And `log_density` (family, sample), leave-one-out. Attributes: `verdict` in words, `most_probable`, `none_fits`
-        (1 if no family passes the check), `nuisances` that were inferred (JSON), `friction` as stated, `data_sha256`
-        of the record.
+        `log_density` (family, sample) holds the leave-one-out log-densities. Attributes: `verdict`, a sentence;
+        `most_probable`; `none_fits` (1 if no family passes the check); `nuisances`, those inferred (JSON); `friction`
+        as stated; `data_sha256` of the record.
 
     Raises
     ------
     RecordError, ParameterError, InferenceError
-        As of `infer_contour`; ParameterError if there are not at least two different families.
+        As for `infer_contour`; ParameterError also if there are fewer than two different families.
     KeyboardInterrupt
-        At Ctrl-C: of families some of which were cut short, nothing is to be said.
+        At Ctrl-C, since families cannot be compared if sampling of some was cut short.
 
     Notes
     -----
-    So that no family is favoured by its prior, sizes have priors for which the mean curvature of a flank is expected
-    to be the same in all of them (`matched_priors`); everything else has the defaults of `infer_contour`. The evidence
-    is that of contours within reach. It is found by bridge sampling (Meng & Wong 1996) from the posterior's draws.
+    So that no family is favoured by its prior, sizes have priors under which the expected mean curvature of a flank is
+    the same in all families (`matched_priors`); everything else has the defaults of `infer_contour`. The evidence is
+    that of contours within reach, computed by bridge sampling (Meng & Wong 1996) from the posterior's draws.
 
-    Unit of leave-one-out is a sample with its three channels. Where a load cell drifts or has an unknown bias, a
-    sample's density is that given all other samples. Samples next to first contact and snap-off are foretold from a
+    Leave-one-out leaves out a sample with its three channels. If a load cell drifts or has an unknown bias, a sample's
+    density is conditional on all other samples. Samples next to first contact and snap-off are predicted from a
     posterior that is inferred again without them, since importance sampling cannot reach contours that would have let
-    go earlier; of a load cell that drifts they are left out, of all families alike.
+    go earlier; if the load cell drifts, they are left out for all families alike.
 
     Examples
     --------
@@ -185,7 +187,7 @@ def compare_families(
     for name in names:
         own = {**matched_priors(name, length), **(priors or {}).get(name, {})}
         problems[name] = contour_problem(replace(experiment, family=name, priors=own))
-    # What fits anything comes first: others that are far from fitting need not be sampled then.
+    # The shape-free family fits any record and comes first, so that families far from fitting need not be sampled.
     for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
         best = max((one.evidence.log_evidence[_USUAL] for one in tried.values() if one.evidence), default=-np.inf)
         of_family = spawn(seeds[name], 4)
@@ -202,18 +204,17 @@ def compare_families(
             evidence = contour_evidence(problem.model, found, np.random.default_rng(of_family[2]))
         except InferenceError:
             evidence = None
-        foretold = foretold_samples(problem, found, seed=of_family[3], settings=settings) if leave_one_out else None
+        predicted = predicted_samples(problem, found, seed=of_family[3], settings=settings) if leave_one_out else None
         check = check_record(found.tree, false_alarm=false_alarm)
         p_value, passed = float(check.overall_p_value), bool(check.attrs["passed"])
-        tried[name] = _Tried(ceiling, found.draws, evidence, foretold, p_value, passed)
+        tried[name] = _Tried(ceiling, found.draws, evidence, predicted, p_value, passed)
     asked = {name: problem.about[name] for name in ("nuisances", "friction")}
-    return _labelled({name: tried[name] for name in names}, asked).assign_attrs(
-        data_sha256=record_hash(experiment.record)
-    )
+    comparison = _labelled({name: tried[name] for name in names}, asked)
+    return comparison.assign_attrs(data_sha256=record_hash(experiment.record))
 
 
 def _ceiling(model: ContourModel, walk: Walk) -> float:
-    """The largest log-likelihood where walkers start."""
+    """Return the largest log-likelihood among the starting points of the walkers."""
     points, _ = walk.coordinates.parameters(walk.start.reshape(-1, len(model.names)))
     return float(np.max(model.log_probability(points) - model.log_prior(points)))
 
@@ -257,9 +258,9 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
         "steps": ("family", [0 if run is None else run.steps_run for run in runs]),
         "seconds": ("family", [0.0 if run is None else run.seconds for run in runs]),
     }
-    foretold = [one.foretold for one in tried.values()]
-    if any(of_family is not None for of_family in foretold):
-        variables |= _left_out(foretold)
+    predicted = [one.predicted for one in tried.values()]
+    if any(of_family is not None for of_family in predicted):
+        variables |= _left_out(predicted)
     result = xr.Dataset(variables, coords={"family": list(tried), "prior_width": list(WIDTHS)}, attrs=asked)
     result.attrs |= {
         "verdict": verdict_on(result),
@@ -269,10 +270,10 @@ def _labelled(tried: Mapping[str, _Tried], asked: Mapping[str, Any]) -> xr.Datas
     return result
 
 
-def _left_out(foretold: Sequence[ForetoldSamples | None]) -> dict[str, Any]:
-    """NaN for families that were given up, whose weight is none."""
-    known = [of_family for of_family in foretold if of_family is not None]
-    sampled = np.array([of_family is not None for of_family in foretold])
+def _left_out(predicted: Sequence[PredictedSamples | None]) -> dict[str, Any]:
+    """Return the leave-one-out variables; NaN, with weight 0, for families that were not sampled."""
+    known = [of_family for of_family in predicted if of_family is not None]
+    sampled = np.array([of_family is not None for of_family in predicted])
     logs = np.array([of_family.log_density for of_family in known])
     common = np.isfinite(logs).all(axis=0)
     elpd = logs[:, common].sum(axis=1)
@@ -285,11 +286,11 @@ def _left_out(foretold: Sequence[ForetoldSamples | None]) -> dict[str, Any]:
         "weight": stacking_weights(logs[:, common]),
         "largest_k": [np.nanmax(of_family.pareto_k) for of_family in known],
     }
-    every = np.full((len(foretold), logs.shape[1]), np.nan)
+    every = np.full((len(predicted), logs.shape[1]), np.nan)
     every[sampled] = logs
     out: dict[str, Any] = {"log_density": (("family", "sample"), every)}
     for name, values in columns.items():
-        of_all = np.full(len(foretold), 0.0 if name == "weight" else np.nan)
+        of_all = np.full(len(predicted), 0.0 if name == "weight" else np.nan)
         of_all[sampled] = values
         out[name] = ("family", of_all)
     return out

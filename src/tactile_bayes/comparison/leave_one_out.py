@@ -1,9 +1,9 @@
-"""Leave-one-out cross-validation: how well a model foretells each sample from all the others.
+"""Leave-one-out cross-validation: predictive density of each sample given all the others.
 
-Of a model that treats samples as independent, log-densities are log p(y_i | θ), as of `LoadCell.log_likelihood`; of one
-in which they know of one another, log p(y_i | all other y, θ), as of `LoadCell.log_density_left_out` (Bürkner, Gabry &
-Vehtari 2021, doi 10.1007/s00180-020-01045-4). In both, a posterior draw has the weight 1 / p(y_i | θ) under the
-posterior without sample i.
+If a model treats samples as independent, log-densities are log p(y_i | θ), as in `LoadCell.log_likelihood`; if samples
+are correlated, they are log p(y_i | all other y, θ), as in `LoadCell.log_density_left_out` (Bürkner, Gabry & Vehtari
+2021, doi 10.1007/s00180-020-01045-4). In both cases a posterior draw has the weight 1 / p(y_i | θ) under the posterior
+without sample i.
 """
 
 from __future__ import annotations
@@ -32,54 +32,54 @@ __all__ = [
 ]
 
 _LEAST_DRAWS = 25
-"""Of which a fifth, the tail, is enough to fit two parameters to."""
+"""Smallest number of draws; a fifth of them, the tail, suffices to fit two parameters."""
 
 _LEAST_EFFECTIVE = 10.0
-"""Effective draws below which their scatter does not tell how far their mean is off."""
+"""Number of effective draws below which their scatter does not estimate the error of their mean."""
 
 _SAME = 1e-12
-"""Difference of logarithms below which weights are the same."""
+"""Difference of logarithms below which weights are equal."""
 
 _OFF = 1e-5
-"""Log-density per sample by which the weights of a stack may be worse than the best."""
+"""Largest loss of log-density per sample of the stacking weights relative to the best."""
 
 
 class LeftOut(NamedTuple):
-    """Predictive densities of each sample given all the others."""
+    """Predictive log-density of each sample given all the others."""
 
     log_density: Floats
     """Shape (samples,)."""
     standard_error: Floats
-    """Monte-Carlo error of each, autocorrelation heeded; too small, maybe several times, where k̂ is above 0.5, and
-    infinite where it is above `largest_k`."""
+    """Monte-Carlo error of each, allowing for autocorrelation; too small, maybe several times, where k̂ is above 0.5,
+    and infinite where it is above `largest_k`."""
     pareto_k: Floats
     """Shape of the weights' tail, k̂; −∞ where the largest weights are all the same, ∞ where no tail can be fitted."""
 
 
 class FromWider(NamedTuple):
-    """Predictive density of one sample given all the others, from draws that were given fewer."""
+    """Predictive log-density of one sample given all the others, from a posterior given fewer samples."""
 
     log_density: float
     """NaN where no draw has any weight."""
     standard_error: float
-    """Monte-Carlo error, autocorrelation heeded; infinite with fewer than 10 effective draws."""
+    """Monte-Carlo error, allowing for autocorrelation; infinite with fewer than 10 effective draws."""
     effective: float
-    """Effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation makes it fewer still."""
+    """Effective number of draws of the weights, (Σ w)² / Σ w²; autocorrelation reduces it further."""
 
 
 class Difference(NamedTuple):
-    """By how much one model foretells the samples of a record better than another."""
+    """Difference of two models' leave-one-out log-densities."""
 
     difference: float
-    """Sum over samples of log-densities of the one, less those of the other; positive where the one is better."""
+    """Sum over samples of the first model's log-densities less the second's; positive if the first predicts better."""
     standard_error: float
-    """From the scatter between samples: √n standard deviations."""
+    """Standard error from the scatter between samples: √n standard deviations."""
 
 
 def largest_k(draws: int) -> float:
-    """Pareto k̂ above which so many draws do not stand for the posterior without a sample.
+    """Return the Pareto k̂ above which so many draws do not represent the posterior without a sample.
 
-    The smaller of 1 − 1 / log₁₀ draws and 0.7 (Vehtari et al. 2024, JMLR 25(72)).
+    It is the smaller of 1 − 1 / log₁₀ draws and 0.7 (Vehtari et al. 2024, JMLR 25(72)).
 
     Examples
     --------
@@ -90,16 +90,16 @@ def largest_k(draws: int) -> float:
 
 
 def left_out(log_densities: Floats) -> LeftOut:
-    """Leave-one-out predictive densities, by Pareto-smoothed importance sampling.
+    """Return leave-one-out predictive densities by Pareto-smoothed importance sampling.
 
-    Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. Weights are smoothed with tails as long as the
-    autocorrelation of the densities asks for. A small k̂ is no proof where the posterior without a sample reaches what
-    the whole posterior excludes, as beside a jump: see `left_out_from_wider`.
+    The method is that of Vehtari, Gelman & Gabry 2017, doi 10.1007/s11222-016-9696-4. The length of the smoothed tail
+    allows for the autocorrelation of the densities. A small k̂ is no proof where the posterior without a sample extends
+    to values that the whole posterior excludes, as beside a jump: see `left_out_from_wider`.
 
     Parameters
     ----------
     log_densities : ndarray, shape (chains, draws, samples)
-        Of each sample under each posterior draw; 25 draws at least.
+        Log-density of each sample under each posterior draw; at least 25 draws.
 
     Returns
     -------
@@ -112,14 +112,14 @@ def left_out(log_densities: Floats) -> LeftOut:
 
     Examples
     --------
-    Of 50 normal numbers of standard deviation 1 and unknown mean, to foretell each with the mean of the others:
+    Predict each of 50 normal numbers of standard deviation 1 and unknown mean from the others:
 
     >>> rng = np.random.default_rng(1)
     >>> y = rng.normal(size=50)
     >>> mean = rng.normal(y.mean(), 50**-0.5, (4, 500, 1))
     >>> found = left_out(-0.5 * (y - mean) ** 2 - 0.5 * np.log(2 * np.pi))
-    >>> foretold = (50 * y.mean() - y) / 49
-    >>> exact = -0.5 * np.log(2 * np.pi * 50 / 49) - 0.5 * (y - foretold) ** 2 * 49 / 50
+    >>> predicted = (50 * y.mean() - y) / 49
+    >>> exact = -0.5 * np.log(2 * np.pi * 50 / 49) - 0.5 * (y - predicted) ** 2 * 49 / 50
     >>> bool(np.all(abs(found.log_density - exact) < 4 * found.standard_error)), bool(found.pareto_k.max() < 0.5)
     (True, True)
     """
@@ -145,21 +145,21 @@ def left_out(log_densities: Floats) -> LeftOut:
 
 
 def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
-    """Predictive density of a sample given all the others, from draws of the posterior without it and some more.
+    """Return the predictive density of a sample given all the others, from a posterior without it and some more.
 
-    Importance sampling from the whole posterior does not reach what a sample alone excludes, and its k̂ may not tell:
-    beside a jump of the predicted load, both sides of the jump are known from two samples, and without one of them the
-    jump may lie beyond it. The posterior without all of these samples, E, is wider than that without one:
+    Importance sampling from the whole posterior does not reach values that one sample alone excludes, and its k̂ may not
+    show that: beside a jump of the predicted load, both sides of the jump are known from two samples, and without one
+    of them the jump may lie beyond it. The posterior without all of these samples, E, is wider than that without one:
 
         p(y_i | all other y) = Σ_s w_s p(y_i | θ_s) / Σ_s w_s,   w_s = Π_{j in E, j ≠ i} p(y_j | θ_s).
 
     Parameters
     ----------
     log_densities : ndarray, shape (chains, draws, events)
-        Of each sample in E under each draw of the posterior without all of E, these samples being independent of all
-        others given θ; −∞ where a draw excludes one. Samples that know of one another want `reweighted`.
+        Log-density of each sample in E under each draw of the posterior without E; −∞ where a draw excludes the sample.
+        The samples must be independent of all others given θ; for correlated samples use `reweighted`.
     chosen : int
-        Which of E is to be foretold from all else.
+        Index in E of the sample to be predicted.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
 
     Examples
     --------
-    A jump is between 0 and 3, and as likely anywhere; samples at 1 and 2 found it between them:
+    The place of a jump is uniform between 0 and 3, and samples at 1 and 2 found the jump between them:
 
     >>> jump = np.random.default_rng(1).uniform(0.0, 3.0, (4, 1000))
     >>> passed = np.stack([jump > 1.0, jump < 2.0], axis=-1)
@@ -182,21 +182,22 @@ def left_out_from_wider(log_densities: Floats, chosen: int) -> FromWider:
     """
     logs = _checked(log_densities)
     if not 0 <= chosen < logs.shape[-1]:
-        raise ParameterError(f"chosen is {chosen!r}: give the place of one of {logs.shape[-1]} samples, from 0 on")
+        raise ParameterError(f"chosen is {chosen!r}: give the index of one of {logs.shape[-1]} samples, from 0 on")
     return reweighted(np.delete(logs, chosen, axis=-1).sum(axis=-1), logs[..., chosen])
 
 
 def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
-    """A mean density over draws from a wider distribution, by their weights under a narrower one.
+    """Return a mean density over draws from a wider distribution, weighted towards a narrower one.
 
-    For samples that know of one another: draws of a posterior without several samples, weighed by the likelihood of
-    all samples but one over that of those it was given.
+    It serves for correlated samples: draws of a posterior without several samples are weighted by the likelihood of all
+    samples except one over the likelihood of those that the posterior was given.
 
     Parameters
     ----------
     log_weights : ndarray, shape (chains, draws)
-        But for a constant; −∞ where the narrower distribution excludes a draw.
+        Logarithms of the weights, up to a constant; −∞ where the narrower distribution excludes a draw.
     log_density : ndarray, shape (chains, draws)
+        Log-density of the predicted sample under each draw.
 
     Returns
     -------
@@ -224,7 +225,7 @@ def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
             chain, draw = np.argwhere(~(values < np.inf))[0].tolist()
             raise ParameterError(
                 f"{name} is {float(values[chain, draw])!r} at draw {draw} of chain {chain}: give finite numbers, or "
-                "-inf for what is impossible"
+                "-inf where a draw is impossible"
             )
     total = logsumexp(weights)
     if total == -np.inf:
@@ -236,16 +237,16 @@ def reweighted(log_weights: Floats, log_density: Floats) -> FromWider:
 
 
 def difference(one: Floats, other: Floats) -> Difference:
-    """Difference of two models' leave-one-out log-densities, and its standard error over samples.
+    """Return the difference of two models' leave-one-out log-densities, and its standard error over samples.
 
-    √n times the standard deviation of n differences: equation 24 of Vehtari, Gelman & Gabry 2017, doi
-    10.1007/s11222-016-9696-4. Below 4 or so a difference says little, and its standard error is too small (Sivula et
-    al. 2020, arXiv 2008.10296).
+    The standard error is √n times the standard deviation of n differences: equation 24 of Vehtari, Gelman & Gabry 2017,
+    doi 10.1007/s11222-016-9696-4. Below 4 or so a difference says little, and its standard error is too small (Sivula
+    et al. 2020, arXiv 2008.10296).
 
     Parameters
     ----------
     one, other : ndarray, shape (samples,)
-        `LeftOut.log_density` of the same samples.
+        `LeftOut.log_density` of the two models for the same samples.
 
     Returns
     -------
@@ -271,10 +272,10 @@ def difference(one: Floats, other: Floats) -> Difference:
 
 
 def stacking_weights(log_densities: Floats) -> Floats:
-    """Weights of a mixture of models that foretells samples best, leave-one-out.
+    """Return the weights of the mixture of models with the best leave-one-out predictions (stacking).
 
-    They maximise Σ_i log Σ_k w_k p_k(y_i | all other y) over w ≥ 0 with sum one, which is convex: Yao et al. 2018, doi
-    10.1214/17-BA1091. The result is within 1e-5 per sample of the best.
+    They maximise Σ_i log Σ_k w_k p_k(y_i | all other y) over w ≥ 0 with sum one, a convex problem: Yao et al. 2018, doi
+    10.1214/17-BA1091. The result is within 1e-5 per sample of the optimum.
 
     Parameters
     ----------
@@ -316,7 +317,7 @@ def stacking_weights(log_densities: Floats) -> Floats:
         return -float(np.log(mixture).mean()), -(densities / mixture).mean(axis=1)
 
     models = len(logs)
-    least = 1e-10 / models  # keeps mixtures from nothing
+    least = 1e-10 / models  # keeps mixtures positive
     found = minimize(
         loss,
         np.full(models, 1.0 / models),
@@ -345,7 +346,7 @@ def _checked(log_densities: Floats) -> Floats:
 
 
 def _smoothed(log_density: Floats) -> tuple[Floats, float]:
-    """Logarithms of weights in proportion to 1 / density, with sum one, their tail smoothed, and its k̂."""
+    """Return logarithms of weights in proportion to 1 / density, with sum one and a smoothed tail, and its k̂."""
     efficiency = _efficiency(np.exp(log_density - log_density.max()))
     tail = int(3.0 * math.sqrt(log_density.size / efficiency))
     tail = min(tail, log_density.size // 5)
@@ -353,13 +354,13 @@ def _smoothed(log_density: Floats) -> tuple[Floats, float]:
     plain = -log_density - logsumexp(-log_density)
     if np.ptp(lowest) < _SAME:
         return plain, -math.inf
-    with np.errstate(all="ignore"):  # a fit that fails, of few different weights, gives NaN
-        smoothed, k = array_stats.psislw(log_density, r_eff=efficiency, axis=(0, 1))  # it takes what to divide by
+    with np.errstate(all="ignore"):  # a fit to few different weights fails and gives NaN
+        smoothed, k = array_stats.psislw(log_density, r_eff=efficiency, axis=(0, 1))  # weights are 1 / its argument
     return (smoothed, float(k)) if np.isfinite(k) and np.isfinite(smoothed).all() else (plain, math.inf)
 
 
 def _weighed(log_weights: Floats, log_density: Floats) -> tuple[float, float]:
-    """Logarithm of a weighted mean of densities, and its error to first order, from weights with sum one."""
+    """Return the logarithm of a weighted mean of densities, and its first-order error, from weights with sum one."""
     found = float(logsumexp(log_weights + log_density))
     if found == -np.inf:
         return found, math.inf
@@ -368,7 +369,7 @@ def _weighed(log_weights: Floats, log_density: Floats) -> tuple[float, float]:
 
 
 def _efficiency(values: Floats) -> float:
-    """Effective over actual draws for the mean of values, shape (chains, draws), at most 1."""
+    """Return effective over actual draws for the mean of values, shape (chains, draws), at most 1."""
     size = np.abs(values).max()
     if size == 0.0:
         return 1.0

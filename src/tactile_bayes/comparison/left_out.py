@@ -1,4 +1,4 @@
-"""How well a family of contours foretells each sample of a record from all the others."""
+"""Leave-one-out predictions of the samples of a record by a family of contours."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from tactile_bayes.inference.contour_problem import ContourProblem
 from tactile_bayes.inference.contour_start import walk_of
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, Seed, sample, spawn
 
-__all__ = ["ForetoldSamples", "foretold_samples"]
+__all__ = ["PredictedSamples", "predicted_samples"]
 
 _DRAWS = 2000
-"""Of which densities are asked."""
+"""Largest number of draws under which densities are computed."""
 
 
-class ForetoldSamples(NamedTuple):
-    """Log-densities of each sample given all others, its channels together, in EI/L and EI/L²."""
+class PredictedSamples(NamedTuple):
+    """Leave-one-out log-density of each sample, its channels together, in units of EI/L and EI/L²."""
 
     log_density: Floats
-    """Shape (samples,); NaN where it is not to be had: next to events, of a load cell that drifts."""
+    """Shape (samples,); NaN next to events if the load cell drifts or has an unknown bias."""
     standard_error: Floats
     """Monte-Carlo error; infinite where it cannot be trusted."""
     pareto_k: Floats
     """NaN where the contour was inferred again without the sample."""
 
 
-def foretold_samples(
+def predicted_samples(
     problem: ContourProblem, sampled: Sampled, *, seed: Seed, settings: SamplerSettings
-) -> ForetoldSamples:
-    """Leave-one-out predictive densities of a record.
+) -> PredictedSamples:
+    """Return the leave-one-out predictive densities of a record.
 
-    By Pareto-smoothed importance sampling from the posterior; but not next to first contact and snap-off. There, the
-    record without a sample allows contours that would have been touched later, or let go earlier, of which the
-    posterior has none: these samples are foretold from a posterior that is inferred again without any of them, weighed
-    by all of them but one.
+    They come from the posterior by Pareto-smoothed importance sampling, except next to first contact and snap-off.
+    There the record without a sample allows contours that would have been touched later, or let go earlier, of which
+    the posterior has none: these samples are predicted from a posterior that is inferred again without any of them,
+    weighted by the likelihood of all of them except one.
     """
     model = problem.model
     logs = _densities(model, sampled.draws)
@@ -48,9 +48,9 @@ def foretold_samples(
     chosen = np.unique(events[events >= 0])
     log_density, error, k = (np.array(part) for part in found)
     k[chosen] = np.nan
-    if _knows_of_others(model):
+    if _is_correlated(model):
         log_density[chosen] = error[chosen] = np.nan
-        return ForetoldSamples(log_density, error, k)
+        return PredictedSamples(log_density, error, k)
     seeds = spawn(seed, 2)
     without = np.zeros(logs.shape[-1], dtype=bool)
     without[chosen] = True
@@ -69,23 +69,23 @@ def foretold_samples(
     for i, of_sample in enumerate(chosen):
         one = left_out_from_wider(of_events, i)
         log_density[of_sample], error[of_sample] = one.log_density, one.standard_error
-    return ForetoldSamples(log_density, error, k)
+    return PredictedSamples(log_density, error, k)
 
 
-def _knows_of_others(model: ContourModel) -> bool:
+def _is_correlated(model: ContourModel) -> bool:
     cell = model.likelihood.load_cell
     return bool(cell.drift or any(cell.bias_uncertainty))
 
 
 def _densities(model: ContourModel, draws: Draws) -> Floats:
-    """Log-densities of samples, given the others where they know of them, shape (chains, draws, samples)."""
+    """Return log-densities of samples, conditional on the others if correlated, shape (chains, draws, samples)."""
     chains, _, parameters = draws.samples.shape
     kept = draws.evenly(_DRAWS // chains)
     points = draws.samples[:, kept].reshape(-1, parameters)
     logs = []
     for part in np.array_split(points, max(1, len(points) // 200)):
         loads, reached = model.loads_with_errors(part)
-        if _knows_of_others(model):
+        if _is_correlated(model):
             cell, measured = model.likelihood.load_cell, model.likelihood.measured
             logs.append(cell.log_density_left_out(measured, loads[:, 0], noise_scale=model.noise_scale(part)))
         else:

@@ -1,4 +1,4 @@
-"""What a comparison of families comes to, in words."""
+"""The verdict of a comparison of families."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from tactile_bayes.inference.misfit import what_to_try
 __all__ = ["NONE_FITS", "verdict_on"]
 
 NONE_FITS = "None fits: with the rig as assumed, the record does not look like one of any of these shapes"
-"""How the verdict begins where no family passes the check."""
+"""Beginning of the verdict if no family passes the check."""
 
 _LIKELY = 0.05
-"""Probability from which on a family is named."""
+"""Smallest probability with which a family is named."""
 
 
 def verdict_on(result: xr.Dataset) -> str:
-    """The first thing to be known of a comparison of families, as `compare_families` returns it."""
+    """Return the verdict on a comparison of families, from the result of `compare_families`."""
     names = [str(name) for name in result.family.values]
     fits = result.fits.values
     if not fits.any():
         return f"{NONE_FITS} ({', '.join(names)}). Probabilities say which of them is the least wrong. " + what_to_try(
             names, json.loads(result.attrs["nuisances"]), friction=result.attrs["friction"]
         )
-    words = []
+    parts = []
     probability = result.probability.values
     if np.isnan(probability).any():
         lacking = [name for name, value in zip(names, result.log_evidence.values, strict=True) if np.isnan(value)]
-        words.append(f"No probabilities: the evidence of {', '.join(lacking)} is not to be had from its draws")
+        parts.append(f"No probabilities: the evidence of {', '.join(lacking)} cannot be computed from its draws")
     else:
         order = np.argsort(probability)[::-1]
         likely = [i for i in order if probability[i] >= _LIKELY]
-        words.append(", ".join(f"{names[i]} with probability {_share(probability[i])}" for i in likely))
+        parts.append(", ".join(f"{names[i]} with probability {_share(probability[i])}" for i in likely))
         if not fits[order[0]]:
-            words.append(f"but a record of a {names[order[0]]} would not look like this one")
+            parts.append(f"but a record of a {names[order[0]]} would not look like this one")
         elif names[order[0]] == "shape-free":
-            words.append("that is, a smooth contour of none of the other shapes")
+            parts.append("that is, a smooth contour of none of the other shapes")
         firm = result.probability_by_width.values[:, order[0]]
         if firm.min() < 0.5 <= firm.max():
-            words.append(
+            parts.append(
                 f"which depends on the width of the priors: from {_share(firm.min())} to {_share(firm.max())} with "
                 "half and twice the width"
             )
     poor = [name for name, good in zip(names, (result.converged | ~result.sampled).values, strict=True) if not good]
     if poor:
-        words.append(f"not converged: {', '.join(poor)}")
-    return "; ".join(words)
+        parts.append(f"not converged: {', '.join(poor)}")
+    return "; ".join(parts)
 
 
 def _share(probability: float) -> str:

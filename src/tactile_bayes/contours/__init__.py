@@ -1,4 +1,4 @@
-"""Strictly convex contours by slope angle; one family a class on one small base."""
+"""Strictly convex contours by slope angle; each family is a class on one small base."""
 
 from tactile_bayes.contours.base import Contour, Graph, Locus, Single
 from tactile_bayes.contours.checking import check

@@ -1,4 +1,4 @@
-"""What every strictly convex contour offers, and how a family is defined."""
+"""The base of all strictly convex contours, from which a family derives."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ __all__ = [
 Parameter = float | Floats
 
 _FARTHEST = 2.0**60
-"""Where the search for a slope or a place on an endless contour is given up."""
+"""Parameter at which the search for a slope or an x on an endless contour ends."""
 
 
 class Locus(NamedTuple):
-    """Points of a contour at given parameters, with the rates at which arc length and slope angle grow there."""
+    """Points of a contour at given parameters, and the rates of arc length and slope angle there."""
 
     x: Floats
     y: Floats
     slope_angle: Floats
     arclength_rate: Floats
-    """dσ/dp ≥ 0, σ the arc length; zero only where the radius of curvature is: in an edge, where the contour turns on
-    the spot, and at a vertex as sharp as that of |x|ⁿ with n < 2."""
+    """dσ/dp ≥ 0 with the arc length σ; zero only where the radius of curvature is: in an edge, where the contour turns
+    on the spot, and at a vertex as sharp as that of |x|ⁿ with n < 2."""
     slope_rate: Floats
     """dα/dp ≥ 0; zero only where the radius of curvature is infinite."""
 
@@ -52,12 +52,12 @@ class Contour(ABC):
     """Lower boundary of a strictly convex object, traversed from left to right.
 
     A family is a frozen dataclass of its parameters, which are scalars or arrays that broadcast: one contour object may
-    hold many contours. Its own parameter p may be whatever makes point and slope angle continuous functions of it.
-    A family must say how to go from p to the point (`locate`) and where it ends (`domain`); everything else follows by
-    root search, and is overridden where there is a formula. `check` tells whether a family of one's own is right.
+    hold many contours. The contour's own parameter p is any variable of which point and slope angle are continuous
+    functions. A family defines the point at p (`locate`) and the ends (`domain`); everything else follows by root
+    search and is overridden where there is a formula. `check` verifies a family of one's own.
 
-    Contours are equal if they are of one family and all their parameters are, shapes included; a family that is to
-    inherit this is a `dataclass(frozen=True, eq=False)`.
+    Contours are equal if they are of one family and all their parameters are equal, including their shapes. A family
+    that inherits this is a `dataclass(frozen=True, eq=False)`.
     """
 
     def __post_init__(self) -> None:
@@ -75,7 +75,7 @@ class Contour(ABC):
         return hash((type(self), self._identity()))
 
     def _identity(self) -> tuple[Any, ...]:
-        """The parameters as what can be compared and hashed."""
+        """Parameters in a form that can be compared and hashed."""
         return tuple(
             (name, v.shape, tuple(v.ravel().tolist())) if isinstance(v, np.ndarray) else (name, v)
             for name, v in vars(self).items()
@@ -84,63 +84,79 @@ class Contour(ABC):
 
     @abstractmethod
     def locate(self, parameter: ArrayLike) -> Locus:
-        """Points at the contour's own parameter."""
+        """Points at the contour's own parameter.
+
+        Parameters
+        ----------
+        parameter : array_like
+            Broadcasts with the parameters of the family.
+
+        Returns
+        -------
+        Locus
+            Arrays of the broadcast shape; lengths in the contour's unit of length, angles in rad.
+        """
 
     @property
     @abstractmethod
     def domain(self) -> tuple[Floats, Floats]:
-        """Least and greatest parameter; at a finite end the contour is over."""
+        """Least and greatest parameter; the contour ends at a finite one, and is endless at an infinite one."""
 
     def end_name(self, side: Literal["left", "right"]) -> str:
-        """What the end on one side is, for messages."""
+        """Description of the end on one side, for messages."""
         return "where it is over"
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
-        """The contour's own parameter at a slope angle [rad]; NaN where the contour has no such slope."""
+        """Contour's own parameter at a slope angle [rad], of the broadcast shape; NaN where there is no such slope."""
         return self._parameter_where(slope_angle, lambda locus: (locus.slope_angle, locus.slope_rate))
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
-        """The contour's own parameter at x, in the contour's unit of length; NaN beyond its ends."""
+        """Contour's own parameter at x [length], of the broadcast shape; NaN beyond the ends."""
         return self._parameter_where(x, lambda locus: (locus.x, locus.arclength_rate * np.cos(locus.slope_angle)))
 
     def height(self, x: ArrayLike) -> Floats:
-        """Height of the contour at x; NaN beyond its ends.
+        """Height of the contour at x.
 
         Parameters
         ----------
         x : array_like
-            In the contour's unit of length.
+            Position, in the contour's unit of length; broadcasts with the parameters of the family.
+
+        Returns
+        -------
+        ndarray
+            Heights in the same unit; NaN beyond the ends.
         """
         return self.locate(self.parameter_of_x(x)).y
 
     @property
     def knots(self) -> tuple[Floats, ...]:
-        """Parameters between the ends beside which the contour is smooth, but perhaps not there.
+        """Parameters between the ends at which the contour may not be smooth.
 
-        Wherever the radius of curvature jumps or the slope does there must be one; others do no harm.
+        There must be one wherever the radius of curvature or the slope jumps; others do no harm.
         """
         return ()
 
     @property
     def halves(self) -> Halves | None:
-        """Both sides of a level vertex, if they have formulas that compiled code knows; any other contour has none."""
+        """Both sides of a level vertex if compiled code has formulas for them; else None."""
         return None
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Common shape of the parameters: () for a single contour."""
+        """Common shape of the parameters; () for a single contour."""
         return np.broadcast(*vars(self).values()).shape
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Self:
-        """The same contours with every parameter an array of one shape, as `take` wants them."""
+        """Contours with every parameter broadcast to one shape, as `take` requires."""
         return self._each(lambda value: np.broadcast_to(value, (*shape, *np.shape(value)[len(self.shape) :])))
 
     def take(self, index: Index | tuple[Index, ...]) -> Self:
-        """The contours at `index`, of a contour whose parameters are all arrays of one shape."""
+        """Contours at `index`, of a contour whose parameters are all arrays of one shape."""
         return self._each(lambda value: value[index])
 
     def _each(self, change: Callable[[Any], Floats]) -> Self:
-        """The contours with all changed that has an entry for each."""
+        """Contours with a change applied to every array that has an entry for each."""
         other = object.__new__(type(self))  # the parameters have been checked, and this is called in inner loops
         other.__dict__.update({name: change(value) for name, value in vars(self).items()})
         return other
@@ -151,30 +167,35 @@ class Contour(ABC):
         Parameters
         ----------
         slope_angle : array_like
-            In (−π/2, π/2) [rad].
+            Slope angle α in (−π/2, π/2) [rad]; broadcasts with the parameters of the family.
 
         Returns
         -------
         x, y : ndarray
-            NaN where the contour has no such slope.
+            In the contour's unit of length; NaN where the contour has no such slope.
         """
         locus = self.locate(self.parameter_of_slope(slope_angle))
         return locus.x, locus.y
 
     def radius_of_curvature(self, slope_angle: ArrayLike) -> Floats:
-        """ρ = dσ/dα at a slope angle, in the contour's unit of length; infinite where the curvature vanishes.
+        """Radius of curvature ρ = dσ/dα at a slope angle.
 
         Parameters
         ----------
         slope_angle : array_like
-            In (−π/2, π/2) [rad].
+            Slope angle α in (−π/2, π/2) [rad]; broadcasts with the parameters of the family.
+
+        Returns
+        -------
+        ndarray
+            In the contour's unit of length; infinite where the curvature vanishes, NaN where there is no such slope.
         """
         locus = self.locate(self.parameter_of_slope(slope_angle))
         with np.errstate(divide="ignore"):
             return locus.arclength_rate / locus.slope_rate
 
     def _parameter_where(self, wanted: ArrayLike, measure: Callable[[Locus], tuple[Floats, Floats]]) -> Floats:
-        """Parameters at which something that grows along the contour, given with its rate, is as wanted; else NaN."""
+        """Parameters at which an increasing function of the parameter, given with its rate, has a value; else NaN."""
         shape = np.broadcast_shapes(self.shape, np.shape(wanted))
         goal = np.broadcast_to(np.asarray(wanted, dtype=float), shape).ravel()
         many, place = self.broadcast_to(shape or (1,)), np.unravel_index(np.arange(goal.size), shape or (1,))
@@ -200,10 +221,10 @@ class Contour(ABC):
 
 
 class Vertexed(Contour):
-    """Contours that positive sizes describe, and the vertex, at height q above x_c."""
+    """Contours with positive sizes and a vertex at height q above x_c."""
 
     sizes: ClassVar[Mapping[str, str]]
-    """What must be said of sizes, by name, where one is not positive and finite."""
+    """Messages by name of a size, for a size that is not positive and finite."""
 
     q: Parameter
     x_c: Parameter
@@ -218,7 +239,7 @@ class Vertexed(Contour):
 
 
 class Single(Contour):
-    """A contour that stands alone, without parameters of a family; it equals itself only."""
+    """A single contour without parameters of a family; it equals itself only."""
 
     def __post_init__(self) -> None:
         pass
@@ -235,11 +256,11 @@ class Single(Contour):
 
 
 class Graph(Contour):
-    """A contour that is easiest to give as the graph y = g(x): its parameter is x.
+    """A contour given as the graph y = g(x), with the parameter x.
 
-    A family of one's own is a frozen dataclass of its parameters, with a method for g and its first two derivatives;
-    `domain` is to be overridden where it ends, and `check` tells whether it is right. Parameters may be arrays, so
-    formulas must work on arrays. A contour without parameters derives from `Graph` and `Single`.
+    A family of one's own is a frozen dataclass of its parameters, with a method for g and its first two derivatives.
+    It overrides `domain` if it has ends; `check` verifies it. Parameters may be arrays, so that formulas must work on
+    arrays. A contour without parameters derives from `Graph` and `Single`.
 
     Examples
     --------
@@ -260,7 +281,7 @@ class Graph(Contour):
 
     @abstractmethod
     def derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """g(x), g'(x) and g''(x), for x between the ends."""
+        """g(x) [length], g'(x) and g''(x) [1/length], for x between the ends, of the broadcast shape."""
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
@@ -279,13 +300,13 @@ class Graph(Contour):
 
 
 def alike(*arrays: Floats) -> tuple[Floats, ...]:
-    """The arrays, broadcast to one shape: at once where they have it, since this is called in inner loops."""
+    """Broadcast arrays to one shape, with a short cut for equal shapes, since this is called in inner loops."""
     shape = np.shape(arrays[0])
     return arrays if all(np.shape(a) == shape for a in arrays) else np.broadcast_arrays(*arrays)
 
 
 def as_parameter(family: str, name: str, given: Any) -> Parameter:
-    """A parameter as a number, or a copy of it as an array of numbers."""
+    """Return a parameter as a number, or as a new array of numbers."""
     values = as_numbers(given)
     if values is None:
         raise ContourError(f"{family}: {name} is {shown(given)}: give a number, or an array of numbers")
@@ -293,7 +314,7 @@ def as_parameter(family: str, name: str, given: Any) -> Parameter:
 
 
 def common_shape(family: str, **shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """The shape that the shapes of some parameters broadcast to."""
+    """Return the common shape of parameters, or raise ContourError if they do not broadcast."""
     try:
         return np.broadcast_shapes(*shapes.values())
     except ValueError:
@@ -304,7 +325,7 @@ def common_shape(family: str, **shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def refuse_unless(holds: Any, family: str, rule: str, **values: Parameter) -> None:
-    """Raise ContourError, naming the first offending values, where a rule on the parameters of a family fails."""
+    """Raise ContourError with the first offending values where a rule on the parameters of a family fails."""
     if np.all(holds):
         return
     fails = ~np.asarray(holds)
@@ -313,5 +334,5 @@ def refuse_unless(holds: Any, family: str, rule: str, **values: Parameter) -> No
 
 
 def finite(*values: Parameter) -> Any:
-    """Where all of some parameters are finite."""
+    """Return an array that is True where all given parameters are finite."""
     return np.logical_and.reduce(np.broadcast_arrays(*(np.isfinite(v) for v in values)))

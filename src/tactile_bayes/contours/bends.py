@@ -1,4 +1,4 @@
-"""Whether measured points may be those of a convex contour: in one band, and nowhere bent downward."""
+"""Tests whether measured points can be points of a convex contour: in one band, and nowhere bent downward."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ __all__ = ["FALSE_ALARM", "STRAIGHT", "Bends", "refuse_two_bands", "refuse_unles
 STRAIGHT = "; a contour must be curved: measure a longer stretch or more points, of the lower boundary only"
 
 FALSE_ALARM = 1e-3
-"""How often points of a contour that is convex may be refused."""
+"""Probability that the points of a convex contour are refused."""
 
-_SEEN = 3.0
-"""Standard errors by which the points must bend upward as a whole."""
+_LEAST_BEND = 3.0
+"""Least upward bend of all points together, in standard errors."""
 
 _NEIGHBOURS, _FEWEST_BANDED = 8, 20
-"""Neighbouring points of which it is asked whether they are in two bands, and how many there must be in all."""
+"""Number of neighbouring points that are tested for two bands, and the least number of all points."""
 
 
 class Bends(NamedTuple):
-    """Parabolas fitted to stretches of neighbouring points; the last stretch is all of them.
+    """Parabolas fitted to stretches of neighbouring points; the last stretch contains all points.
 
-    The quadratic term is the heights' product with a parabola that is + − + and orthogonal to lines. Less the line that
-    meets them where it changes sign, heights of a convex contour are + − + too: their product is never negative.
+    The quadratic term is the scalar product of the heights with a parabola of signs + − + that is orthogonal to lines.
+    Heights of a convex contour, less the line through them at its sign changes, have the signs + − + too, so that their
+    product is never negative.
     """
 
     first: Floats
@@ -38,7 +39,7 @@ class Bends(NamedTuple):
     size: Floats
     """Coefficients of the squares."""
     errors: Floats
-    """The same in standard errors."""
+    """Coefficients in standard errors."""
 
     @property
     def mean_curvature(self) -> float:
@@ -90,24 +91,24 @@ def refuse_unless_convex(bends: Bends, freedom: float, place: Callable[[float], 
             f"chord by {off_chord:.3g} ({remark}). Leave this stretch out, or give a larger scatter; an object that "
             "has a dent is outside this package"
         )
-    if bends.errors[-1] < _SEEN:
+    if bends.errors[-1] < _LEAST_BEND:
         raise ContourError(
             f"from_points: the points cannot be told from a straight line: as a whole they bend upward by "
-            f"{bends.errors[-1]:.1f} standard errors, and it takes {_SEEN:g} ({remark}){STRAIGHT}"
+            f"{bends.errors[-1]:.1f} standard errors, and it takes {_LEAST_BEND:g} ({remark}){STRAIGHT}"
         )
 
 
 def refuse_two_bands(x: Floats, y: Floats) -> None:
-    """Refuse points with two heights at about the same x, as those of a closed outline.
+    """Refuse points with two heights at about the same x, like those of a closed outline.
 
-    The heights of eight neighbours are parted at their widest gap. The lower ones of a convex contour are neighbours
-    again. Here upper and lower ones must take turns, with a gap twice as wide as what either part spans, in more than a
-    third of all such groups: of heights that only scatter one in 150 does so.
+    The heights of eight neighbours are parted at their widest gap. On a convex contour the lower ones are neighbours
+    again. The points are refused if upper and lower ones alternate, with a gap twice as wide as either part, in more
+    than a third of all such groups; of groups that only scatter, one in 150 does so.
     """
     if x.size < _FEWEST_BANDED:
         return
     _, place = np.unique(x, return_inverse=True)
-    order = np.lexsort((np.where(place % 2, -y, y), x))  # where an x repeats, with as few turns as there can be
+    order = np.lexsort((np.where(place % 2, -y, y), x))  # where an x repeats, with as few turns as possible
     groups = sliding_window_view(y[order], _NEIGHBOURS)
     heights = np.sort(groups, axis=1)
     last = 1 + np.argmax(np.diff(heights, axis=1)[:, 1:-1], axis=1)  # at least two in either part

@@ -15,24 +15,24 @@ __all__ = ["in_cells"]
 _ORDER = 16
 
 _MISS = 4e-15
-"""Share of the size of a coordinate, and of a radian, by which the last coefficients of a series may miss it."""
+"""Largest size of the last coefficients of a series, as a share of the size of a coordinate, or in rad."""
 
 _ROUNDED = 1e-15
-"""Share of a parameter by which rounding may have moved it."""
+"""Rounding error of a parameter, as a share of it."""
 
 _HALVINGS = 40
-"""How often a cell is halved at most: what is not smooth there has no size any more."""
+"""Largest number of halvings of a cell: its size is then below rounding."""
 
 _MOST = 256
-"""Cells of a contour beyond those between knots from which on none is halved: what is rough everywhere is not smooth in
+"""Number of further cells of a contour beyond which none is halved: a contour that is rough everywhere is not smooth in
 smaller cells either."""
 
 
 def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:
-    """Tables of contours with parameters of shape (n,), from a parameter to another, each of shape (n,).
+    """Tables of contours with parameters of shape (n,), between two parameters, each of shape (n,).
 
-    Cells end at knots, and are halved until series of 16 terms miss points by less than 4e-15 of their distance from
-    the origin, and slopes by as many radians.
+    Cells end at knots and are halved until series of 16 terms have errors below 4e-15 of the distance from the origin
+    in points, and below 4e-15 rad in slope angles.
     """
     count = low.size
     knots = np.array([np.broadcast_to(knot, (count,)) for knot in contour.knots], dtype=float).reshape(-1, count)
@@ -76,7 +76,7 @@ def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:
 def _series(contour: Contour, owner: NDArray[np.intp], begin: Floats, end: Floats) -> Floats:
     """Coefficients of x, y and slope angle, shape (cells, 3, order).
 
-    Of what each differs from its value amid the cell, so that rounding is that of the difference.
+    The series are fitted to differences from the values in the middle of the cell, to reduce rounding.
     """
     parameter = begin[:, None] + (end - begin)[:, None] * chebyshev.nodes(_ORDER)
     locus = contour.take(np.broadcast_to(owner[:, None], parameter.shape)).locate(parameter)

@@ -1,4 +1,4 @@
-"""Whether the formulas of a family of contours fit together."""
+"""The consistency check of the formulas of a family of contours."""
 
 from __future__ import annotations
 
@@ -16,30 +16,31 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["check"]
 
-Lane = tuple[int, ...]
+BatchIndex = tuple[int, ...]
 
 _PROBES, _FEW = 400, 10
-"""Places at which rates are tried, and every how many of them the searches for a slope angle and an x."""
+"""Number of points at which rates are checked, and the stride of the points at which searches are checked."""
 
 _STEEPEST = 1.5
-"""Slope angles [rad] up to which a contour is tried."""
+"""Largest slope angle at which a contour is checked [rad]."""
 
 _NEAREST, _ENDLESS = 1e-9, 62.0
-"""Endless parameters are first tried at the former times the hyperbolic sine of up to the latter, up to 4e17."""
+"""Endless parameters are first sampled at the former times the hyperbolic sine of up to the latter, up to 4e17."""
 
 _STRAIGHT = 5
-"""Neighbouring places without curvature that make a contour straight; rounding may leave fewer."""
+"""Number of neighbouring points without curvature that make a contour straight; rounding may cause fewer."""
 
 _SAME = 1e-9
-"""Share of a contour's size, or angle [rad], that is rounding."""
+"""Rounding error, as a share of a contour's size, or as an angle [rad]."""
 
 
 def check(contour: Contour) -> None:
-    """Refuse a contour whose formulas do not fit together, or which is not strictly convex: for a family of one's own.
+    """Refuse a contour whose formulas are inconsistent, or which is not strictly convex: for a family of one's own.
 
-    Tried are 400 places a contour, where it is not steeper than 1.5 rad: the rates of point and slope angle against
-    their changes from place to place, the growth of the slope angle, height, and what finds the parameter of a slope
-    angle and of an x. Features much narrower than the distance of the places may be overlooked.
+    The check takes 400 points a contour, where it is not steeper than 1.5 rad. It compares the rates of point and slope
+    angle with their changes from point to point, and verifies the growth of the slope angle, the height, and the
+    searches for the parameter of a slope angle and of an x. It may overlook features that are much narrower than the
+    distance of the points.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def check(contour: Contour) -> None:
     Raises
     ------
     ContourError
-        That says what is wrong, where on the contour, and by how much.
+        If a formula is wrong; the message says which, where on the contour, and by how much.
 
     Examples
     --------
@@ -92,19 +93,19 @@ class _Checked:
         self._refuse_searches(places[::_FEW])
 
     def _each(self, values: Floats) -> Floats:
-        """The same values for each of the contours, along a first axis."""
+        """Repeat values along the first axis for each contour."""
         return values.reshape(-1, *(1,) * len(self.shape)) + np.zeros(self.shape)
 
     def _located(self, stops: Floats) -> Locus:
-        """The locus, of which all members have the shape of the parameters."""
+        """Locus with all members broadcast to the shape of the parameters."""
         return Locus(*(np.broadcast_to(np.asarray(v, dtype=float), stops.shape) for v in self.contour.locate(stops)))
 
-    def _refusal(self, lane: Lane, what: str) -> ContourError:
-        which = f" at index {lane if lane[1:] else lane[0]}" if lane else ""
+    def _refusal(self, index: BatchIndex, what: str) -> ContourError:
+        which = f" at index {index if index[1:] else index[0]}" if index else ""
         return ContourError(f"{self.contour}{which}: {what}")
 
     def _window(self) -> tuple[Floats, Floats]:
-        """Parameters between which a contour is tried: short of upright, and of where an endless one is straight."""
+        """Parameters between which a contour is checked: not too steep, and not where an endless one is straight."""
         lo, hi = (np.broadcast_to(end, self.shape).astype(float) for end in self.contour.domain)
         if not np.all(lo < hi):
             raise self._refusal((), f"its domain is {self.contour.domain}: the first must be the smaller")
@@ -146,22 +147,22 @@ class _Checked:
         locus = self._located(stops)
         for name, values in locus._asdict().items():
             if np.any(bad := ~np.isfinite(values)):
-                at, *lane = _first(bad)
-                raise self._refusal(tuple(lane), f"{name} is {values[bad][0]} at parameter {stops[at, *lane]:.6g}")
+                at, *index = _first(bad)
+                raise self._refusal(tuple(index), f"{name} is {values[bad][0]} at parameter {stops[at, *index]:.6g}")
         return locus
 
     def _refuse_falling(self, locus: Locus) -> None:
-        """Refuse an x or a slope angle that falls along the contour; of several stretches the middle one is named."""
+        """Refuse an x or a slope angle that decreases along the contour; the message names the middle stretch."""
         for name, values, unit in (("x", locus.x, ""), ("slope angle", locus.slope_angle, " rad")):
             falls = np.diff(values, axis=0) < -_SAME * (1.0 if unit else np.abs(values[1:]))
             if np.any(falls):
-                _, *lane = _first(falls)
-                at = np.flatnonzero(falls[_of(lane)])
+                _, *index = _first(falls)
+                at = np.flatnonzero(falls[_of(index)])
                 runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
                 run = min(runs, key=lambda run: np.abs(run - len(falls) // 2).min())
-                first, last = (run[0], *lane), (run[-1] + 1, *lane)
+                first, last = (run[0], *index), (run[-1] + 1, *index)
                 raise self._refusal(
-                    tuple(lane),
+                    tuple(index),
                     f"it is not strictly convex, or runs backward: its {name} falls from {values[first]:.4g} to "
                     f"{values[last]:.4g}{unit}, from x = {_text(locus.x[first])} to {_text(locus.x[last])}",
                 )
@@ -190,20 +191,20 @@ class _Checked:
             if found is None:
                 continue
             ends = np.array([found.left, found.right])
-            x = [_text(v) for v in self._located(self._each(ends)).x[_of(found.lane)]]
+            x = [_text(v) for v in self._located(self._each(ends)).x[_of(found.contour)]]
             if np.isnan(found.miss):
-                raise self._refusal(found.lane, f"{name} jumps at x ≈ {x[1]}: name the parameter there in `knots`")
+                raise self._refusal(found.contour, f"{name} jumps at x ≈ {x[1]}: name the parameter there in `knots`")
             raise self._refusal(
-                found.lane,
+                found.contour,
                 f"{name} is not the derivative of {whose}: from x = {x[0]} to {x[1]} they differ by {found.miss:.3g}",
             )
 
     def _refuse_straight(self, locus: Locus) -> None:
         flat = (locus.slope_rate <= 0.0) & (locus.arclength_rate > 0.0)
         if np.any(straight := sliding_window_view(flat, _STRAIGHT, axis=0).all(axis=-1)):
-            at, *lane = _first(straight)
-            x = _text(locus.x[at, *lane]), _text(locus.x[at + _STRAIGHT - 1, *lane])
-            raise self._refusal(tuple(lane), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
+            at, *index = _first(straight)
+            x = _text(locus.x[at, *index]), _text(locus.x[at + _STRAIGHT - 1, *index])
+            raise self._refusal(tuple(index), f"it is not strictly convex: it is straight from x = {x[0]} to {x[1]}")
 
     def _refuse_searches(self, stops: Floats) -> None:
         contour, locus = self.contour, self._located(stops)
@@ -217,15 +218,15 @@ class _Checked:
             ("the slope angle that parameter_of_slope finds", angle, locus.slope_angle, 1.0),
         ):
             if np.any(bad := ~(np.abs(found - wanted) <= _SAME * rounding)):
-                at, *lane = _first(bad)
+                at, *index = _first(bad)
                 raise self._refusal(
-                    tuple(lane),
+                    tuple(index),
                     f"{name} is {np.broadcast_to(found, stops.shape)[bad][0]:.6g} at x = "
-                    f"{_text(locus.x[at, *lane])}, not {wanted[bad][0]:.6g}",
+                    f"{_text(locus.x[at, *index])}, not {wanted[bad][0]:.6g}",
                 )
 
     def _refuse_picking(self, stops: Floats) -> None:
-        """Many contours are picked from by `broadcast_to` and `take`; families of one's own may spoil that."""
+        """Refuse contours for which `broadcast_to` and `take` give other points."""
         shape = self.shape or (1,)
         index = tuple(axis.ravel() for axis in np.indices(shape))
         picked = self.contour.broadcast_to(shape).take(index)
@@ -237,13 +238,13 @@ class _Checked:
             )
 
 
-def _first(bad: ArrayLike) -> Lane:
+def _first(bad: ArrayLike) -> BatchIndex:
     return tuple(int(i) for i in np.argwhere(bad)[0])
 
 
-def _of(lane: Sequence[int]) -> tuple[Any, ...]:
-    """Index of all values of one contour."""
-    return (slice(None), *lane)
+def _of(index: Sequence[int]) -> tuple[Any, ...]:
+    """Return the index of all values of one contour."""
+    return (slice(None), *index)
 
 
 def _text(x: float) -> str:

@@ -1,4 +1,4 @@
-"""The registry of families: contours by the names that users give."""
+"""The registry of families by the names that users give."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ from tactile_bayes.errors import ParameterError
 __all__ = ["FAMILIES", "FLANKS", "Flank", "FlankFamily", "family_named", "sides_of"]
 
 _FAR = 1e3
-"""Widths from the vertex beyond which a power law is as high as here, or its height would overflow."""
+"""Widths from the vertex beyond which the height of a power law is constant, lest it overflow."""
 
 Values = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Flank:
-    """Contours with a vertex at height q above x_c, of one law on one side of it or on both.
+    """Contours with a vertex at height q above x_c and one formula, on one side of it or on both.
 
     Parameters
     ----------
     contour : type
-        Their class, which has the parameters as attributes.
+        Class of the contours, which has the parameters as attributes.
     table : mapping of str to FamilyParameter
-        Its own parameters by name.
+        Parameters of the flank by name.
     start : callable
-        From a in y = a x² to values by name, in rod lengths, of a flank that is about as bent.
+        Maps a in y = a x² to parameters by name, in rod lengths, of a flank with about the same curvature.
     miss : callable
-        From places seen from the vertex, and values by name, to their distances from the flank, about.
+        Maps points relative to the vertex, and parameters by name, to their approximate distances from the flank.
     build : callable, optional
-        From parameters by name, with q and x_c, to contours; by default the class.
+        Maps parameters by name, with q and x_c, to contours; by default the class.
     is_always_clear : bool
-        Whether a rod that has snapped off is past every such contour.
+        Whether a rod is clear of every such contour after snap-off.
     """
 
     contour: type[Contour]
@@ -65,14 +65,14 @@ class Flank:
 
 @dataclass(frozen=True)
 class FlankFamily(Family):
-    """Contours of one flank on both sides, or of two.
+    """Family of contours with one flank on both sides, or with two different flanks.
 
     Parameters
     ----------
     name : str
-        What users call it.
+        Name that users give.
     flanks : mapping of str to Flank
-        By what stands before the names of their parameters: "" of one flank, "left_" and "right_" of two.
+        Flanks by the prefix of the names of their parameters: "" for one flank, "left_" and "right_" for two.
     """
 
     name: str
@@ -113,12 +113,12 @@ class FlankFamily(Family):
         return values_at(min(found, key=lambda point: float(np.median(np.abs(miss(point))))))
 
     def _own(self, side: str, values: Values) -> dict[str, Any]:
-        """The parameters of one flank, by its own names, with those of the vertex."""
+        """Parameters of one flank, by its own names, with those of the vertex."""
         names = self.flanks[side].table
         return {name: values[f"{side}{name}"] for name in names} | {"q": values["q"], "x_c": values["x_c"]}
 
     def _fold(self, name: str, value: float) -> float:
-        """A bounded parameter as one that may have any value."""
+        """Map a bounded parameter to an unbounded one."""
         return float(np.log(value - self.bounds[name][0]))
 
     def _unfold(self, name: str, value: float) -> float:
@@ -134,14 +134,14 @@ def _ellipse_miss(u: Floats, v: Floats, values: Values) -> Floats:
 
 
 def _size(meaning: str, scale: float, length_power: int = 1) -> FamilyParameter:
-    """A positive parameter, as likely half as twice as large, or thereabouts, as `scale` in rod lengths."""
+    """Return a positive parameter with a log-normal prior about `scale`, in rod lengths."""
     return FamilyParameter(meaning, length_power, log_normal(1.0, scale), (0.0, np.inf))
 
 
 _A = "coefficient a, or horizontal half-axis of an ellipse"
 
 FLANKS: dict[str, Flank] = {
-    # Radius of curvature at the vertex, 1/(2a), like the circle's: half a rod length, give or take a factor of e.
+    # Radius of curvature at the vertex, 1/(2a), like the circle's: half a rod length within a factor of e.
     "parabola": Flank(
         Parabola,
         {"a": _size(_A, 1.0, -1)},
@@ -162,7 +162,7 @@ FLANKS: dict[str, Flank] = {
         start=lambda a: {"a": 0.5 / a, "b": 0.5 / a},
         miss=_ellipse_miss,
     ),
-    # The unit of a = w^(1 − n), by which PowerLaw goes, would depend on n.
+    # The unit of PowerLaw's a = w^(1 − n) would depend on n.
     "power-law": Flank(
         PowerLaw,
         {
@@ -176,11 +176,11 @@ FLANKS: dict[str, Flank] = {
         build=PowerLaw.of_width,
     ),
 }
-"""By name; any two make a joined family."""
+"""Flanks by name; any two make a joined family."""
 
 
 def sides_of(family: str) -> dict[str, str]:
-    """Names of the flanks of a family, by what stands before the names of their parameters.
+    """Names of the flanks of a family, by the prefix of the names of their parameters.
 
     Examples
     --------
@@ -200,16 +200,16 @@ FAMILIES: dict[str, Family] = {
     SHAPE_FREE.name: SHAPE_FREE,
     **{f"{left}/{right}": _of_flanks(f"{left}/{right}") for left in FLANKS for right in FLANKS},
 }
-"""Families by name; "parabola/circle" is a parabola on the left of its vertex, and a circle on the right."""
+"""Families by name; "parabola/circle" is a parabola on the left of the vertex and a circle on the right."""
 
 
 def family_named(name: str) -> Family:
-    """The family of a name.
+    """Return the family with a name.
 
     Raises
     ------
     ParameterError
-        If there is none.
+        If there is no such family.
 
     Examples
     --------

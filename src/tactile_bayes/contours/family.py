@@ -1,4 +1,4 @@
-"""A family of contours: what its parameters are, what is expected of them, and which contour is nearest to points."""
+"""A family of contours: its parameters, their default priors, and the fit to points."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ __all__ = ["DefaultPrior", "Family", "FamilyParameter", "log_normal", "parabola_
 _MOST_STEPS = 100
 
 _SETTLED = 1e-5
-"""Change of parameters, in rod lengths and over their size, after which least squares are not repeated."""
+"""Change of parameters, in rod lengths and relative to their size, at which least squares have converged."""
 
 
 class DefaultPrior(NamedTuple):
-    """The prior of a parameter unless another one is given, for a rod of length one."""
+    """Default prior of a parameter, for a rod of length one."""
 
     distribution: str
-    """Its name in scipy.stats."""
+    """Name of the distribution in scipy.stats."""
     numbers: Mapping[str, float]
-    """Its arguments; `scale` has the parameter's unit."""
+    """Arguments of the distribution; `scale` has the parameter's unit."""
 
 
 def log_normal(s: float, scale: float, **more: float) -> DefaultPrior:
-    """A prior of which the logarithm has standard deviation s, about the median `scale`."""
+    """Return a log-normal prior: the logarithm has the standard deviation s, and the median is `scale`."""
     return DefaultPrior("lognorm", {"s": s, **more, "scale": scale})
 
 
 class FamilyParameter(NamedTuple):
-    """A parameter of a family."""
+    """Parameter of a family."""
 
     meaning: str
     length_power: int
     """Power of length in its unit."""
     prior: DefaultPrior | None = None
-    """None of the vertex, about which the pivot says more: it lies anywhere within a rod length of that."""
+    """None for the vertex, which lies anywhere within a rod length of the pivot."""
     bounds: tuple[float, float] = (-np.inf, np.inf)
-    """What it is at least, and at most: there is no other contour."""
+    """Least and greatest value; no contour has another one."""
     unit: str = "1"
-    """Of one without length."""
+    """Unit of a parameter without length."""
 
 
 VERTEX = {"q": FamilyParameter("height of the vertex", 1), "x_c": FamilyParameter("position of the vertex", 1)}
@@ -54,12 +54,12 @@ VERTEX = {"q": FamilyParameter("height of the vertex", 1), "x_c": FamilyParamete
 
 
 class Family(ABC):
-    """Contours that a vector of parameters describes, q and x_c, the vertex, being its last."""
+    """Contours that a vector of parameters describes; the last two are those of the vertex, q and x_c."""
 
     name: str
-    """What users call it."""
+    """Name that users give."""
     table: Mapping[str, FamilyParameter]
-    """Its parameters by name, in order."""
+    """Parameters by name, in order."""
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
@@ -67,39 +67,39 @@ class Family(ABC):
 
     @cached_property
     def length_powers(self) -> dict[str, int]:
-        """For every parameter the power of length in its unit."""
+        """Power of length in the unit of each parameter."""
         return {name: parameter.length_power for name, parameter in self.table.items()}
 
     @cached_property
     def bounds(self) -> dict[str, tuple[float, float]]:
-        """What parameters are at least, and at most, whatever a prior says."""
+        """Least and greatest value of each parameter, under any prior."""
         return {name: parameter.bounds for name, parameter in self.table.items()}
 
     @property
     def roughness(self) -> tuple[str, ...]:
-        """Parameters that say nothing by themselves, of which a record need not tell anything."""
+        """Parameters of the random shape, which a record need not determine."""
         return ()
 
     @property
     @abstractmethod
     def is_always_clear(self) -> bool:
-        """Whether a rod that has snapped off is past every contour of the family."""
+        """True if a rod is clear of every contour of the family after snap-off."""
 
     @abstractmethod
     def build(self, *values: Any) -> Contour:
-        """Contours from parameters in the order of `parameters`, numbers or arrays."""
+        """Build contours from parameters in the order of `parameters`, numbers or arrays."""
 
     def contour(self, values: Mapping[str, Any]) -> Contour:
-        """Contours from parameters by name, numbers or arrays; ContourError beyond their bounds."""
+        """Build contours from parameters by name, numbers or arrays; ContourError beyond their bounds."""
         return self.build(*(values[name] for name in self.parameters))
 
     @abstractmethod
     def fit(self, x: Floats, y: Floats) -> dict[str, float]:
-        """Parameters by name that fit points (x, y) in rod lengths, by least squares that outliers do not rule."""
+        """Fit parameters, by name, to points (x, y) in rod lengths, by robust least squares."""
 
 
 def parabola_through(x: Floats, y: Floats) -> tuple[float, float, float]:
-    """a, q and x_c of a parabola through points; a positive one."""
+    """a, q and x_c of a parabola fitted to points, with a > 0."""
     design = np.stack([x * x, x, np.ones_like(x)], axis=1)
     a, b, c = robust_least_squares(lambda p: design @ p - y, np.linalg.lstsq(design, y, rcond=None)[0])
     if not a > 0.0:
@@ -108,7 +108,7 @@ def parabola_through(x: Floats, y: Floats) -> tuple[float, float, float]:
 
 
 def robust_least_squares(miss: Callable[[Floats], Floats], point: Any) -> Floats:
-    """Least squares that outliers do not rule: repeated, each time in units of the spread that the last one left."""
+    """Robust least squares, repeated with the residuals scaled by the median residual of the last fit."""
     for _ in range(5):
         spread = max(float(np.median(np.abs(miss(point)))), 1e-9)
 

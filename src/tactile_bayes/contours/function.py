@@ -22,19 +22,19 @@ Function = Callable[[NDArray[np.float64]], ArrayLike]
 
 _MAX_DEGREE = 1024
 _RESOLVED = 1e-14
-"""Share of the largest coefficient below which the last ones of a resolved function lie, per root of the degree."""
+"""Largest size of the last coefficients of a resolved function, over the largest one and the root of the degree."""
 
 _REFOUND = 64.0
-"""Multiple of that by which an interpolant may be off between its nodes."""
+"""Largest error of an interpolant between its nodes, as a multiple of that size."""
 
 _PROBES, _MANY_PROBES = 400, 1000
-"""Places, besides the ends, at which a function is tried: its derivatives, and its interpolant."""
+"""Numbers of points, besides the ends, at which the derivatives and the interpolant of a function are checked."""
 
 _PATCH = 32
-"""Degree of the interpolants by which a place is found where a function is not smooth."""
+"""Degree of the interpolants that locate a point where a function is not smooth."""
 
 _CONVEX = 1e-9
-"""Negative second derivatives of this share of the largest are rounding."""
+"""Negative second derivatives up to this share of the largest are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,26 +70,30 @@ def from_function(
     slope: Function | None = None,
     curvature: Function | None = None,
 ) -> FunctionContour:
-    """The contour y = g(x).
+    """Contour y = g(x).
 
-    Without derivatives the contour is g's Chebyshev interpolant, made fine enough to equal g up to rounding, so that
-    point, slope and curvature fit together exactly; for that g must be smooth on the whole domain. With them it is g
-    itself, of which the curvature must be continuous. Where it jumps, join two functions: `Joined`.
+    Without derivatives the contour is g's Chebyshev interpolant, fine enough to equal g up to rounding, so that point,
+    slope and curvature are consistent; g must then be smooth on the whole domain. With derivatives the contour is g
+    itself, and its curvature must be continuous. Where the curvature jumps, join two functions: `Joined`.
 
     Parameters
     ----------
     g : callable
-        From an array of x to the heights there, the same shape [length].
+        Maps an array of x to the heights there, of the same shape [length].
     domain : (float, float)
-        Least and greatest x; there the contour ends.
+        Least and greatest x, the ends of the contour [length].
     slope, curvature : callable, optional
-        g' and g'', both or none.
+        g' and g'' [1/length], both or none.
+
+    Returns
+    -------
+    FunctionContour
 
     Raises
     ------
     ContourError
-        If g is not strictly convex, not smooth or not finite (the message says where), or derivatives given are none
-        of g.
+        If g is not strictly convex, not smooth or not finite (the message says where), or the given derivatives are
+        not those of g.
 
     Examples
     --------
@@ -123,7 +127,7 @@ def from_function(
 
 @dataclass(frozen=True)
 class _Named:
-    """A function with the name that refusals give it, of which all values must be finite."""
+    """A function with finite values, and its name for messages."""
 
     function: Function
     name: str
@@ -174,7 +178,7 @@ def _resolved(g: _Named, lo: float, hi: float) -> Chebyshev:
 
 
 def _interpolant(g: _Named, lo: float, hi: float) -> Chebyshev | None:
-    """The interpolant that is g up to rounding, at its nodes and between them, if there is one."""
+    """Interpolant that equals g up to rounding, at its nodes and between them; None if there is none."""
     between = _probes(lo, hi, _MANY_PROBES)
     heights = g(between)
     degree = 16
@@ -190,7 +194,7 @@ def _interpolant(g: _Named, lo: float, hi: float) -> Chebyshev | None:
 
 
 def _may_be_joined(g: _Named, lo: float, at: float, hi: float) -> bool:
-    """Whether the parts on both sides of a place are smooth up to there, and the slope does not fall."""
+    """Return whether both sides of a point are smooth up to it, and the slope does not fall there."""
     if not lo < at < hi:
         return False
     left, right = _interpolant(g, lo, at), _interpolant(g, at, hi)
@@ -198,7 +202,7 @@ def _may_be_joined(g: _Named, lo: float, at: float, hi: float) -> bool:
 
 
 def _rough_place(g: _Named, lo: float, hi: float, near: float) -> float:
-    """Where a function is not smooth: in the left, the middle or the right half, whichever is worst, and so on."""
+    """Find a point where a function is not smooth, by descent into the worst of left, middle and right half."""
     size, width = np.abs(g(_probes(lo, hi))).max(), hi - lo
     lo, hi = max(lo, near - 0.02 * width), min(hi, near + 0.02 * width)
     while hi - lo > 1e-6 * width:
@@ -218,12 +222,12 @@ def _patch_miss(g: _Named, lo: float, hi: float) -> float:
 
 
 def _probes(lo: float, hi: float, count: int = _PROBES) -> Floats:
-    """Places to try, dense toward the ends, which are left out: there a contour may stand upright."""
+    """Return points to check, dense toward the ends, without the ends, where a contour may be vertical."""
     return 0.5 * (lo + hi) + 0.5 * (hi - lo) * probes(count)
 
 
 def _refuse_other_derivatives(contour: FunctionContour) -> None:
-    """Each derivative must add up to what it is the derivative of, and not jump."""
+    """Refuse derivatives whose integrals miss the function, or that jump."""
     width = contour.right - contour.left
     x = _probes(contour.left, contour.right)
     g, slope = _Named(contour.g, "the function"), _Named(contour.slope, "the slope")
@@ -244,7 +248,7 @@ def _refuse_other_derivatives(contour: FunctionContour) -> None:
 
 
 def _refuse_dents(x: Floats, heights: Floats) -> None:
-    """Refuse heights of which some are above the chord of their neighbours."""
+    """Refuse heights if some lie above the chord of their neighbours."""
     share = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
     above = heights[1:-1] - (1.0 - share) * heights[:-2] - share * heights[2:]
     dented = np.flatnonzero(above > 1e-12 * np.abs(heights).max())

@@ -1,4 +1,4 @@
-"""What compiled code has to know of contours: halves with a formula, or a table."""
+"""Contours for compiled code: halves with a formula, or a table."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ PARABOLA, OVAL, POWER_LAW, SLOPES, CELLS = 0, 1, 2, 3, 4
 
 
 class Half(NamedTuple):
-    """One side of a contour from its vertex on, the contour's parameter being zero there."""
+    """One side of a contour from its vertex, where the contour's parameter is zero."""
 
     kind: int
-    """`PARABOLA`: y = size · x²; `OVAL`: half-axes size (sideways) and shape; `POWER_LAW`: y = size · |x|^shape;
-    `SLOPES`, `CELLS`, of both sides: up to the parameter `size`, and the rest is in the tables."""
+    """`PARABOLA`: y = size · x²; `OVAL`: half-axes size (horizontal) and shape; `POWER_LAW`: y = size · |x|^shape;
+    `SLOPES`, `CELLS`: `size` is the parameter of the end, and the points are in the tables."""
     size: Floats
     shape: Floats
 
@@ -27,10 +27,10 @@ class Halves(NamedTuple):
     left: Half
     right: Half
     x: Floats
-    """The vertex, or what a table counts from."""
+    """Vertex, or origin of a table."""
     y: Floats
     tables: Floats | None = None
-    """Of contours that have no formula, shape (n, rows, columns). `SLOPES`: at slope angles from −π/2 to π/2, equally
-    far apart, the point, its rates over the width of a cell, and the rates of these. `CELLS`: a row a cell, where it
-    begins and ends in the contour's own parameter, and Chebyshev coefficients of x, y and slope angle; rows beyond the
-    last cell begin at infinity."""
+    """Tables of contours without a formula, shape (n, rows, columns). `SLOPES`: at equidistant slope angles from −π/2
+    to π/2, the point, its rates over the width of a cell, and the rates of these. `CELLS`: a row for each cell, with
+    its ends in the contour's own parameter and the Chebyshev coefficients of x, y and slope angle; rows beyond the last
+    cell begin at infinity."""

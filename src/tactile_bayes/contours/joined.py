@@ -1,4 +1,4 @@
-"""Two contours joined, with an edge between them or without: profile IV of the paper."""
+"""Two contours joined, with or without an edge between them: profile IV of the paper."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from tactile_bayes.errors import ContourError
 __all__ = ["SAME_SLOPE", "Joined"]
 
 SAME_SLOPE = 1e-9
-"""Slope angles [rad] that differ by less are the same."""
+"""Difference below which slope angles are equal [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Joined(Contour):
-    """The part of `left` up to the joint, and the part of `right` from there on.
+    """Part of `left` up to the joint, and part of `right` beyond it.
 
     The radius of curvature may jump at the joint. The slope may too, if it grows: the object then has an edge, an arc
     of radius zero on which the rod turns on the spot.
@@ -39,7 +39,7 @@ class Joined(Contour):
     left, right : Contour
         The halves; they meet at the joint.
     x : array_like, optional
-        Where the joint is [length]; by default where both are level.
+        Position of the joint [length]; by default the point at which both are level.
 
     Raises
     ------
@@ -53,7 +53,7 @@ class Joined(Contour):
     >>> iv.height([-1.0, 0.0, 1.0])
     array([0.8, 0.3, 1.3])
 
-    An edge, as of a roof upside down:
+    An edge:
 
     >>> edge = Joined(Parabola(0.2, q=0.3, x_c=1.0), Parabola(0.2, q=0.3, x_c=-1.0), x=0.0)
     >>> edge.point([-0.2, 0.0, 0.2])[0].round(12), edge.radius_of_curvature(0.1)
@@ -100,7 +100,7 @@ class Joined(Contour):
 
     @property
     def _joint(self) -> tuple[Floats, Floats, Floats]:
-        """Parameter of the left half and of the right half at the joint, and the turn between them."""
+        """Parameters of the left and the right half at the joint, and the turn between them [rad]."""
         return self.__dict__["_before"], self.__dict__["_after"], self.__dict__["_edge"]
 
     @property

@@ -17,12 +17,12 @@ __all__ = ["Circle", "Ellipse"]
 
 
 class _Oval(Vertexed):
-    """Lower half of an oval; its parameter is the eccentric angle, counted from the lowest point."""
+    """Lower half of an oval; its parameter is the eccentric angle from the lowest point."""
 
     @property
     @abstractmethod
     def half_axes(self) -> tuple[Parameter, Parameter]:
-        """The horizontal and the vertical one."""
+        """Horizontal and vertical half-axis."""
 
     @property
     def domain(self) -> tuple[Floats, Floats]:
@@ -51,7 +51,7 @@ class _Oval(Vertexed):
 
 @dataclass(frozen=True, eq=False)
 class Circle(_Oval):
-    """Lower half of a circle, y = q + r − √(r² − (x − x_c)²); it ends where it stands upright, at x = x_c ± r.
+    """Lower half of a circle, y = q + r − √(r² − (x − x_c)²); it ends where it is vertical, at x = x_c ± r.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class Circle(_Oval):
 
 @dataclass(frozen=True, eq=False)
 class Ellipse(_Oval):
-    """Lower half of an ellipse, (x − x_c)²/a² + (y − q − b)²/b² = 1; it ends where it stands upright, at x = x_c ± a.
+    """Lower half of an ellipse, (x − x_c)²/a² + (y − q − b)²/b² = 1; it ends where it is vertical, at x = x_c ± a.
 
     Parameters
     ----------

@@ -15,21 +15,27 @@ __all__ = ["paper_profile"]
 
 
 def paper_profile(name: Literal["I", "II", "III", "IV"], q: float) -> Contour:
-    """One of the paper's profiles.
+    """Return one of the paper's profiles.
 
-    I is 0.7 x² + q, II is 0.5 x² + q, III is 1 − √(1 − x²) + q, and IV is 0.5 x² + q for x < 0 and x⁴ + q for x ≥ 0.
+    I is 0.7 x² + q, II is 0.5 x² + q, III is 1 − √(1 − x²) + q, and IV is 0.5 x² + q for x < 0 and x⁴ + q for x ≥ 0:
+    equations 21 to 24 of Merker et al. 2018, doi 10.1155/2018/1613945.
 
     Parameters
     ----------
     name : {"I", "II", "III", "IV"}
-        Which profile.
+        Name of the profile.
     q : float
-        Distance of the vertex above the x axis, in rod lengths.
+        Height of the vertex above the x axis, in rod lengths.
+
+    Returns
+    -------
+    Contour
+        A single contour, in rod lengths.
 
     Raises
     ------
     ContourError
-        If there is no profile of that name.
+        If there is no profile of that name, or q is not finite.
 
     Examples
     --------

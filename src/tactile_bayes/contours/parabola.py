@@ -17,7 +17,7 @@ __all__ = ["Parabola"]
 
 @dataclass(frozen=True, eq=False)
 class Parabola(Vertexed):
-    """y = a (x − x_c)² + q.
+    """Parabola y = a (x − x_c)² + q.
 
     Parameters
     ----------

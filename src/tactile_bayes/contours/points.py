@@ -21,7 +21,7 @@ from tactile_bayes.errors import ContourError
 __all__ = ["MeasuredContour", "from_points"]
 
 _FEWEST = 6
-"""Different x that are needed: four belong to a cubic, and the scatter wants the others."""
+"""Least number of different x: four for a cubic, and two for the scatter."""
 
 _MOST_PIECES = 100
 
@@ -38,13 +38,13 @@ class MeasuredContour(Graph, Single):
     Attributes
     ----------
     x, y : ndarray, shape (n,)
-        The points, as given [length].
+        The given points [length].
     scatter : float or ndarray, shape (n,)
-        Standard deviation of the heights, given or else estimated [length].
+        Standard deviation of the heights, given or estimated [length].
     residual_rms : float
-        Root mean square of the heights of the points above the contour [length].
+        Root mean square of the vertical distances of the points from the contour [length].
     graph : PPoly
-        g, of degree four between its breakpoints, with three continuous derivatives.
+        g, a polynomial of degree four between its breakpoints, with three continuous derivatives.
     """
 
     x: Floats
@@ -76,37 +76,39 @@ class MeasuredContour(Graph, Single):
 
 
 def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None) -> MeasuredContour:
-    """A strictly convex, smooth contour from measured points of an object's lower boundary.
+    """Fit a strictly convex, smooth contour to measured points of an object's lower boundary.
 
     Its curvature g'' is a quadratic spline, so that the radius of curvature and its slope are continuous. It minimises
     the squares of the residuals, over scatter², plus a weight times ∫ g⁗² dx, with g'' nowhere below 1/1000 of the
-    points' mean curvature. The weight, and the scatter where it is not given, are those of greatest restricted
-    likelihood if g⁗ is white noise (the smoothing spline's prior; Wahba, Ann. Statist. 13, 1985, p. 1378).
+    points' mean curvature. The weight, and the scatter if it is not given, maximise the restricted likelihood for white
+    noise g⁗ (the smoothing spline's prior; Wahba, Ann. Statist. 13, 1985, p. 1378).
 
-    Before, every stretch of neighbouring points, short and long, is tested for a bend of the wrong sign: the quadratic
-    term of a parabola fitted to it, which is never negative for points of a convex contour, against its standard error.
-    Points of a convex contour with Gaussian scatter are refused at most once in 1000 times.
+    First, every stretch of neighbouring points, short and long, is tested for a bend of the wrong sign: the quadratic
+    term of a parabola fitted to it, which is never negative for points of a convex contour, is compared with its
+    standard error. Points of a convex contour with Gaussian scatter are refused at most once in 1000 times.
 
     Parameters
     ----------
     x, y : array_like, shape (n,)
-        The points [length], in any order; the x may repeat. At least six x must differ, and they are taken as exact.
+        The points [length], in any order; the x may repeat. At least six x must differ; they are taken as exact.
     scatter : array_like, shape () or (n,), optional
-        Standard deviation of the heights y [length], of all or of each, independent from point to point; say more where
-        neighbouring errors go together, as in a filtered profile or in finely spaced, coarsely rounded heights. A
-        probe that scatters by σ at right angles to a contour of slope angle α scatters by σ/cos α in height. By
-        default one scatter is estimated from the points: better from many, and a dent of few points is taken for it.
+        Standard deviation of the heights y [length], of all or of each, independent from point to point; give a larger
+        one where neighbouring errors are correlated, as in a filtered profile or in finely spaced, coarsely rounded
+        heights. A probe with a scatter σ normal to a contour of slope angle α has the scatter σ/cos α in height. By
+        default one scatter is estimated from the points: the more points the better, and a dent of few points counts as
+        scatter.
 
     Returns
     -------
     MeasuredContour
-        On [min x, max x]; with `scatter` and `residual_rms`.
+        The contour on [min x, max x], with `scatter` and `residual_rms`.
 
     Raises
     ------
     ContourError
-        If the points are not convex beyond their scatter (the message names the stretch), a closed outline, upside
-        down, or not distinguishable from a line; if they are too few, not finite, or a scatter is not positive.
+        If the points are not convex within their scatter (the message names the stretch), form a closed outline, are
+        upside down, or cannot be distinguished from a line; if they are too few or not finite, or a scatter is not
+        positive.
 
     Examples
     --------
@@ -139,7 +141,7 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
     if size <= rounding:
         raise ContourError(f"from_points: the points are on a straight line{STRAIGHT}")
 
-    with threadpool_limits(1):  # the matrices are small: threads would only wait for one another
+    with threadpool_limits(1):  # the matrices are small: threads would wait for one another
         noise = np.ones_like(y) if given is None else np.broadcast_to(np.hypot(given, rounding) / size, y.shape)
         problem = _Smoothing.of(u, off_line / size, noise)
         estimate = problem.weigh(None)
@@ -167,24 +169,24 @@ def from_points(x: ArrayLike, y: ArrayLike, *, scatter: ArrayLike | None = None)
 
 class _Weighing(NamedTuple):
     weight: float
-    """Of the roughness."""
+    """Weight of the roughness."""
     noise: float
-    """What the noise must be multiplied by."""
+    """Factor on the noise."""
     freedom: float
-    """Degrees of freedom that this factor is known from."""
+    """Degrees of freedom of the estimate of this factor."""
 
 
 class _Smoothing(NamedTuple):
-    """Least squares for an offset (level, tilt) and the B-splines of g'', reduced to a triangle."""
+    """Least squares for a line (level, slope) and the B-splines of g'', reduced to a triangular system."""
 
     knots: Floats
     design: Floats
     target: Floats
     rest: float
-    """Squares that no coefficients can take away."""
+    """Residual sum of squares of the unconstrained fit."""
     points: int
     roughness: Floats
-    """The squares of this times the coefficients sum up to ∫ g⁗² du."""
+    """Matrix R with |R c|² = ∫ g⁗² du for coefficients c."""
 
     @classmethod
     def of(cls, u: Floats, heights: Floats, noise: Floats) -> _Smoothing:
@@ -202,7 +204,7 @@ class _Smoothing(NamedTuple):
         return cls(knots, design, target, float(np.sum(rest**2)), u.size, np.pad(fourth, ((0, 0), (2, 0))))
 
     def weigh(self, noise: float | None) -> _Weighing:
-        """The weight of greatest restricted likelihood, and that of the noise too where it is None."""
+        """Find the weight, and the noise if it is None, of greatest restricted likelihood."""
         smooth = null_space(self.roughness)  # cubics, which cost nothing
         beyond = np.linalg.qr(self.design @ smooth, mode="complete")[0][:, smooth.shape[1] :]
         modes, gain, _ = np.linalg.svd(beyond.T @ self.design @ np.linalg.pinv(self.roughness))
@@ -227,7 +229,7 @@ class _Smoothing(NamedTuple):
         return _Weighing(weight, np.sqrt(squares(log_weight) / count), count - float(np.sum(gain2 / (gain2 + weight))))
 
     def solve(self, weight: float, floor: float) -> tuple[Floats, Floats]:
-        """The offset, and coefficients of g'' none of which is below the floor."""
+        """Find the line and the coefficients of g'', none of which is below the floor."""
         stacked = np.vstack([self.design, np.sqrt(weight) * self.roughness])
         target = np.pad(self.target, (0, self.roughness.shape[0])) - floor * stacked[:, 2:].sum(axis=1)
         triangle = _triangle(np.column_stack([stacked, target]))
@@ -241,7 +243,7 @@ def _triangle(columns: Floats) -> Floats:
 
 
 def _checked(x: ArrayLike, y: ArrayLike, scatter: ArrayLike | None) -> tuple[Floats, Floats, Floats | None]:
-    """Copies of the points, in arrays that cannot be written to, if they are any."""
+    """Return read-only copies of the points, or refuse them."""
     columns = {"x": x, "y": y} if scatter is None else {"x": x, "y": y, "scatter": scatter}
     checked: dict[str, Floats] = {}
     for name, given in columns.items():

@@ -17,16 +17,16 @@ __all__ = ["PowerLaw"]
 _LEAST_EXPONENT, _GREATEST_EXPONENT = 1.1, 50.0
 
 _STEEPEST = 1e300
-"""Greatest factor that follows from a width: more is beyond what numbers hold."""
+"""Greatest factor a that follows from a width, lest it overflow."""
 
 
 @dataclass(frozen=True, eq=False)
 class PowerLaw(Vertexed):
-    """y = a |x − x_c|ⁿ + q.
+    """Power law y = a |x − x_c|ⁿ + q.
 
-    For n > 2 the curvature vanishes at the vertex, and only there. For n < 2 it grows beyond all bounds there: the
-    radius of curvature is zero at the vertex, the slope is continuous all the same, and a rod slides past it. Toward
-    n = 1 the vertex becomes an edge; below 1.1 give that edge, as `Joined` does.
+    For n > 2 the curvature vanishes at the vertex, and only there. For n < 2 it is infinite there: the radius of
+    curvature is zero at the vertex, but the slope is continuous, and a rod slides past it. Toward n = 1 the vertex
+    becomes an edge; instead of n < 1.1 give an edge by `Joined`.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class PowerLaw(Vertexed):
 
     @classmethod
     def of_width(cls, w: Parameter, n: Parameter, q: Parameter, x_c: Parameter = 0.0) -> Self:
-        """(y − q)/w = (|x − x_c|/w)ⁿ: as high above its vertex as it is wide at w > 0 [length].
+        """Power law (y − q)/w = (|x − x_c|/w)ⁿ, which is as high above its vertex as it is wide at w > 0 [length].
 
         Examples
         --------
@@ -90,7 +90,7 @@ class PowerLaw(Vertexed):
 
     @property
     def w(self) -> Floats:
-        """The width of `of_width`."""
+        """Width w of `of_width` [length]."""
         return np.asarray(np.asarray(self.a) ** (1.0 / (1.0 - np.asarray(self.n))))
 
     @property
@@ -107,7 +107,7 @@ class PowerLaw(Vertexed):
         return (np.zeros(()),)
 
     def _powers(self) -> tuple[Floats, Floats, Floats]:
-        """|x − x_c|, slope and y − q are these powers of |p|: p is the offset for n ≥ 2, else like the slope."""
+        """Exponents of |p| in |x − x_c|, slope and y − q: p is the offset for n ≥ 2, else proportional to the slope."""
         of_offset, of_slope = np.maximum(1.0, 1.0 / (self.n - 1.0)), np.maximum(1.0, self.n - 1.0)
         return of_offset, of_slope, of_offset + of_slope
 

@@ -1,4 +1,4 @@
-"""A random radius of curvature over the slope angle: a Gaussian process in the few directions that matter."""
+"""A random radius of curvature over the slope angle: a Gaussian process in a truncated Karhunen–Loève expansion."""
 
 from __future__ import annotations
 
@@ -15,40 +15,40 @@ from tactile_bayes.contours.smooth import Smooth
 __all__ = ["Directions", "RandomRadius"]
 
 _PLACES = 200
-"""Slope angles at which the process is cut into directions."""
+"""Number of slope angles at which the expansion is computed."""
 
 _LARGEST = 25.0
-"""Logarithm of radii that no prior comes near."""
+"""Bound on the logarithm of radii, far beyond any prior."""
 
 _LENGTHS = 64
-"""Length scales for which that is done, others being interpolated."""
+"""Number of length scales at which the expansion is computed; it is interpolated between them."""
 
 
 class Directions(NamedTuple):
-    """Functions of the slope angle, one after the other the largest that are left, of which the process is the sum."""
+    """Terms of the expansion as functions of the slope angle, in the order of decreasing variance."""
 
     log_lengths: Floats
-    """Of the length scales, shape (lengths,)."""
+    """Logarithms of the length scales, shape (lengths,)."""
     values: Floats
-    """At the nodes of `Smooth`, shape (lengths, nodes, directions); times standard normal numbers, their sum has unit
-    standard deviation on average over slope angles."""
+    """Values at the nodes of `Smooth`, shape (lengths, nodes, directions). With standard normal weights their sum has
+    unit variance on average over slope angles."""
 
 
 @dataclass(frozen=True)
 class RandomRadius:
-    """log ρ(α) = log r + amplitude · g(α), with g a Gaussian process of which r is the geometric mean.
+    """Random radius log ρ(α) = log r + amplitude · g(α), with a Gaussian process g and the geometric mean r of ρ.
 
-    The covariance is Matérn's with ν = 5/2 (Rasmussen & Williams 2006, equation 4.17), so that curvature changes
-    smoothly, over slope angles from −π/2 to π/2, with the mean over these taken off.
+    The covariance of g is Matérn's with ν = 5/2 (Rasmussen & Williams 2006, equation 4.17), so that curvature changes
+    smoothly; the mean over slope angles from −π/2 to π/2 is subtracted.
 
     Parameters
     ----------
     shortest, longest : float
-        Length scales between which g is known [rad].
+        Range of the length scale [rad].
     tolerance : float
-        Share of the variance of g that may be left out at the shortest length scale; the number of directions follows.
+        Share of the variance of g that is neglected at the shortest length scale; it determines the number of terms.
     nodes : int
-        Values by which a contour is given.
+        Number of values that define a contour.
     """
 
     shortest: float
@@ -64,16 +64,16 @@ class RandomRadius:
 
     @property
     def directions(self) -> Directions:
-        """In which the process is cut, at length scales from the shortest to the longest."""
+        """Terms of the expansion, at length scales from the shortest to the longest."""
         return _directions(self.shortest, self.longest, self.count, self.nodes)
 
     def log_radius(self, log_r: Floats, amplitude: Floats, length: Floats, weights: Floats) -> Floats:
-        """At the nodes, shape (n, nodes), from arrays of shape (n,) and standard normal weights (n, directions)."""
+        """log ρ at the nodes, shape (n, nodes), from arrays (n,) and standard normal weights (n, directions)."""
         sums = (self.shapes(length) @ weights[..., None])[..., 0]
         return np.clip(log_r[..., None] + amplitude[..., None] * sums, -_LARGEST, _LARGEST)
 
     def shapes(self, length: Floats) -> Floats:
-        """The directions at the nodes, shape (n, nodes, directions), for length scales of shape (n,)."""
+        """Terms at the nodes, shape (n, nodes, directions), for length scales of shape (n,) [rad]."""
         at = np.log(np.clip(length, self.shortest, self.longest))
         return np.asarray(_spline(self.shortest, self.longest, self.count, self.nodes)(at))
 
@@ -89,7 +89,7 @@ def _places() -> Floats:
 
 @functools.lru_cache(maxsize=64)
 def _spectrum(length: float) -> tuple[Floats, Floats]:
-    """Mean variances of the directions, the largest first, and the directions at the places, a column each."""
+    """Mean variances of the directions, the largest first, and the directions at the slope angles, a column each."""
     places = _places()
     covariance = _covariance(places, places, length)
     covariance = covariance - covariance.mean(axis=0) - covariance.mean(axis=1)[:, None] + covariance.mean()
@@ -99,7 +99,7 @@ def _spectrum(length: float) -> tuple[Floats, Floats]:
 
 @functools.lru_cache(maxsize=8)
 def _directions(shortest: float, longest: float, count: int, nodes: int) -> Directions:
-    """The first directions for many length scales."""
+    """First directions for many length scales."""
     places, at = _places(), Smooth.nodes(nodes)
     log_lengths = np.linspace(np.log(shortest), np.log(longest), _LENGTHS)
     values = np.empty((_LENGTHS, nodes, count))
@@ -110,7 +110,7 @@ def _directions(shortest: float, longest: float, count: int, nodes: int) -> Dire
         if before is not None:
             chosen = chosen * np.sign(np.sum(chosen * before, axis=0))
         before = chosen
-        # The functions between the places, as the covariance continues them (Nyström).
+        # The functions between the slope angles, by Nyström's extension.
         across = _covariance(at, places, float(np.exp(log_length)))
         across = across - across.mean(axis=1)[:, None]
         mean = _covariance(places, places, float(np.exp(log_length))).mean(axis=0)

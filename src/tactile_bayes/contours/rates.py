@@ -1,4 +1,4 @@
-"""Whether one function is the derivative of another, judged by its integrals."""
+"""The comparison of a function with the derivative of another, by integrals."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ __all__ = ["Mismatch", "Rate", "mismatch", "probes"]
 Rate = Callable[[Floats], Floats]
 
 _MISS = 1e-6
-"""Share of the largest change between neighbouring stops by which an integral may miss a change."""
+"""Tolerated error of an integral, as a share of the largest change between neighbouring stops."""
 
 _ROUNDING = 16.0 * np.finfo(float).eps
 
 _SUSPECTS = 16
-"""How many of the worst stretches are looked into."""
+"""Number of the worst stretches that are examined."""
 
 _HALVINGS = 8
 _SHRINKS = 0.25
-"""Where the derivative is right, the misses of a stretch shrink at least by this factor if it is halved so often: only
-those about a jump or a kink of it remain. Those of a wrong one add up to the same."""
+"""If the derivative is right, the misses of a stretch shrink at least by this factor after so many halvings: only those
+about a jump or a kink remain. The misses of a wrong derivative keep their sum."""
 
 _JUMP = 1e-6
-"""Share of the largest rate by which it may change over a distance that rounding leaves."""
+"""Tolerated change of a rate over a distance of rounding, as a share of the largest rate."""
 
 
 class Mismatch(NamedTuple):
@@ -37,54 +37,54 @@ class Mismatch(NamedTuple):
     left: float
     right: float
     miss: float
-    """By which they differ over the stretch; NaN where the derivative only jumps, at `right`."""
-    lane: tuple[int, ...]
-    """Which of many functions."""
+    """Difference over the stretch; NaN if the derivative only jumps, at `right`."""
+    contour: tuple[int, ...]
+    """Index of the function among many."""
 
 
 def probes(count: int) -> Floats:
-    """Places in (−1, 1), dense toward the ends.
+    """Return points in (−1, 1), dense toward the ends.
 
-    They are a little to the left, so that zero, a likely place for a jump, is neither one of them nor in the middle
-    between two: there no integral would miss it.
+    They are shifted a little to the left, so that zero, a likely position of a jump, is neither one of them nor in the
+    middle between two, where no integral would miss it.
     """
     return -np.cos(np.pi * (np.arange(count) + 0.38) / count)
 
 
 def mismatch(rate: Rate, of: Rate, stops: Floats) -> Mismatch | None:
-    """The worst stretch between stops over which a function changes by another amount than its rate adds up to.
+    """Find the worst stretch between stops over which the change of a function differs from the integral of its rate.
 
-    A rate may have jumps at stops only: one elsewhere is named if there is no worse.
+    A rate may jump at stops only; a jump elsewhere is returned if there is nothing worse.
 
     Parameters
     ----------
     rate, of : callable
-        From arguments of shape (k, ...) to values of that shape.
+        Map arguments of shape (k, ...) to values of that shape.
     stops : ndarray, shape (n, ...)
-        Arguments, not falling along the first axis; of many functions along the others.
+        Arguments, not decreasing along the first axis; the other axes are those of many functions.
     """
     change, miss = _misses(rate, of, stops)
     excess = miss - _MISS * np.abs(change).max(axis=0) - _ROUNDING * np.abs(of(stops)).max(axis=0)
     jump = None
     for place in np.argsort(excess, axis=None)[::-1][:_SUSPECTS]:
-        stretch, *lane = (int(i) for i in np.unravel_index(place, excess.shape))
-        at = (stretch, *lane)
+        stretch, *index = (int(i) for i in np.unravel_index(place, excess.shape))
+        at = (stretch, *index)
         if excess[at] <= 0.0:
             break
         ends = stops[stretch], stops[stretch + 1]
         _, finer = _misses(rate, of, np.linspace(*ends, 2**_HALVINGS + 1))
-        if finer.sum(axis=0)[tuple(lane)] > _SHRINKS * miss[at]:
-            return Mismatch(float(stops[at]), float(stops[stretch + 1, *lane]), float(miss[at]), tuple(lane))
-        left, right, size = (v[tuple(lane)] for v in _steepest(rate, *ends))
-        begin, end = (stop[tuple(lane)] for stop in ends)
+        if finer.sum(axis=0)[tuple(index)] > _SHRINKS * miss[at]:
+            return Mismatch(float(stops[at]), float(stops[stretch + 1, *index]), float(miss[at]), tuple(index))
+        left, right, size = (v[tuple(index)] for v in _steepest(rate, *ends))
+        begin, end = (stop[tuple(index)] for stop in ends)
         inside = begin < left and right < end  # at a stop it may jump, or rise as steeply as a power of almost zero
-        if jump is None and inside and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(lane)]:
-            jump = Mismatch(float(left), float(right), np.nan, tuple(lane))
+        if jump is None and inside and size > _JUMP * np.abs(rate(stops)).max(axis=0)[tuple(index)]:
+            jump = Mismatch(float(left), float(right), np.nan, tuple(index))
     return jump
 
 
 def _misses(rate: Rate, of: Rate, stops: Floats) -> tuple[Floats, Floats]:
-    """Changes between neighbouring stops, and by how much the integrals miss them, by eight Gauss–Legendre nodes."""
+    """Changes between neighbouring stops, and the errors of the integrals, by eight Gauss–Legendre nodes."""
     node, weight = np.polynomial.legendre.leggauss(8)
     half, middle = 0.5 * np.diff(stops, axis=0), 0.5 * (stops[:-1] + stops[1:])
     inside = middle[:, None] + half[:, None] * node.reshape(-1, *(1,) * (stops.ndim - 1))
@@ -94,7 +94,7 @@ def _misses(rate: Rate, of: Rate, stops: Floats) -> tuple[Floats, Floats]:
 
 
 def _steepest(rate: Rate, left: NDArray[np.floating], right: NDArray[np.floating]) -> tuple[Floats, Floats, Floats]:
-    """Neighbouring places between which a rate changes most, and by how much, halving where it does."""
+    """Neighbouring points between which a rate changes most, and the change, by bisection."""
     a, b = rate(np.stack([left, right]))
     for _ in range(60):
         middle = 0.5 * (left + right)

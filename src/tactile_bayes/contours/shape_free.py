@@ -1,4 +1,4 @@
-"""Contours of any shape: the radius of curvature over the slope angle, and one point."""
+"""Contours of any shape, from the radius of curvature over the slope angle and one point."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from tactile_bayes.numerics import chebyshev
 __all__ = ["ShapeFree"]
 
 _LARGEST = 100.0
-"""Logarithm of a radius beyond which a spline has overshot."""
+"""Bound on the logarithm of a radius, beyond which a spline has overshot."""
 
 _ORDER = 32
-"""Chebyshev nodes a stretch between knots: what radii that change twentyfold there leave is rounding."""
+"""Chebyshev nodes between two knots; the error is rounding even if radii change twentyfold there."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeFree(Tabled):
-    """Any strictly convex contour whose curvature is finite: log ρ(α) is a cubic spline, and one point is known.
+    """Any strictly convex contour of finite curvature: log ρ(α) is a cubic spline, and one point is given.
 
     The contour follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle. It is
-    strictly convex whatever the values are.
+    strictly convex for all values.
 
     Parameters
     ----------
     slope_angles : array_like, shape (k,)
-        Knots of the spline, increasing in [−π/2, π/2], at least 4 [rad]; the first and the last are the contour's ends.
+        At least 4 knots of the spline, increasing in [−π/2, π/2] [rad]; the first and the last are the contour's ends.
     log_radius : array_like, shape (..., k)
-        Logarithm of the radius of curvature at the knots, in the unit of length that x and y have.
+        Logarithm of the radius of curvature at the knots, in the unit of length of x and y.
     x, y : array_like, shape (...)
-        The point at slope angle `at` [length].
+        Point at the slope angle `at` [length].
     at : float
-        Slope angle of the known point, between the ends [rad].
+        Slope angle of the given point, between the ends [rad].
 
     Raises
     ------
     ContourError
-        If the knots are not increasing angles, there is not one value a knot, a value is not finite, or the spline runs
-        off between knots that nearly coincide.
+        If the knots are not increasing angles, there is not one value for each knot, a value is not finite, or the
+        spline overshoots between knots that nearly coincide.
 
     Examples
     --------

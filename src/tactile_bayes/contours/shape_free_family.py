@@ -1,4 +1,4 @@
-"""Contours of any shape as a family: a random radius of curvature, and the vertex."""
+"""The family of contours of any shape: a random radius of curvature, and the vertex."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ _AMPLITUDE, _LENGTH = log_normal(0.6, 0.7), log_normal(0.4, 0.7)
 """Priors of the standard deviation of log ρ, and of the length over which it changes [rad]."""
 
 _SCATTER, _HUBER = 0.01, 2.0
-"""Of points to be fitted, in rod lengths, as a first guess; and from how many times that on they pull less."""
+"""First guess of the scatter of points to be fitted [L], and the threshold of the soft-L1 loss in units of it."""
 
 _STEP = 1e-5
 
 _POINTS = 500
-"""To which a contour is fitted at most: as a first guess, which every search improves on."""
+"""Largest number of points of a fit, which is a first guess for a search."""
 
 
 @dataclass(frozen=True)
 class ShapeFreeFamily(Family):
-    """Any smooth contour between vertical ends.
+    """Family of all smooth contours between vertical ends.
 
     Parameters
     ----------
     name : str
     radius : RandomRadius
-        The prior of its radius of curvature.
+        Prior of the radius of curvature.
     """
 
     name: str
@@ -87,9 +87,9 @@ class ShapeFreeFamily(Family):
         return super().contour(values)
 
     def fit(self, x: Floats, y: Floats) -> dict[str, float]:
-        """From a circle that is as bent as the points, by distances along the normal and the directions' prior.
+        """Fit by distances along the normal and the prior of the directions, from a circle with the points' curvature.
 
-        Of very many points, some that are evenly picked.
+        Of very many points an even selection is used.
         """
         picked = np.unique(np.linspace(0, x.size - 1, min(x.size, _POINTS)).astype(np.intp))
         x, y = x[picked], y[picked]
@@ -99,7 +99,7 @@ class ShapeFreeFamily(Family):
         length = _LENGTH.numbers["scale"]
 
         def residuals(points: Floats, scatter: float) -> Floats:
-            """Of points (n, d): (n, points + d)."""
+            """Residuals at parameters of shape (n, d), shape (n, points + d)."""
             ones = np.ones(len(points))
             contours = self.build(np.exp(points[:, 0]), amplitude * ones, length * ones, *points[:, 1:].T)
             return np.hstack([_distances(contours, x, y) / scatter, points - middle])
@@ -123,7 +123,7 @@ class ShapeFreeFamily(Family):
 
 
 def _distances(contours: Contour, x: Floats, y: Floats) -> Floats:
-    """Of points from contours, along the normal where they are above or below them, shape (n, points)."""
+    """Distances of points from contours, along the normal above or below them, shape (n, points)."""
     left, right = (contours.locate(end).x for end in contours.domain)
     margin = 1e-9 * (right - left)
     at = contours.locate(contours.parameter_of_x(np.clip(x[:, None], left + margin, right - margin)))

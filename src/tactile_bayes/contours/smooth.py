@@ -1,4 +1,4 @@
-"""Smooth contours of any shape, many at once: log radius of curvature over slope angle, and the vertex."""
+"""Smooth contours of any shape, many at once, from the radius of curvature over the slope angle and the vertex."""
 
 from __future__ import annotations
 
@@ -21,34 +21,34 @@ __all__ = ["Smooth"]
 
 _UPRIGHT = 0.5 * np.pi
 _LARGEST = 100.0
-"""Logarithm of a radius beyond which nothing is gained."""
+"""Bound on the logarithm of a radius."""
 
 _CELLS = 128
-"""Of a contour, between whose ends it is a polynomial of fifth degree; even, so that the vertex is one of them."""
+"""Cells of a contour, on each of which it is a polynomial of fifth degree; even, so that the vertex ends a cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smooth(Tabled):
-    """Any smooth, strictly convex contour between vertical ends: log ρ(α) is a polynomial, and the vertex is known.
+    """Any smooth, strictly convex contour between vertical ends: log ρ(α) is a polynomial, and the vertex is given.
 
     The contour follows by integration, ξ' = ρ cos α and η' = ρ sin α; its own parameter is the slope angle. It is
-    strictly convex whatever the values are. Unlike `ShapeFree` it is smooth throughout, so that many contours at once
-    cost little.
+    strictly convex for all values. Unlike `ShapeFree` it is smooth everywhere, so that many contours at once cost
+    little.
 
     Parameters
     ----------
     log_radius : array_like, shape (..., k)
-        Logarithm of the radius of curvature, in the unit of length that q and x_c have, at `Smooth.nodes(k)`, through
-        which the polynomial goes; k at least 2.
+        Logarithm of the radius of curvature, in the unit of length of q and x_c, at the interpolation nodes
+        `Smooth.nodes(k)`; k ≥ 2.
     q : array_like, shape (...)
         Height of the vertex [length].
     x_c : array_like, shape (...)
-        Where the vertex is [length].
+        Position of the vertex [length].
 
     Raises
     ------
     ContourError
-        If a value is not finite, or the polynomial runs off.
+        If a value is not finite, or the polynomial overshoots.
 
     Examples
     --------
@@ -75,7 +75,7 @@ class Smooth(Tabled):
 
     @staticmethod
     def nodes(count: int) -> Floats:
-        """Slope angles at which radii of curvature are given, increasing in (−π/2, π/2) [rad]."""
+        """Slope angles at which radii of curvature are given, increasing in (−π/2, π/2), shape (count,) [rad]."""
         return 2.0 * _UPRIGHT * (chebyshev.nodes(count) - 0.5)
 
     @property
@@ -130,9 +130,10 @@ class Smooth(Tabled):
 
 
 def _tabulated(coefficients: Floats) -> Floats:
-    """At the ends of cells, shape (n, cells + 1, 6): the point seen from the vertex, its rates over a cell, and theirs.
+    """Table at the ends of cells, shape (n, cells + 1, 6), from coefficients of log ρ, shape (k, n).
 
-    From coefficients of log ρ, shape (k, n). The way across a cell is integrated to seventh order of its width.
+    Columns are the point relative to the vertex, its rates over a cell, and the rates of these. The integral over a
+    cell has an error of seventh order in its width.
     """
     alpha, values, slopes = _grid(coefficients.shape[0])
     log_radius = coefficients.T @ values
@@ -159,14 +160,14 @@ def _tabulated(coefficients: Floats) -> Floats:
 
 @functools.cache
 def _grid(count: int) -> tuple[Floats, Floats, Floats]:
-    """Slope angles at ends and middles of cells, Chebyshev's polynomials there, and their slopes at the ends."""
+    """Slope angles at ends and middles of cells, Chebyshev polynomials there, and their derivatives at the ends."""
     z = np.linspace(0.0, 1.0, 2 * _CELLS + 1)
     slopes = chebyshev.evaluate(chebyshev.derivative(np.eye(count)), z[::2, None]).T
     return 2.0 * _UPRIGHT * (z - 0.5), chebyshev.basis(count, z), slopes / (2.0 * _UPRIGHT)
 
 
 def _between(left: Floats, right: Floats, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """x, y and their rates at a share t of a cell, from what is known at its ends: polynomials of fifth degree."""
+    """x, y and their rates at a share t of a cell, by polynomials of fifth degree between its ends."""
     out = []
     for axis in range(2):
         start, rate, bend = (left[..., axis + k] for k in (0, 2, 4))

@@ -1,4 +1,4 @@
-"""Contours of which something is tabulated, once for all that are taken from them."""
+"""Contours with tables, which are shared by all contours that are taken from them."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ __all__ = ["Tabled"]
 
 
 class Tabled(Contour):
-    """Contours with tables that have a row for each; `_row` says which, so that the tables need not be taken along."""
+    """Contours with tables of a row for each; `_row` is its index, so that `take` need not copy the tables."""
 
     _by_contour: ClassVar[tuple[str, ...]]
-    """Names of what has an entry for each contour, `log_radius` first and `_row` last."""
+    """Names of the arrays with an entry for each contour, `log_radius` first and `_row` last."""
 
     log_radius: Floats
 
     def _take_arrays(self, *names: str) -> None:
-        """Make parameters arrays of numbers."""
+        """Convert parameters to arrays of numbers."""
         family = type(self).__name__
         self.__dict__.update({n: np.asarray(as_parameter(family, n, getattr(self, n))) for n in names})
 
     def _share_shape(self) -> None:
-        """Bring what has an entry for each contour to one shape, and number the contours."""
+        """Broadcast the arrays with an entry for each contour to one shape, and number the contours."""
         family, values = type(self).__name__, self.log_radius
         others = {name: self.__dict__[name] for name in self._by_contour[1:-1]}
         shapes = {"log_radius[..., 0]": values.shape[:-1], **{name: v.shape for name, v in others.items()}}
@@ -44,7 +44,7 @@ class Tabled(Contour):
         return np.shape(self.__dict__["_row"])
 
     def _each(self, change: Callable[[Any], Floats]) -> Self:
-        other = object.__new__(type(self))  # the tables stay one for all
+        other = object.__new__(type(self))  # the tables are shared
         other.__dict__.update(self.__dict__)
         other.__dict__.update((name, change(self.__dict__[name])) for name in self._by_contour)
         return other

@@ -14,13 +14,13 @@ from threadpoolctl import threadpool_limits
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.families import FAMILIES
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.datasets.measurement import measure
 from tactile_bayes.datasets.specification import Specification, rule_of
 from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
-from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rod import LARGEST_STRAIN
 from tactile_bayes.sweep import EVENT_COLUMNS, SAMPLE_COLUMNS, ManyUnits, phases_of, sweep_events, sweep_samples
 
@@ -36,7 +36,7 @@ _APART = 2**20
 """Random numbers from where one draw of a record begins to where the next does: far more than there are laws, so that a
 contour is the same whatever is drawn after it."""
 
-_GOOD = Reach.TOUCHES.words
+_GOOD = Reachability.TOUCHES.message
 
 
 @dataclass(frozen=True)
@@ -172,11 +172,11 @@ def _keep(
             if not key.startswith("contours[") or key.startswith(f"contours[{g}]."):
                 values[kept] = candidates.values[key][chosen]
         if taken.size:
-            lane = sweeps * taken[:, None] + np.arange(sweeps)
-            found = {name: rows[lane] for name, rows in _of_sweeps(spec, its).items()}
+            index = sweeps * taken[:, None] + np.arange(sweeps)
+            found = {name: rows[index] for name, rows in _of_sweeps(spec, its).items()}
             _put(records.sweep, found, kept, count)
             for some in spec.blocks(kept.size):
-                _put(records.sample, _of_samples(its, lane[some]), kept[some], count)
+                _put(records.sample, _of_samples(its, index[some]), kept[some], count)
 
 
 def _shares(stream: np.random.Generator, count: int) -> Floats:
@@ -267,7 +267,7 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         forward = drive.begin + (drive.end - drive.begin) * way
         as_seen = np.where(backward[:, None], np.pi - forward[::-1], forward)
     paths = trace(
-        SeenContour(contours.take(place), base_x, base_y, length, standoff, backward),
+        SweepFrame(contours.take(place), base_x, base_y, length, standoff, backward),
         friction_angle=float(np.arctan(spec.friction)),
         drive_angles=as_seen,
         relative=as_seen.ndim == 1,
@@ -281,33 +281,35 @@ def _judged(paths: Paths, sweeps: int) -> NDArray[Any]:
     fate = paths.reach.reshape(-1, sweeps).max(axis=1)
     with np.errstate(invalid="ignore"):
         clear = paths.is_clear().reshape(-1, sweeps).all(axis=1)
-    reasons = np.array([reach.words for reach in Reach], dtype=object)[fate]
-    return np.where((fate == Reach.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
+    reasons = np.array([one.message for one in Reachability], dtype=object)[fate]
+    return np.where((fate == Reachability.TOUCHES) & ~clear, _NOT_CLEAR, reasons)
 
 
 def _of_sweeps(spec: Specification, tried: _Tried) -> dict[str, NDArray[Any]]:
     """What is known of every sweep, shape (lanes,)."""
     paths = tried.paths
     found = {
-        "base_x": paths.seen.base_x,
-        "base_y": paths.seen.base_y,
+        "base_x": paths.sweep_frame.base_x,
+        "base_y": paths.sweep_frame.base_y,
         "phases": np.array(phases_of(paths), dtype=object),
     }
     for event, columns in sweep_events(paths, tried.units).items():
         found |= {f"{event}_{name}": columns[name] for name in EVENT_COLUMNS}
     found["snap_off_kind"] = paths.snap_off
     if spec.has_thickness:
-        found["largest_strain"] = np.nan_to_num(paths.largest_curvature * paths.seen.standoff / paths.seen.length)
+        found["largest_strain"] = np.nan_to_num(
+            paths.largest_curvature * paths.sweep_frame.standoff / paths.sweep_frame.length
+        )
     return found
 
 
-def _of_samples(tried: _Tried, lane: Index) -> dict[str, NDArray[Any]]:
+def _of_samples(tried: _Tried, index: Index) -> dict[str, NDArray[Any]]:
     """What sweeps on lanes record, shape (*lane.shape, k)."""
     paths, drive = tried.paths, tried.drive
-    first, snap = paths.first_angle[lane][..., None], paths.snap_angle[lane][..., None]
-    as_seen = first + drive * (snap - first) if drive.ndim == 1 else drive[lane]
-    samples = sweep_samples(paths, tried.units, lane)
-    mirrored = paths.seen.mirrored[lane][..., None]
+    first, snap = paths.first_angle[index][..., None], paths.snap_angle[index][..., None]
+    as_seen = first + drive * (snap - first) if drive.ndim == 1 else drive[index]
+    samples = sweep_samples(paths, tried.units, index)
+    mirrored = paths.sweep_frame.mirrored[index][..., None]
     found = {"drive_angle": np.where(mirrored, np.pi - as_seen, as_seen)}
     return found | {f"truth_{name}": samples[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
 

@@ -19,8 +19,8 @@ from tactile_bayes.contours.family import FamilyParameter
 from tactile_bayes.datasets.generation import Records, generate_records
 from tactile_bayes.datasets.netcdf import netcdf_of
 from tactile_bayes.datasets.specification import Specification, read_text
-from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.phases import PHASE_NAMES
+from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
 from tactile_bayes.tasks import write_atomically
 

@@ -1,7 +1,7 @@
-"""What is wrong with a record, or with a result.
+"""Diagnostics of a record and of a result.
 
-`inspection`     a record before anything is inferred from it
-`suspicions`     units and signs of a record
-`record_check`   whether a record fits the model with which its contour was inferred
-`verdicts`       what a result says of its own assumptions
+`inspection`        inspects a record before anything is inferred from it
+`units_and_signs`   checks units and signs of a record
+`record_check`      checks a record against the model with which its contour was inferred
+`verdicts`          judges a result and its assumptions
 """

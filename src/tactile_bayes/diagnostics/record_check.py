@@ -1,4 +1,4 @@
-"""The check of a record: could it have come from the posterior that was inferred from it?"""
+"""The posterior predictive check of a record."""
 
 from __future__ import annotations
 
@@ -23,47 +23,47 @@ DISCREPANCIES = ("runs", "neighbours", "largest", "loaded", "zero")
 _FEWEST_PREDICTIONS = 100
 
 _FEWEST_SAMPLES = 5
-"""Of one kind in a channel, below which nothing is said of them."""
+"""Number of loaded, or of unloaded, samples in a channel below which they are not judged."""
 
 _OUTLYING = 4.0
-"""Where residuals are cut off for all but `largest`, in standard deviations: one outlier is no run."""
+"""Standard deviations at which residuals are clipped for all discrepancies except `largest`: one outlier is no run."""
 
 _WINDOWS = 8
-"""Lengths of a running mean in the loaded part of a sweep: misfit of one shape by another changes sign 3 to 5 times."""
+"""Running-mean widths in the loaded part of a sweep: misfit of one shape by another changes sign 3 to 5 times."""
 
 _LOST = 20.0
-"""Log-probability below the median beyond which a draw is of a walker that is lost, and predicts nothing of use."""
+"""Log-probability below the median beyond which a draw belongs to a lost walker and is left out."""
 
 _TINY = 1e-300
 
 
 class Residuals(NamedTuple):
-    """Readings of one channel less what the posterior expects, over its spread; row 0 is the record itself."""
+    """Standardised residuals of one channel: readings less the predictive median, over the predictive spread."""
 
     values: Floats
-    """Shape (1 + predictions, samples)."""
+    """Shape (1 + predictions, samples); row 0 is the record itself."""
     scale: Floats
-    """What one is in the record's units, shape (samples,)."""
+    """Predictive spread in the record's units, shape (samples,)."""
     loaded: NDArray[np.bool_]
-    """Which samples the posterior expects to carry a load, shape (samples,)."""
+    """True for samples that the posterior expects to carry a load, shape (samples,)."""
     sweeps: tuple[Index, ...]
     """Rows of each sweep, in the order of measurement."""
 
 
 def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dataset:
-    """Posterior predictive check: does the record look like those that the posterior predicts?
+    """Check a record against those that the posterior predicts (posterior predictive check).
 
-    A contour that the family does not hold, a wrong rod, a forgotten tare: the noise that is inferred beside the
-    contour takes in all of them, so that the size of the residuals says nothing. Their pattern does: misfit is smooth
-    in the drive angle, there is none of it in unloaded samples, and noise is neither.
+    The noise that is inferred beside the contour absorbs misfit from any cause, such as a contour outside the family, a
+    wrong rod or a forgotten tare, so that the size of the residuals says nothing. Their pattern does: misfit is smooth
+    in the drive angle and absent from unloaded samples; noise is neither.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`.
     false_alarm : float
-        Probability, at most, that the check fails for a record which the model does describe; all discrepancies and
-        channels together. With fewer than 1/false_alarm − 1 predictions in the tree it is 1/(1 + predictions).
+        Largest probability that the check fails for a record which the model describes, in (0, 1); all discrepancies
+        and channels together. With fewer than 1/false_alarm − 1 predictions in the tree it is 1/(1 + predictions).
 
     Returns
     -------
@@ -75,31 +75,31 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             there are too few samples.
         score
             Discrepancy above its median over predictions, over the same of their 95 % quantile: 1 is unusual, some
-            tens are a misfit that can be seen.
+            tens are a visible misfit.
         worst_sweep, worst_from, worst_to (channel)
             Sweep and drive angles [rad] of the stretch whose mean residual is largest, in standard errors.
         worst_residual (channel)
             That mean, in the record's units.
         neighbour_noise (channel)
-            Standard deviation of white noise on the residuals from the differences of neighbours, in the record's
-            units: what the noise is if all that is smooth is misfit.
+            Standard deviation of white noise, estimated from second differences of neighbouring residuals, in the
+            record's units: the noise if everything smooth is misfit.
         overall_p_value
             Share of records of which the largest score is at least that of the real one.
 
-        Attributes: `passed` (0 or 1), false_alarm (as it is), predictions.
+        Attributes: `passed` (0 or 1), `false_alarm` (the probability in effect), `predictions` (their number).
 
     Raises
     ------
     InferenceError
-        If the tree holds fewer than 100 predictions.
+        If the tree is not a result of `infer_contour`, or holds fewer than 100 predictions.
     ParameterError
         If `false_alarm` is not in (0, 1).
 
     Notes
     -----
     Residuals are readings less the median of the predicted ones, over half the width of their central 95 % interval
-    (over 1.96), of the real record and of all predicted ones alike; so drift, correlated noise, outliers and steps of
-    the reading need no treatment of their own. Draws of walkers that are lost are left out. In each channel:
+    (over 1.96), for the real record and for all predicted ones alike; so drift, correlated noise, outliers and
+    resolution need no treatment of their own. Draws of lost walkers are left out. In each channel:
 
     - runs: mean square of the running mean over an eighth of the loaded part of a sweep, over that of the differences
       of neighbours;
@@ -108,10 +108,11 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     - loaded: mean square of loaded samples over that of unloaded ones;
     - zero: mean of the unloaded samples over their root mean square.
 
-    All but `largest` cut residuals off at 4. None depends on the size of the noise. The p-values are those of Gelman,
-    Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre. The posterior has seen the record,
-    so they are conservative: of a true model they are seldom small, the less the more parameters there are for a
-    sample. A record that passes is not proven right: misfit below the noise over √(samples in a stretch) is not seen.
+    All except `largest` clip residuals at 4. None depends on the size of the noise. The p-values are those of Gelman,
+    Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre. The posterior is inferred from the
+    same record, so they are conservative: under a true model they are seldom small, and the more seldom the more
+    parameters there are per sample. A record that passes is not proven right: misfit below the noise over √(samples in
+    a stretch) remains undetected.
 
     Examples
     --------
@@ -171,7 +172,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
 
 
 def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
-    """Residuals of the record and of every prediction, by channel."""
+    """Return the residuals of the record and of every prediction, by channel."""
     refuse_no_contour(posterior, "posterior_predictive", "observed_data", "constant_data", "sample_stats")
     predicted, observed = posterior["posterior_predictive"].to_dataset(), posterior["observed_data"].to_dataset()
     sweep = posterior["constant_data"].to_dataset().sweep.values
@@ -193,7 +194,7 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
 
 
 def _loaded(posterior: xr.DataTree) -> NDArray[np.bool_]:
-    """Samples between first contact and snap-off, as the median of the draws has them."""
+    """Return True for samples between first contact and snap-off, at the posterior medians of these events."""
     record = record_of(posterior)
     events = posterior["events"].to_dataset().median(("chain", "draw"))
     strokes = RecordLikelihood(record, LoadCell.from_record(record) or LoadCell()).strokes
@@ -206,7 +207,7 @@ def _loaded(posterior: xr.DataTree) -> NDArray[np.bool_]:
 
 
 def _discrepancies(residuals: Residuals) -> Floats:
-    """In the order of `DISCREPANCIES`, of every row, shape (5, rows); NaN where there are too few samples."""
+    """Return the `DISCREPANCIES` of every row, shape (5, rows); NaN where there are too few samples."""
     cut_off = np.clip(residuals.values, -_OUTLYING, _OUTLYING)
     squares, loaded = cut_off**2, residuals.loaded
     out = np.full((len(DISCREPANCIES), len(cut_off)), np.nan)
@@ -230,7 +231,7 @@ def _discrepancies(residuals: Residuals) -> Floats:
 
 
 def _ratio(above: Floats, below: Floats) -> Floats:
-    """Logarithm of a ratio, whose distribution over records has no long tail."""
+    """Return the logarithm of a ratio, whose distribution over records has no long tail."""
     return np.asarray(np.log(np.maximum(above, _TINY)) - np.log(np.maximum(below, _TINY)))
 
 
@@ -246,20 +247,20 @@ def _running_mean(values: Floats) -> Floats:
 
 
 def _p_values(discrepancies: Floats) -> Floats:
-    """Share of rows at least as large as the first, over the last axis; NaN where that is none."""
+    """Return the share of entries at least as large as the first, over the last axis; NaN where the first is NaN."""
     shares = np.mean(discrepancies >= discrepancies[..., :1], axis=-1)
     return np.where(np.isnan(discrepancies[..., 0]), np.nan, shares)
 
 
 def _scores(discrepancies: Floats) -> Floats:
-    """Discrepancies on a scale that they share, on which the median over predictions is 0, and the 95 % quantile 1."""
+    """Return discrepancies scaled so that the median over predictions is 0 and their 95 % quantile 1."""
     middle, high = np.quantile(discrepancies[..., 1:], [0.5, 0.95], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray((discrepancies - middle[..., None]) / (high - middle)[..., None])
 
 
 def _worst_stretch(residuals: Residuals) -> Index:
-    """Samples of the real record, neighbours in the loaded part of a sweep, whose mean is furthest from zero."""
+    """Return the stretch of loaded samples of the real record whose mean residual is furthest from zero."""
     parts = [rows[residuals.loaded[rows]] for rows in residuals.sweeps]
     parts = [rows for rows in parts if rows.size >= _FEWEST_SAMPLES] or list(residuals.sweeps)
     real = np.clip(residuals.values[:1], -_OUTLYING, _OUTLYING)
@@ -275,5 +276,5 @@ def _worst_stretch(residuals: Residuals) -> Index:
 
 
 def _neighbour_noise(residuals: Residuals) -> float:
-    """Of the real record, from the median size of second differences, so that jumps do not count."""
+    """Return the real record's white noise, from the median size of second differences, so that jumps do not count."""
     return rough_noise(residuals.values[0] * residuals.scale)

@@ -1,4 +1,4 @@
-"""Verdicts: what is wrong with a result, in words, and what to do."""
+"""Verdicts: messages on what is wrong with a result, and what to do."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import Residuals, check_record, residuals_of
-from tactile_bayes.diagnostics.suspicions import suspicions
+from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import DriftWarning, InferenceError
 from tactile_bayes.inference.misfit import CHECK_RIG, is_inferred, what_to_try
 from tactile_bayes.inference.result import posterior_draws, record_of
@@ -27,19 +27,20 @@ __all__ = ["doubtful_sides", "verdicts"]
 _NOISES = ("noise_scale", "moment_noise", "force_noise")
 
 _FACTOR = 2.0
-"""Between the noise that is stated and the one that is found: less is what data sheets are like."""
+"""Ratio of inferred to stated noise beyond which it is reported: data sheets are no more accurate."""
 
 _OFF_ZERO = 5.0
-"""Standard errors by which a zero must be off to be told."""
+"""Standard errors by which a zero must be off to be reported."""
 
 _CONTRADICTION = 1e-4
-"""Probability of the misfit of single samples below which it is told."""
+"""Probability of the misfit of single samples below which it is reported."""
 
 _FEWEST_PRIOR_DRAWS = 500
 
 _BEYOND = 0.5
-"""Of the way from the 5 % quantile of a prior's draws to the last, how much further the posterior must be to be told:
-of a normal prior that is some four standard deviations, of one that is largest at its end nothing is beyond it."""
+"""Distance of the posterior median beyond the prior's last draw from which it is reported, over the distance from the
+5 % quantile of the prior's draws to the last: some four standard deviations of a normal prior; a prior that is largest
+at its end has nothing beyond it."""
 
 _PRIOR_DOMINATED = 0.7
 """Width of the posterior over that of the prior above which the record is said to tell little."""
@@ -54,7 +55,7 @@ _CAUSES = {
 
 
 def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tuple[str, ...]:
-    """What is wrong with a result of `infer_contour`, in sentences, the most serious first, or that all is well.
+    """Judge a result of `infer_contour`: what is wrong, the most serious first, or that all is well.
 
     Parameters
     ----------
@@ -66,11 +67,16 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     Returns
     -------
     tuple of str
-        At least one. Told are: loads that such a rod cannot have (`suspicions`); a zero that is off, or that moved;
-        a record that does not look like what the posterior predicts (`check_record`); ensembles that have not
-        converged; noise twice as large as stated, or half; loads of a sample that contradict one another; nuisance
-        parameters that are beyond what the prior thought possible. Last, and not against the result, are parameters of
-        which the record tells little.
+        One or more sentences. They report: loads that such a rod cannot have (`check_units_and_signs`); a zero that is
+        off, or that moved; a record that does not look like what the posterior predicts (`check_record`); ensembles
+        that have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
+        nuisance parameters that are nearly impossible under their prior. The last, which is not against the result,
+        names parameters of which the record tells little.
+
+    Raises
+    ------
+    InferenceError
+        If the tree is not a result of `infer_contour` with its record and predictions.
 
     Examples
     --------
@@ -86,14 +92,14 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     record = record_of(posterior)
     try:
         check = check_record(posterior)
-    except InferenceError:  # too few draws, which the message tells
+    except InferenceError:  # there are too few draws, as the posterior's message says
         check = None
-    residuals = residuals_of(posterior)  # after the check has let its own go: of a long record they are large
+    residuals = residuals_of(posterior)  # after the check has released its own: those of a long record are large
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DriftWarning)  # which is told in words
+        warnings.simplefilter("ignore", DriftWarning)  # a message reports it
         unloaded = zero_load(record)
     against = [
-        *suspicions(record),
+        *check_units_and_signs(record),
         *doubtful_sides(posterior.attrs),
         *_off_zero(record, unloaded, residuals),
         *_moved_zero(posterior, record, unloaded),
@@ -105,7 +111,7 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     noisier = 1.0 if check is None else _neighbours_over_stated(record, check)
     beyond = _beyond_prior(posterior)
     against += [*_noise(posterior, noisier), *_contradictions(posterior, record, contacts, noisier)]
-    against += _told_beyond(beyond)
+    against += _beyond_message(beyond)
     if not against:
         p_value = math.nan if check is None else float(check.overall_p_value)
         against.append(
@@ -115,13 +121,13 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
 
 
 def _inferred(posterior: xr.DataTree) -> list[str]:
-    """Nuisance parameters of a run."""
+    """Return the nuisance parameters of a run."""
     names: list[str] = json.loads(posterior.attrs.get("nuisances", "[]"))
     return names
 
 
 def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
-    """What the attributes of a posterior, or of contacts, say of sweeps that may have touched from either side."""
+    """Return a message on sweeps whose side of contact is in doubt, from attributes of a posterior or of contacts."""
     if "doubtful_sides" not in attrs:
         return []
     sides = json.loads(attrs["doubtful_sides"])
@@ -135,7 +141,7 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
 
 
 def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residuals]) -> list[str]:
-    """Channels that read something without load which the posterior does not expect."""
+    """Report channels whose unloaded readings differ from what the posterior expects."""
     off = []
     for name, of_channel in residuals.items():
         unloaded = found.unloaded.values & ~of_channel.loaded
@@ -156,7 +162,7 @@ def _off_zero(record: xr.Dataset, found: xr.Dataset, residuals: dict[str, Residu
 
 
 def _moved_zero(posterior: xr.DataTree, record: xr.Dataset, found: xr.Dataset) -> list[str]:
-    """Channels whose zero wandered, where nothing was said of that, nor asked."""
+    """Report channels whose zero moved although no drift is stated or inferred."""
     cell = LoadCell.from_record(record)
     inferred = _inferred(posterior)
     level = found.attrs["false_alarm"] / max(int(np.isfinite(found.same_bias_p_value).sum()), 1)
@@ -193,9 +199,9 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
 
 
 def _neighbours_over_stated(record: xr.Dataset, check: xr.Dataset) -> float:
-    """How much neighbouring samples scatter over what the load cell states, the median of the channels; 1 if unknown.
+    """Return the scatter of neighbouring samples over the stated noise, the median of the channels; 1 if unknown.
 
-    Only so much of the misfit can be noise.
+    No more of the misfit than that can be noise.
     """
     cell = LoadCell.from_record(record) or LoadCell()
     stated = np.hypot(list(cell.standard_deviations.values()), cell.resolution / math.sqrt(12.0))
@@ -224,7 +230,7 @@ def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
 def _contradictions(
     posterior: xr.DataTree, record: xr.Dataset, contacts: xr.Dataset | None, noisier: float
 ) -> list[str]:
-    """Of normal noise: outliers make the misfits larger than the probability knows of."""
+    """Report loads of single samples that contradict one another, under normal noise; outliers enlarge misfits."""
     cell = LoadCell.from_record(record) or LoadCell()
     if contacts is None or math.isfinite(cell.degrees_of_freedom):
         return []
@@ -239,7 +245,7 @@ def _contradictions(
 
 
 def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
-    """What friction would do to the force along the rod."""
+    """Return a sentence on the force along the rod where friction explains it."""
     if not axial_score < -AXIAL_ALARM:
         return ""
     words = f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
@@ -249,7 +255,7 @@ def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
 
 
 def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
-    """Parameters whose prior has next to nothing where the posterior is, with that in words."""
+    """Return parameters whose posterior lies where the prior has almost no mass, each with its values as text."""
     draws, prior = posterior_draws(posterior), posterior["prior"].to_dataset()
     said = {}
     for name in draws.data_vars:
@@ -263,7 +269,7 @@ def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
     return said
 
 
-def _told_beyond(beyond: Mapping[str, str]) -> list[str]:
+def _beyond_message(beyond: Mapping[str, str]) -> list[str]:
     if not beyond:
         return []
     return [
@@ -284,7 +290,7 @@ def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[str]
 
 
 def _width(values: Floats) -> float:
-    """Two standard deviations, but of the middle."""
+    """Return the width of the central 68 % interval, two standard deviations of a normal distribution."""
     low, high = np.quantile(values, [0.16, 0.84])
     return float(high - low)
 

@@ -20,14 +20,14 @@ def events_of(
     """
     count = contours.shape[0]
     paths = likelihood.paths(contours, rig, exact=exact)
-    lanes = np.arange(paths.seen.lanes)
-    backward = paths.seen.mirrored
+    lanes = np.arange(paths.sweep_frame.size)
+    backward = paths.sweep_frame.mirrored
     out = {}
     for label, angle, parameter in (
         ("first", paths.first_angle, paths.first_parameter),
         ("snap_off", paths.snap_angle, paths.snap_parameter),
     ):
-        locus = paths.seen.contour.take(lanes).locate(np.where(backward, -parameter, parameter))
+        locus = paths.sweep_frame.contour.take(lanes).locate(np.where(backward, -parameter, parameter))
         out[f"{label}_drive_angle"] = np.where(backward, np.pi - angle, angle)
         out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
     return {name: values.reshape(-1, count).T for name, values in out.items()}

@@ -140,94 +140,121 @@ def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline
 
 
 def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
-    """Where searches end that begin at Step 2's contacts and at draws from the prior, the likeliest first."""
-    size = len(model.located)
-    located = Logarithms(model.coordinates.positive[:size])
-    deviation, present = model.deviation, model.present
-    measured = model.likelihood.measured[:, present] / deviation[present]
-    brackets = event_brackets(model)
-    candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
-    for name, zero in _zeros(model).items():
-        candidates[:, model.names.index(name)] = zero
+    """Return where searches end that begin at Step 2's contacts and at draws from the prior, the likeliest first."""
+    search = _Search(model, rng, deadline)
+    for found in optima(search.residuals, search.starts(), *search.limits):
+        yield search.judged(search.gone_on(found))
 
-    drawn = located.of(candidates[:, :size])
-    percentiles = np.quantile(drawn, [0.16, 0.84], axis=0)
-    middle = percentiles.mean(axis=0)
-    rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
-    stated = np.array([float(model.priors[name].std()) for name in model.located])
-    spread = np.where(np.isfinite(stated) & ~located.positive, stated, rough)
 
-    least = np.where(model.may_vanish, -model.high, model.low)[:size]
+class _Search:
+    """Least squares over the contour and the rig, in logarithms of sizes; the noise follows from what is left."""
 
-    def residuals(places: Floats) -> Floats:
-        # A prior that ends somewhere is no wall: the way to where it does not may lead through there.
-        points = located.parameters(places)[0]
+    def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
+        self.model = model
+        self.deadline = deadline
+        size = len(model.located)
+        self.located = Logarithms(model.coordinates.positive[:size])
+        self.deviation = model.deviation[model.present]
+        self.measured = model.likelihood.measured[:, model.present] / self.deviation
+        self.brackets = event_brackets(model)
+        self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
+        for name, zero in _zeros(model).items():
+            self.candidates[:, model.names.index(name)] = zero
+        self.drawn = self.located.of(self.candidates[:, :size])
+        percentiles = np.quantile(self.drawn, [0.16, 0.84], axis=0)
+        rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
+        stated = np.array([float(model.priors[name].std()) for name in model.located])
+        self.middle = percentiles.mean(axis=0)
+        self.spread = np.where(np.isfinite(stated) & ~self.located.positive, stated, rough)
+        walked = model.walked_ends
+        self.limits = self.middle, self.spread, walked.low[:size], walked.high[:size], deadline
+
+    def points(self, places: Floats) -> Floats:
+        """Parameters of contour and rig, shape (n, parameters), from where they are sought."""
+        return self.located.parameters(places)[0]
+
+    def residuals(self, places: Floats) -> Floats:
+        """Loads and events that are missed, in standard deviations, shape (n, loads + events).
+
+        A prior that ends somewhere is no wall: the way to where it does not may lead through there.
+        """
+        model, points, size = self.model, self.points(places), self.middle.size
+        least = np.where(model.may_vanish, -model.high, model.low)[:size]
         allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
-        allowed &= (np.abs(places - middle) < _FARTHEST * spread)[:, located.positive].all(axis=1)
-        out = np.tile(10.0 * (np.abs(measured) + 1.0), (len(points), 1, 1))
-        late = np.full((len(points), brackets.low.size), _FAR_OFF)
+        far = np.abs(places - self.middle) >= _FARTHEST * self.spread
+        allowed &= ~far[:, self.located.positive].any(axis=1)
+        out = np.tile(10.0 * (np.abs(self.measured) + 1.0), (len(points), 1, 1))
+        late = np.full((len(points), self.brackets.low.size), _FAR_OFF)
         if allowed.any():
             loads, events = _continued(model, points[allowed])
             expected = model.likelihood.load_cell.expected(loads)
             # Where loads are large, to have none would often be nearer than to have others: it leads nowhere.
-            happens = ~np.isnan(brackets.at(events)).any(axis=1)
-            out[np.flatnonzero(allowed)[happens]] = measured - expected[happens][..., present] / deviation[present]
-            late[allowed] = brackets.missed(events)
+            happens = ~np.isnan(self.brackets.at(events)).any(axis=1)
+            missed = self.measured - expected[happens][..., model.present] / self.deviation
+            out[np.flatnonzero(allowed)[happens]] = missed
+            late[allowed] = self.brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
-    def events_missed(points: Floats) -> Floats:
-        return residuals(points)[:, measured.size :]
+    def events_missed(self, places: Floats) -> Floats:
+        """The events' part of the residuals."""
+        return self.residuals(places)[:, self.measured.size :]
 
-    def starts() -> Iterator[Floats]:
-        by_contacts = contact_fit(model)
+    def starts(self) -> Iterator[Floats]:
+        """Places where searches begin; at draws from the prior, moved to where events are as they are to be."""
+        by_contacts = contact_fit(self.model)
         if by_contacts is not None:
-            yield located.of(np.append(by_contacts, np.median(candidates[:, by_contacts.size : size], axis=0)))
-        parts = [drawn[block] for block in blocks(len(drawn), measured.size)]
-        costs = np.concatenate([np.sum(np.minimum(np.abs(residuals(part)), 30.0), axis=1) for part in parts])
-        for place in drawn[np.argsort(costs)[:_CANDIDATES]]:
-            if brackets.low.size and not deadline.has_passed:
-                yield descend(events_missed, place, middle, spread, deadline=deadline).point
+            rig = np.median(self.candidates[:, by_contacts.size : self.middle.size], axis=0)
+            yield self.located.of(np.append(by_contacts, rig))
+        parts = [self.drawn[block] for block in blocks(len(self.drawn), self.measured.size)]
+        costs = np.concatenate([np.sum(np.minimum(np.abs(self.residuals(part)), 30.0), axis=1) for part in parts])
+        for place in self.drawn[np.argsort(costs)[:_CANDIDATES]]:
+            if self.brackets.low.size and not self.deadline.has_passed:
+                yield descend(self.events_missed, place, self.middle, self.spread, deadline=self.deadline).point
             else:
                 yield place
 
-    ends, walked = model.ends, model.walked_ends
-    low, high = ends.low[:size], ends.high[:size]
-    about = middle, spread, walked.low[:size], walked.high[:size], deadline
-    possible = candidates[:, size:]
+    def gone_on(self, found: Optimum) -> Optimum:
+        """An optimum, or, as long as it does not explain the record, what a search from Step 2's contacts leads to.
 
-    def seen_again(found: Optimum) -> Optimum | None:
-        """From where Step 2 sees the contour: the rig is often found long before a contour that is far away."""
-        point = located.parameters(found.point[None])[0][0]
-        point = np.where(model.may_vanish[:size], np.maximum(point, 0.0), point)
-        by_contacts = contact_fit(model, dict(zip(model.located, point.tolist(), strict=True)))
-        if by_contacts is None:
-            return None
-        place = located.of(np.append(by_contacts, point[by_contacts.size :]))
-        return next(optima(residuals, [place], *about))
-
-    for found in optima(residuals, starts(), *about):
-        while not found.fits and not deadline.has_passed:
-            again = seen_again(found)
-            if again is None or again.cost > _CLEARLY * found.cost:
+        The rig is often found long before a contour that is far away; with that rig Step 2 says where the contour is.
+        """
+        while not found.fits and not self.deadline.has_passed:
+            point = self.points(found.point[None])[0]
+            point = np.where(self.model.may_vanish[: point.size], np.maximum(point, 0.0), point)
+            by_contacts = contact_fit(self.model, dict(zip(self.model.located, point.tolist(), strict=True)))
+            if by_contacts is None:
+                break
+            place = self.located.of(np.append(by_contacts, point[by_contacts.size :]))
+            again = next(optima(self.residuals, [place], *self.limits))
+            if again.cost > _CLEARLY * found.cost:
                 break
             found = again
-        point = located.parameters(found.point[None])[0][0]
-        noise = fitted_noise(model, found.residuals[: measured.size].reshape(measured.shape))
+        return found
+
+    def judged(self, found: Optimum) -> ContourOptimum:
+        """All parameters at an optimum, how uncertain they are, and whether the record wants others."""
+        model, size = self.model, self.middle.size
+        point = self.points(found.point[None])[0]
+        noise = fitted_noise(model, found.residuals[: self.measured.size].reshape(self.measured.shape))
         if not np.isfinite(model.log_prior(np.append(point, noise)[None]))[0]:
+            possible = self.candidates[:, size:]
             noise = possible[np.argmin(np.sum(np.log(possible / noise) ** 2, axis=1))]
-        narrow = np.minimum(0.5 * spread / np.sqrt(np.diag(found.covariance)), 1.0)
-        covariance = np.zeros((len(model.names), len(model.names)))
+        narrow = np.minimum(0.5 * self.spread / np.sqrt(np.diag(found.covariance)), 1.0)
+        covariance = np.diag(np.full(len(model.names), 0.5 / self.measured.size))
         covariance[:size, :size] = found.covariance * np.outer(narrow, narrow)
-        covariance[range(size, len(model.names)), range(size, len(model.names))] = 0.5 / measured.size
-        beyond = ""
+        return ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, self._beyond(found))
+
+    def _beyond(self, found: Optimum) -> str:
+        """What the record wants and the priors do not allow, in words, where that explains it far better."""
         explained = found.cost - found.excess < _NEARLY * found.residuals.size
-        if found.beyond is not None and found.excess > _FAR_BETTER and explained:
-            wanted = located.parameters(found.beyond[None])[0][0]
-            off = np.flatnonzero((wanted <= low) | (wanted >= high))
-            beyond = ", ".join(
-                f"{model.located[i]} = {wanted[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
-            )
-        yield ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, beyond)
+        if found.beyond is None or found.excess <= _FAR_BETTER or not explained:
+            return ""
+        wanted, ends = self.points(found.beyond[None])[0], self.model.ends
+        low, high = ends.low[: wanted.size], ends.high[: wanted.size]
+        off = np.flatnonzero((wanted <= low) | (wanted >= high))
+        return ", ".join(
+            f"{self.model.located[i]} = {wanted[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
+        )
 
 
 def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:

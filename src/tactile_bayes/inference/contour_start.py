@@ -15,19 +15,24 @@ from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optima_of, optimum_of
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
+    ANYTHING,
     Coordinates,
-    Logarithms,
+    Ends,
     Mixture,
     Proposal,
+    Proposing,
     SamplerSettings,
     approximate,
     in_coordinates,
     learned,
     scatter_walkers,
 )
+from tactile_bayes.inference.flank_coordinates import FlankCoordinates
+from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.start import Cloud, gather
+from tactile_bayes.numerics.differences import central_slopes
 
 __all__ = ["Walk", "walk_of"]
 
@@ -62,6 +67,13 @@ _SAME = 3.0
 
 _RARE = 9.0
 """Logarithm of how much less mass a mode may have than another to be left out: one draw in ten thousand."""
+
+_X_C = 3
+"""Column of x_c among the parameters of a power law."""
+
+_RARELY, _NEARBY = 0.01, 0.1
+"""Share of draws, and of the usual distance of the vertex from the pivot: where more of them are nearer, some vertices
+may lie on its other side, which the coordinates of a flank do not have."""
 
 _POOR = 2.0
 """Mean square of what is left of a record, over its own roughness, from which on a search is worth its time."""
@@ -138,7 +150,10 @@ class _Mode(NamedTuple):
     optimum: ContourOptimum
     cloud: Cloud
     proposal: Proposal
-    """In the model's coordinates, like the cloud."""
+    coordinates: Proposing
+    """Of cloud and proposal."""
+    usual: _Mode | None = None
+    """The same in the model's own coordinates, if those are others."""
 
 
 def _scattered(
@@ -150,7 +165,9 @@ def _scattered(
 ) -> Walk:
     """Walkers scattered twice as wide as a normal approximation of each mode, which they are then proposed from."""
     modes = _modes(model, rng, deadline)
-    walked = model.coordinates
+    if len({mode.coordinates.digest for mode in modes}) > 1:
+        modes = [mode.usual or mode for mode in modes]
+    walked = modes[0].coordinates
     proposal = Mixture(tuple(mode.proposal for mode in modes))
 
     def floor() -> float:
@@ -177,7 +194,7 @@ def _scattered(
             "signs, drive angle, rod and base right? tactile-bayes inspect may tell. "
             + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
         ) from error
-    coordinates: Coordinates = walked.with_proposal(proposal)
+    coordinates = walked.with_proposal(proposal)
     if proposal.efficiency < _EFFICIENT and not deadline.has_passed:
         size = len(model.names)
         scouts, scale = start.reshape(-1, size)[: _SCOUTS * size], _prior_scale(model, walked, rng)
@@ -186,10 +203,10 @@ def _scattered(
     return Walk(coordinates.of(start), coordinates, log_evidence, modes[0].optimum.beyond)
 
 
-def _prior_scale(model: ContourModel, walked: Logarithms, rng: np.random.Generator) -> Floats:
-    """Half the distance in which two thirds of the prior lie, of each coordinate."""
+def _prior_scale(model: ContourModel, walked: Proposing, rng: np.random.Generator) -> Floats:
+    """Half the distance in which two thirds of the prior lie, of each coordinate where it has one."""
     draws = np.stack([model.priors[name].rvs(_OF_SCALE, random_state=rng) for name in model.names], axis=1)
-    low, high = np.quantile(walked.of(draws), [0.16, 0.84], axis=0)
+    low, high = np.nanquantile(walked.of(draws), [0.16, 0.84], axis=0)
     return np.asarray(0.5 * (high - low))
 
 
@@ -228,12 +245,42 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
 
 def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) -> bool:
     """Whether an optimum belongs to a mode that was found."""
-    place = model.coordinates.of(optimum.point[None])
-    return any(np.linalg.norm(mode.proposal.steps(place)) < _SAME * np.sqrt(place.size) for mode in found)
+    point = optimum.point[None]
+    far = _SAME * np.sqrt(point.size)
+    return any(np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point))) < far for mode in found)
 
 
 def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator, deadline: Deadline) -> _Mode:
-    target = in_coordinates(model.log_probability, model.coordinates)
-    ends = model.walked_ends
-    cloud = gather(target, model.coordinates.of(optimum.point), optimum.covariance, rng, deadline, ends)
-    return _Mode(optimum, cloud, approximate(target, cloud.centre, cloud.narrow_covariance, rng, deadline, ends))
+    """Around an optimum, in the coordinates in which the posterior is nearer to a normal distribution."""
+    usual = _mode_in(model, optimum, model.coordinates, optimum.covariance, rng, deadline, model.walked_ends)
+    if usual.proposal.efficiency > _EFFICIENT or model.family.name != "power-law" or deadline.has_passed:
+        return usual
+    pivot = float(np.mean([x for x, _ in bases_of(model.measured)]))
+    side = float(np.sign(pivot - optimum.point[_X_C]))
+    flank = FlankCoordinates(model.coordinates, pivot, side)
+    place = model.coordinates.of(optimum.point[None])[0]
+    slopes = central_slopes(lambda places: flank.of(model.coordinates.parameters(places)[0]), place, 1e-6)
+    covariance = slopes @ optimum.covariance @ slopes.T
+    if not np.isfinite(covariance).all():  # the vertex is above the pivot
+        return usual
+    mode = _mode_in(model, optimum, flank, covariance, rng, deadline)
+    distances = np.abs(flank.parameters(mode.proposal.draw(rng, _OF_SCALE)[0])[0][:, _X_C] - pivot)
+    reaches_vertex = np.quantile(distances, _RARELY) < _NEARBY * np.median(distances)
+    return (
+        usual if reaches_vertex or mode.proposal.efficiency < usual.proposal.efficiency else mode._replace(usual=usual)
+    )
+
+
+def _mode_in(
+    model: ContourModel,
+    optimum: ContourOptimum,
+    coordinates: Proposing,
+    covariance: Floats,
+    rng: np.random.Generator,
+    deadline: Deadline,
+    ends: Ends = ANYTHING,
+) -> _Mode:
+    target = in_coordinates(model.log_probability, coordinates)
+    cloud = gather(target, coordinates.of(optimum.point[None])[0], covariance, rng, deadline, ends)
+    proposal = approximate(target, cloud.centre, cloud.narrow_covariance, rng, deadline, ends)
+    return _Mode(optimum, cloud, proposal, coordinates)

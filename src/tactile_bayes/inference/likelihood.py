@@ -14,18 +14,18 @@ from scipy.special import logsumexp
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.encoder import EncoderErrors
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.shapes import shapes_of
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.sweeps import Answers, Lanes, Shapes, Strokes
+    from tactile_bayes.mechanics.sweeps import Segments, Shapes, Solutions, Sweeps
 
 __all__ = ["RecordLikelihood", "Rig", "bases_of", "without_errors"]
 
@@ -127,7 +127,7 @@ class RecordLikelihood:
         self._pivots = np.array([stroke.pivot for stroke in self.strokes])
         self._signs = np.array([-1.0 if stroke.backward else 1.0 for stroke in self.strokes])
         longest = max(stroke.samples.size for stroke in self.strokes)
-        self._strokes: dict[bytes, Strokes] = {}
+        self._strokes: dict[bytes, Segments] = {}
         self._angles = np.full((len(self.strokes), longest), np.nan)
         for row, stroke in zip(self._angles, self.strokes, strict=True):
             seen = angle[stroke.samples]
@@ -163,12 +163,12 @@ class RecordLikelihood:
             drive_angles=drive_angles,
         )
 
-    def _seen(self, contours: Contour, rig: Rig) -> SeenContour:
+    def _seen(self, contours: Contour, rig: Rig) -> SweepFrame:
         (count,), strokes = contours.shape, len(self.strokes)
         base_x, base_y = self._bases(rig).reshape(-1, 2).T
         backward = np.repeat(self._signs < 0.0, count)
         every = contours.take(np.tile(np.arange(count), strokes))
-        return SeenContour(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
+        return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
 
     def _bases(self, rig: Rig) -> Floats:
         """Pivots, shape (strokes, n, 2)."""
@@ -256,12 +256,12 @@ class RecordLikelihood:
             predicted[..., 1], predicted[..., 2] = turned(predicted[..., 1], predicted[..., 2], turn)
         return predicted, self._usable(found), self._events(found, rig)
 
-    def _answers(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Answers:
+    def _answers(self, contours: Contour, rig: Rig, errors: Floats | None = None) -> Solutions:
         """Of the forward model, lane k·n + i for contour i in stroke k; of no samples if no errors are given."""
-        from tactile_bayes.mechanics.sweeps import answered  # numba takes a second to load
+        from tactile_bayes.mechanics.sweeps import solve_sweeps  # numba takes a second to load
 
         errors = np.empty(0) if errors is None else errors
-        return answered(
+        return solve_sweeps(
             self._shapes(contours, rig),
             self._lanes(rig),
             self._strokes_with(errors),
@@ -270,13 +270,13 @@ class RecordLikelihood:
             asks_clearance=not self.is_always_clear,
         )
 
-    def _usable(self, found: Answers) -> NDArray[np.bool_]:
-        usable = found.reach == Reach.TOUCHES
+    def _usable(self, found: Solutions) -> NDArray[np.bool_]:
+        usable = found.reach == Reachability.TOUCHES
         if not self.is_always_clear:
             usable &= found.snap_angle > found.clear_angle
         return np.asarray(usable.reshape(len(self.strokes), -1).all(axis=0))
 
-    def _events(self, found: Answers, rig: Rig) -> Floats:
+    def _events(self, found: Solutions, rig: Rig) -> Floats:
         """First contact and snap-off, as read and as seen in forward sweeps, shape (n, strokes, 2)."""
         events = np.stack([found.first_angle, found.snap_angle], axis=-1).reshape(len(self.strokes), -1, 2)
         return np.asarray(events.swapaxes(0, 1) + (self._signs * self._misread(rig))[..., None])
@@ -287,14 +287,14 @@ class RecordLikelihood:
         low, high = (end.reshape(len(self.strokes), -1) for end in self._seen(contours, rig).own_domain())
         return shapes_of(contours, low.min(axis=0), high.max(axis=0))
 
-    def _lanes(self, rig: Rig) -> Lanes:
-        from tactile_bayes.mechanics.sweeps import Lanes
+    def _lanes(self, rig: Rig) -> Sweeps:
+        from tactile_bayes.mechanics.sweeps import Sweeps
 
         count, strokes = rig.friction.size, len(self.strokes)
         bases = self._bases(rig)
-        return Lanes(
+        return Sweeps(
             contour=np.tile(np.arange(count), strokes),
-            stroke=np.repeat(np.arange(strokes), count),
+            segment=np.repeat(np.arange(strokes), count),
             base_x=bases[..., 0].ravel(),
             base_y=bases[..., 1].ravel(),
             length=np.full(strokes * count, self.rod.length),
@@ -314,9 +314,9 @@ class RecordLikelihood:
             shifts[:, : rig.base_shifts.shape[1]] = rig.base_shifts
         return Rig._make((*(np.broadcast_to(value, (count,)) for value in rig[:-1]), shifts))
 
-    def _strokes_with(self, errors: Floats) -> Strokes:
+    def _strokes_with(self, errors: Floats) -> Segments:
         """Every sample once for each error, one error after the other."""
-        from tactile_bayes.mechanics.sweeps import Strokes
+        from tactile_bayes.mechanics.sweeps import Segments
 
         key = errors.tobytes()
         if key not in self._strokes:
@@ -329,7 +329,7 @@ class RecordLikelihood:
                 rows = stroke.samples + len(self.measured) * np.arange(errors.size)[:, None]
                 samples.append(rows.ravel()[order])
             first = np.cumsum([0, *(part.size for part in samples)])
-            self._strokes[key] = Strokes(first, np.concatenate(samples), np.concatenate(angles))
+            self._strokes[key] = Segments(first, np.concatenate(samples), np.concatenate(angles))
         return self._strokes[key]
 
     def log_likelihood(

@@ -3,17 +3,17 @@
 A force f acts at the contact, and ψ is the rod's slope over the direction across it. With ψ1 = ψ at the contact,
 m = (1 − sin ψ1)/2, c = cos ψ1 = 2 √(m (1 − m)) and the Jacobi amplitude χ = am(√f (s1 − s) | m) along the rod,
 
-    tan((ψ − ψ1)/2) = c w / (1 − 2 m w),    w = sin²(χ/2)        how far the rod has turned since the contact
+    tan((ψ − ψ1)/2) = c w / (1 − 2 m w),    w = sin²(χ/2)        turn of the rod since the contact
     √f (s1 − s)     = F(χ | m)
     C = ∫ 2 c² w² Δ⁻³ dχ                                         √f times arc minus chord along the contact's direction
     S = ∫ 2 c w (1 − 2 m w) Δ⁻³ dχ,         Δ² = 1 − m sin²χ     √f times the chord across it
 
 C and S have closed forms: with D = (F − E)/m, P = F − sin χ/Δ and Q = 2 w sin χ/Δ − D they are 2 m (P − (1 − 2 m) Q)
-and c (P + 2 m Q). Counting from the contact keeps digits: turn, C and S vanish with the load without cancellation.
-Legendre's θ at the pivot is linked to χ by tan χ = cot θ / √(1 − m).
+and c (P + 2 m Q). Arc length is counted from the contact, so that turn, C and S vanish with the load without
+cancellation. Legendre's θ at the pivot and χ are related by tan χ = cot θ / √(1 − m).
 
 F and D are computed by duplication in Carlson's symmetric forms (Numer. Algorithms 10 (1995) 13, doi
-10.1007/BF02198293), those of short arcs by Gauss and Legendre's rule.
+10.1007/BF02198293), and those of short arcs by Gauss–Legendre quadrature.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ __all__ = [
     "arc_and_slopes",
     "arc_at",
     "arc_to",
-    "chord_angle",
-    "chord_rate",
-    "slack",
-    "slack_rate",
+    "chord_deficit",
+    "chord_deficit_rate",
+    "chord_direction",
+    "chord_direction_rate",
     "slopes_by_chi",
 ]
 
 SHORT_COSINE = math.cos(1.0)
-"""Cosine of the amplitude below which an arc is short: quadrature then, since the closed forms of C and S cancel."""
+"""Cosine of the amplitude below which an arc is short: the closed forms of C and S cancel there; quadrature is used."""
 
 _HALVINGS = 5
-"""Halvings of F(χ) after the first; what is left is so short that a few terms of a series are exact."""
+"""Halvings of F(χ) after the first; a few terms of a series are exact for the remainder."""
 
 _FLAT = 1e-6
-"""Parameter m below which D changes with it as it does at m = 0."""
+"""Parameter m below which the derivative of D is that at m = 0."""
 
 
 def _even_rule(count: int) -> tuple[Floats, Floats]:
-    """Squares of nodes, and weights, for even functions on [0, 1]: half of Gauss and Legendre's rule on [−1, 1].
+    """Squares of the nodes and weights for even functions on [0, 1]: half of the Gauss–Legendre rule on [−1, 1].
 
-    The weights are those that fit the nodes; NumPy's own are off by up to 1e-13.
+    The weights are computed from the nodes; those of NumPy are off by up to 1e-13.
     """
     nodes = np.polynomial.legendre.leggauss(2 * count)[0][count:]
     even = np.polynomial.legendre.legvander(nodes, 2 * count - 2)[:, ::2]
@@ -63,20 +63,20 @@ _SQUARES, _WEIGHTS = _even_rule(10)
 
 
 class Arc(NamedTuple):
-    """A piece of elastica from the contact to amplitude χ, or its derivatives by one variable."""
+    """Piece of elastica from the contact to the amplitude χ, or its derivatives by one variable."""
 
     length: float
     """F(χ | m) = √f s1."""
     shortfall: float
-    """C: length minus chord along the direction at the contact."""
+    """C, the length minus the chord along the direction at the contact."""
     offset: float
-    """S: chord across the direction at the contact."""
+    """S, the chord across the direction at the contact."""
     turn: float
     """ψ − ψ1 in [0, π]."""
 
 
 class _Amplitude(NamedTuple):
-    """χ and m as the integrands want them, with all digits."""
+    """χ and m in the form that the integrands take, without loss of digits."""
 
     sin: float
     cos: float
@@ -97,7 +97,7 @@ def _amplitude(chi: float, m: float) -> _Amplitude:
 
 @compiled
 def arc_at(sin: float, cos: float, m: float) -> Arc:
-    """Arc to the amplitude χ ∈ [0, π] of this sine and cosine, of parameter m ∈ (0, 1)."""
+    """Arc to the amplitude χ ∈ [0, π] with this sine and cosine, for the parameter m ∈ (0, 1)."""
     twice = 2.0 + 2.0 * abs(cos)
     half = sin / math.sqrt(twice) if cos > 0.0 else 0.5 * math.sqrt(twice)
     return _arc(_Amplitude(sin, cos, half, m, 2.0 * math.sqrt(m * (1.0 - m)), 1.0 - m * sin * sin))
@@ -105,20 +105,20 @@ def arc_at(sin: float, cos: float, m: float) -> Arc:
 
 @compiled
 def arc_to(chi: float, m: float) -> tuple[Arc, Arc]:
-    """Arc to amplitude χ ∈ [0, 3π/2) of parameter m ∈ (0, 1), and its derivatives by χ."""
+    """Arc to the amplitude χ ∈ [0, 3π/2) for the parameter m ∈ (0, 1), and its derivatives by χ."""
     at = _amplitude(chi, m)
     return _arc(at), _by_chi(at)
 
 
 @compiled
 def slopes_by_chi(chi: float, m: float) -> Arc:
-    """The derivatives alone."""
+    """Derivatives of the arc by χ alone; see `arc_to`."""
     return _by_chi(_amplitude(chi, m))
 
 
 @compiled
 def arc_and_slopes(chi: float, m: float) -> tuple[Arc, Arc, Arc]:
-    """The same, with the derivatives by ψ1 as well."""
+    """Arc to the amplitude χ, and its derivatives by χ and by ψ1; see `arc_to`."""
     at = _amplitude(chi, m)
     if at.cos > SHORT_COSINE:
         F, C, S, F_1, C_1, S_1 = _short(at)
@@ -138,7 +138,7 @@ def _turn(at: _Amplitude) -> float:
 
 @compiled
 def _by_chi(at: _Amplitude) -> Arc:
-    """The integrands."""
+    """Derivatives by χ: the integrands."""
     w = at.half * at.half
     cw, d = at.c * w, math.sqrt(at.d2)
     kernel = 2.0 * cw / (at.d2 * d)
@@ -169,7 +169,7 @@ def _arc(at: _Amplitude) -> Arc:
 
 @compiled
 def _short(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
-    """F, C and S, and their derivatives by ψ1 with dm/dψ1 = −c/2 and dc/dψ1 = −p, of a short arc; p = sin ψ1."""
+    """F, C and S of a short arc, and their derivatives by ψ1, with dm/dψ1 = −c/2 and dc/dψ1 = −p; p = sin ψ1."""
     m, c = at.m, at.c
     F, first, second, third, fourth, fifth = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     square = at.half * at.half
@@ -197,7 +197,7 @@ def _short(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
 
 @compiled
 def _long(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
-    """The same of a long arc."""
+    """F, C and S of a long arc, and their derivatives by ψ1; see `_short`."""
     sin, m, c = at.sin, at.m, at.c
     p, w = 1.0 - 2.0 * m, at.half * at.half
     F, D = _legendre(at)
@@ -216,10 +216,10 @@ def _long(at: _Amplitude) -> tuple[float, float, float, float, float, float]:
 
 @compiled
 def _legendre(at: _Amplitude) -> tuple[float, float]:
-    """F and D = (F − E)/m by duplication, which they share.
+    """F and D = (F − E)/m, by one duplication for both.
 
-    F is R_F and D is R_D/3 of (cos²χ, Δ², 1)/sin²χ. The first halving takes the roots with their signs, and so serves
-    amplitudes beyond π/2 as well; written out, it does not cancel at π.
+    F is R_F and D is R_D/3 of (cos²χ, Δ², 1)/sin²χ. The first halving takes the roots with their signs and therefore
+    holds for amplitudes beyond π/2 too; in this form it does not cancel at π.
     """
     d = math.sqrt(at.d2)
     falling = (1.0 - at.m) / (d - at.cos) if at.cos < 0.0 else (d + at.cos) / (at.sin * at.sin)
@@ -254,28 +254,28 @@ def _legendre(at: _Amplitude) -> tuple[float, float]:
 
 
 @compiled
-def chord_angle(arc: Arc) -> float:
-    """Angle of the chord over the direction at the contact."""
+def chord_direction(arc: Arc) -> float:
+    """Angle of the chord to the direction at the contact [rad]."""
     return math.atan2(arc.offset, arc.length - arc.shortfall)
 
 
 @compiled
-def chord_rate(arc: Arc, by: Arc) -> float:
-    """Its derivative."""
+def chord_direction_rate(arc: Arc, by: Arc) -> float:
+    """Derivative of `chord_direction`."""
     along = arc.length - arc.shortfall
     across = along * by.offset - arc.offset * (by.length - by.shortfall)
     return across / (along * along + arc.offset * arc.offset)
 
 
 @compiled
-def slack(arc: Arc) -> float:
-    """√(1 − r²) for a rod of length one, r its chord; without cancellation."""
+def chord_deficit(arc: Arc) -> float:
+    """Chord deficit √(1 − r²) of a rod of length one with the chord r, without cancellation."""
     F, C, S = arc.length, arc.shortfall, arc.offset
     return math.sqrt(max(2.0 * F * C - C * C - S * S, 0.0)) / F
 
 
 @compiled
-def slack_rate(arc: Arc, value: float, by: Arc) -> float:
+def chord_deficit_rate(arc: Arc, value: float, by: Arc) -> float:
     F, C, S = arc.length, arc.shortfall, arc.offset
     half = (F - C) * by.shortfall + C * by.length - S * by.offset
     return (half / (value * F) - value * by.length) / F

@@ -1,7 +1,7 @@
-"""The shape of the deformed rod, from what its base feels, in closed form.
+"""The shape of the deformed rod from its base wrench, in closed form.
 
-Everything here is dimensionless and relative to the pivot, as in `elastica`. Between pivot and contact the rod is a
-piece of elastica (`arc`): its amplitude at arc length s is χ = am(√f (s1 − s) | m), and the chord from there to the
+Quantities are dimensionless and relative to the pivot, as in `elastica`. Between pivot and contact the rod is a piece
+of elastica (`arc`): its amplitude at arc length s is χ = am(√f (s1 − s) | m), and the chord from there to the
 contact is (F − C, S)/√f along and across the direction at the contact. Beyond the contact the rod is straight.
 """
 
@@ -36,16 +36,16 @@ def rod_shape(
     drive_angle, holding_moment, force_x, force_y : array_like
         Slope of the rod at the pivot [rad] and the wrench there (moment EI/L, force EI/L²); they broadcast.
     points : int
-        Number of points of the rod, at arc lengths `numpy.linspace(0, 1, points)`; at least 2. If rods look polygonal,
-        it is too small.
+        Number of points of the rod, at arc lengths `numpy.linspace(0, 1, points)`; at least 2. Give more if rods look
+        polygonal.
     side : array_like of +1 or −1, optional
-        +1 for contacts of a forward sweep, −1 backward; by default the sign of the holding moment.
+        +1 for contacts of a forward sweep, −1 for those of a backward one; by default the sign of the holding moment.
 
     Returns
     -------
     x, y : ndarray, shape (..., points)
-        Coordinates relative to the pivot [L]. Without load, that is where the force is zero or the wrench NaN, the rod
-        is straight; where the curvature has no zero, no contact makes such a wrench, and the coordinates are NaN.
+        Coordinates relative to the pivot [L]. Where the force is zero or the wrench NaN, the rod is not loaded and
+        straight. Where the curvature has no zero, no contact makes such a wrench, and the coordinates are NaN.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def rod_shape(
     >>> x.round(3), y.round(3)
     (array([ 0.   , -0.203, -0.221, -0.042,  0.2  ]), array([0.   , 0.135, 0.375, 0.541, 0.6  ]))
     """
-    from tactile_bayes.mechanics.touches import chords  # numba takes a second to load
+    from tactile_bayes.mechanics.contact_map import chords  # numba takes a second to load
 
     if points < 2:
         raise ParameterError(f"points is {points!r}: a rod is drawn with at least 2 points, pivot and tip")
@@ -79,7 +79,7 @@ def rod_shape(
     x, y = np.cos(phi0)[:, None] * s, np.sin(phi0)[:, None] * s
     loaded = (force > 0.0) & np.isfinite(moment)
     contact = contact_from_wrench(phi0, moment, fx, fy, side=1.0)
-    # A force at the pivot itself, without moment, leaves the rod straight too: the modulus is there, but no arc.
+    # A force at the pivot itself, without moment, leaves the rod straight too: there is a modulus, but no arc.
     bent = loaded & (contact.contact_arclength > 0.0)
     impossible = loaded & ~(contact.modulus < 1.0)
     x[impossible] = y[impossible] = np.nan

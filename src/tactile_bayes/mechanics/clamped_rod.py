@@ -1,17 +1,18 @@
-"""A rod clamped at its base and pushed at a known point: the curvature at the base.
+"""The curvature at the base of a rod that is clamped there and pushed at a known point.
 
 A thin probe is a contour that has shrunk to a point: the rod touches it tangentially, the force is normal to the rod,
-and the position is known. Seen from the clamp, let the point lie at distance r, at an angle ϑ from the direction of the
-clamp. The moment κ0 = M0/(EI) [1/mm] turns the sensor's suspension by c κ0, so that the rod leaves it δ = ϑ − c κ0
-short of the chord. In tangential contact without friction (ψ1 = 0, m = 1/2) the elastica is one curve up to scale, cut
-off at an amplitude χ, and χ fixes both the angle δ between chord and base and the product κ0 r:
+and the position is known. In the frame of the clamp the point lies at distance r, at an angle ϑ from the direction of
+the clamp. The moment κ0 = M0/(EI) [1/mm] turns the sensor's suspension by c κ0, so that the angle between the rod's
+base and the chord is δ = ϑ − c κ0. In tangential contact without friction (ψ1 = 0, m = 1/2) the elastica is one curve
+up to scale, cut off at an amplitude χ, and χ determines both the angle δ and the product κ0 r:
 
     δ(χ) = turn(χ) − chord angle(χ),     κ0 r = √f r sin χ / Δ     ⟹     κ0 r = g(δ),    g(δ) = 3 δ − … odd
     δ + (c/r) g(δ) = ϑ
 
-The rod's length does not enter, as long as it reaches, and its stiffness only scales what the sensor reads. g rises to
-2.41 at δ = 1.21 rad and turns back at δ = 1.74 rad; up to 1.5 rad it is concave, and Newton's method from ϑ/(1 + 3c/r)
-comes to the root from below. The equilibrium is stable while 1 + (c/r) g'(δ) > 0. The linear beam for comparison is
+The rod's length does not enter, provided that the rod reaches the point, and its stiffness only scales the readings.
+g rises to 2.41 at δ = 1.21 rad and turns back at δ = 1.74 rad; up to 1.5 rad it is concave, and Newton's method from
+ϑ/(1 + 3c/r) converges to the root from below. The equilibrium is stable while 1 + (c/r) g'(δ) > 0. The linear beam for
+comparison is
 
     κ0 = 3 w / (a² + 3 c a),      a = r cos ϑ, w = r sin ϑ,
 
@@ -37,12 +38,12 @@ _MAX_TURN = 1.5
 _MAX_STEPS = 30
 
 _SETTLED = 1e-8
-"""Newton step after which what is left, about its square, would be lost in rounding."""
+"""Newton step after which the remaining error, about its square, is lost in rounding."""
 
 
 @cache
 def _moment_by_turn() -> CubicSpline:
-    """g(δ) and g'(δ), from tangential contact at distance 0.3 with the contour's slope as parameter."""
+    """Spline of g(δ) and g'(δ), from tangential contacts at distance 0.3 with the contour's slope as parameter."""
     chord = np.linspace(0.0, 1.0, 1501)[1:]
     wrench = wrench_from_contact(0.3 * np.cos(chord), 0.3 * np.sin(chord), 0.0)
     turn, moment = wrench.drive_angle - chord, 0.3 * wrench.holding_moment
@@ -56,28 +57,27 @@ def _moment_by_turn() -> CubicSpline:
 def base_curvature(
     along: ArrayLike, across: ArrayLike, compliance: ArrayLike = 0.0, *, small_deflection: bool = False
 ) -> Floats:
-    """Curvature κ0 = M0/(EI) at the base of a clamped rod that a thin probe has pushed to a point.
+    """Curvature κ0 = M0/(EI) at the base of a clamped rod that a thin probe pushes to a point.
 
     Parameters
     ----------
     along, across : array_like
-        The point in the frame of the clamp: along the direction in which the clamp points, and to its left [mm, or any
-        other length].
+        The point in the frame of the clamp: along the direction of the clamp, and to its left [mm, or another unit of
+        length]; they broadcast.
     compliance : array_like
-        Turn of the suspension per base curvature, c = EI · angle per moment: the length of rod that would turn as much
-        [the same length].
+        Turn of the suspension per base curvature, c = EI · angle per moment [the same unit of length].
     small_deflection : bool
         Take the linear beam instead of the large-deflection rod.
 
     Returns
     -------
     ndarray
-        Base curvature [one over the length], positive where the rod is bent to the left; NaN where there is no stable
-        equilibrium, or the chord turns more than 1.5 rad away from the base.
+        Base curvature [1 over that unit], of the broadcast shape; positive where the rod is bent to the left, NaN where
+        there is no stable equilibrium or the angle between chord and base exceeds 1.5 rad.
 
     Examples
     --------
-    A tip of a beam of length 40 that is pushed aside by 0.4 and by 20, against 3 w / a²:
+    The tip of a beam of length 40 is pushed aside by 0.4 and by 20; the linear beam has 3 w / a²:
 
     >>> base_curvature(40.0, [0.4, 20.0]).round(6)
     array([0.00075 , 0.029521])

@@ -1,4 +1,4 @@
-"""How functions are compiled."""
+"""The compilation of functions by numba."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 
-__all__ = ["compiled", "kept"]
+__all__ = ["cached", "compiled"]
 
 _NOTICE = "tactile-bayes: compiling the forward model; this takes a while the first time, and is kept for later"
 
@@ -25,12 +25,12 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False, "no_cfunc_wrapper": True}
-"""Arrays belong to whoever calls from Python: nothing is allocated, and references to arrays are not counted, which
-takes longer than what small functions do."""
+"""The caller in Python owns all arrays: compiled code allocates nothing and does not count references to arrays, which
+would take longer than small functions do."""
 
 
 class _PartLibrary(JITCodeLibrary):
-    """LLVM's code of a function, which is optimised, and turned into machine code, only in what calls it."""
+    """LLVM code of a function, which is optimised and turned into machine code only inside its callers."""
 
     def _optimize_final_module(self) -> None:
         pass
@@ -42,7 +42,7 @@ class _PartLibrary(JITCodeLibrary):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _PartEntry(LoweringPass):
-    """Makes a function known by a key in place of an entry point, which it does not have."""
+    """Registers a function under a key in place of an entry point, which it does not have."""
 
     _name = "part_entry"
 
@@ -57,7 +57,7 @@ class _PartEntry(LoweringPass):
 
 
 class _PartCompiler(CompilerBase):
-    """numba's compiler without machine code: that of a function would hold all that it calls once more."""
+    """numba's compiler without machine code: that of a function would contain a copy of all that it calls."""
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
@@ -70,17 +70,17 @@ class _PartCompiler(CompilerBase):
 
 
 def compiled(function: Function) -> Function:
-    """Machine code, as a part of what calls it; Python cannot call it."""
+    """Compile a function as a part of its callers; Python cannot call it."""
     options = {**_OPTIONS, "no_cpython_wrapper": True}
     made: Function = numba.njit(function, pipeline_class=_PartCompiler, **options)
     return made
 
 
-def kept(function: Function) -> Function:
-    """Machine code that is kept on disk for the next process, where there is a place to keep it.
+def cached(function: Function) -> Function:
+    """Compile a function and cache its machine code on disk for the next process, where that is possible.
 
-    numba sees when the function's own file has changed, but not those of what it calls: so its name tells versions of
-    them all apart.
+    numba notices a change of the function's own file, but not of the files of the functions that it calls. Therefore a
+    hash of all files is a part of its name.
     """
     function.__qualname__ += f"_{_version()}"
     try:
@@ -95,7 +95,7 @@ def _is_ours(event: Any) -> bool:
 
 
 class _Rest(event.Listener):
-    """Rests the garbage collector while functions are compiled, of which it takes a tenth and frees a fifth of the
+    """Switches the garbage collector off during compilation: it takes a tenth of the time and frees a fifth of the
     memory."""
 
     def __init__(self) -> None:
@@ -117,7 +117,7 @@ class _Rest(event.Listener):
 
 
 class _Notice(event.Listener):
-    """Says once that something is compiled, to whoever waits at a terminal."""
+    """Prints once to a terminal that functions are compiled."""
 
     def __init__(self) -> None:
         self.said = False
@@ -137,6 +137,6 @@ event.register("numba:compile", _Rest())
 
 @functools.cache
 def _version() -> str:
-    """Of all source files of this package."""
+    """Hash of all source files of this package."""
     sources = sorted(Path(__file__).parent.glob("*.py"))
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:12]

@@ -1,8 +1,9 @@
-"""What the base feels along a stretch of a path, as Chebyshev series: of the way, and of the drive angle.
+"""Loads along a stretch of a path, as Chebyshev series in the position on the stretch and in the drive angle.
 
-A stretch is smooth, so that a few states tell all of it. A drive angle is looked for in the series of the way. Exact
-states at drive angles begin, and end, with series over the drive angle: it is stretched toward the end, where the drive
-may turn back, so that fewer terms serve.
+A stretch is smooth, so that the states at a few nodes determine all of it. The position at which a drive angle is
+reached is found from the series in the position ("way", from 0 to 1). The search for exact states at drive angles
+begins and ends with series in the drive angle; the variable is stretched toward the end, where the drive may turn back,
+so that fewer terms are needed.
 """
 
 from __future__ import annotations
@@ -42,55 +43,55 @@ __all__ = [
 ]
 
 REST, ANGLE = 3, 4
-"""Rows after those of the three loads: what else tells a state (the arc length of the contact, or where the tip touches
-its slope angle), and the drive angle."""
+"""Rows after those of the three loads: the rest of a state (the arc length of the contact, or in tip contact the slope
+angle of the tip), and the drive angle."""
 
 WAY = 3
-"""Row of the way where loads are laid over the drive angle."""
+"""Row of the position where loads are series in the drive angle."""
 
 MISS = 1e-8
-"""By how much derivatives of exact states may miss where they only say where to look next."""
+"""Tolerance of the derivatives of exact states where they only guide a search."""
 
 DIP = 1e-4
-"""By how much the drive angle must fall beyond a maximum for it to be the snap-off [rad]. Over less a rod hardly jumps:
-it is held by the same object at once."""
+"""Least fall of the drive angle beyond a maximum that makes it the snap-off [rad]. After a smaller fall the rod hardly
+jumps, since the same object stops it at once."""
 
 LOST = -1.0
-"""Way to where contact goes on after a maximum of the drive angle, if it does not."""
+"""Return value of `regained` where contact does not continue after a maximum of the drive angle."""
 
 _LAST = 1e-13
-"""Newton step, as a share of a stretch, below which there is only rounding of its interpolants."""
+"""Newton step, as a share of a stretch, below which its interpolants have rounding errors only."""
 
 
 class Curves(NamedTuple):
-    """Room for the series of one stretch, used again for the next."""
+    """Workspace for the series of one stretch, reused for the next."""
 
     on: Nodes
     series: Floats
-    """Over the way: of loads, what else tells a state, the drive angle, and its derivative, shape (6, order)."""
+    """In the position: loads, rest of the state, drive angle, and its derivative, shape (6, order)."""
     bend: Floats
-    """The second derivative of the drive angle, or the first of the way by it."""
+    """Second derivative of the drive angle, or first derivative of the position by it."""
     over_angle: Floats
-    """Of the three loads and the way over the stretched drive angle, shape (4, order)."""
+    """The three loads and the position in the stretched drive angle, shape (4, order)."""
     values: Floats
-    """Of the drive angle and what comes before it, at the nodes, shape (5, order)."""
+    """Values of the drive angle and the rows before it at the nodes, shape (5, order)."""
     on_grid: Floats
 
 
 class Course(NamedTuple):
-    """How the drive angle runs along a stretch."""
+    """Course of the drive angle along a stretch."""
 
     stop: float
-    """Way to where the stretch, or the path, ends."""
+    """Position at which the stretch, or the path, ends."""
     begin: float
     """Drive angle at the beginning [rad]."""
     end: float
     steadiness: float
-    """Its rate at the end over its mean one: 0 where the drive turns back, 1 if it is even."""
+    """Rate at the end over the mean rate: 0 where the drive turns back, 1 if the rate is constant."""
 
 
 def curves_of(order: int) -> Curves:
-    """Room for so many nodes."""
+    """Workspace for `order` nodes."""
     return Curves(
         on=nodes_of(order),
         series=np.zeros((6, order)),
@@ -103,7 +104,7 @@ def curves_of(order: int) -> Curves:
 
 @compiled
 def exact_at(scene: Scene, stretch: Stretch, way: float) -> tuple[State, float]:
-    """The exact state at a way along a stretch, and the drive angle's derivative by the way, of a stiff suspension."""
+    """Exact state at a position on a stretch, and the derivative of the drive angle by it for a stiff suspension."""
     at = place(scene.outline, along(stretch, way))
     state = exact_state(scene, at, stretch.tip, 0.0)
     return state, angle_rate(at, state) * along_rate(stretch, way)
@@ -111,7 +112,7 @@ def exact_at(scene: Scene, stretch: Stretch, way: float) -> tuple[State, float]:
 
 @compiled
 def sample(scene: Scene, stretch: Stretch, curves: Curves) -> None:
-    """Series along the way of loads and drive angle."""
+    """Fit the series of loads and drive angle in the position."""
     values, on, exact = curves.values, curves.on, scene.exact
     for k in range(on.nodes.size):
         at = place(scene.outline, along(stretch, on.nodes[k]))
@@ -132,7 +133,7 @@ def sample(scene: Scene, stretch: Stretch, curves: Curves) -> None:
 
 @compiled
 def misses(accuracy: Accuracy, tolerance: Floats, curves: Curves) -> bool:
-    """Whether the series miss the drive angle, loads by more than a tolerance, or states that are taken from them."""
+    """Return whether the series miss the drive angle, the loads or the states by more than the tolerances."""
     angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
     rough = angle > accuracy.resolved * change or angle > accuracy.sharp
     for c in range(3):
@@ -146,7 +147,7 @@ def misses(accuracy: Accuracy, tolerance: Floats, curves: Curves) -> bool:
 
 @compiled
 def first_fall(accuracy: Accuracy, is_first: bool, curves: Curves) -> float:
-    """Way to where the drive angle stops growing: above 1 if it grows to the end, 0 if it does not grow at all."""
+    """Position at which the drive angle stops growing: above 1 if it grows to the end, 0 if it does not grow at all."""
     on, slope = curves.on, curves.series[ANGLE + 1]
     weighted(on.slopes, curves.series[ANGLE], slope)
     weighted(on.on_grid, slope, curves.on_grid)
@@ -162,8 +163,8 @@ def first_fall(accuracy: Accuracy, is_first: bool, curves: Curves) -> float:
 
 @compiled
 def regained(stop: float, most: float, curves: Curves) -> float:
-    """Way to where the drive angle exceeds a maximum again, of what comes after a way: above 1 if the stretch ends
-    before, `LOST` if the drive angle falls too far below it."""
+    """Position after `stop` at which the drive angle exceeds a maximum again; above 1 if the stretch ends before,
+    `LOST` if the drive angle falls too far below it."""
     on, angle = curves.on, curves.series[ANGLE]
     weighted(on.on_grid, angle, curves.on_grid)
     below = max(stop, 0.0)
@@ -190,7 +191,7 @@ def angle_rate(at: Place, state: State) -> float:
 
 @compiled
 def polished_fold(scene: Scene, stretch: Stretch, stop: float, curves: Curves) -> float:
-    """Way at which the exact derivative of the drive angle vanishes: secants, the first by the interpolant."""
+    """Position at which the exact derivative of the drive angle vanishes, by secants from the interpolant."""
     weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
     bend = value(curves.bend, stop)
     at_stop, last = exact_at(scene, stretch, stop)[1], 2e-2
@@ -207,7 +208,7 @@ def polished_fold(scene: Scene, stretch: Stretch, stop: float, curves: Curves) -
 
 @compiled
 def lay_over_angle(accuracy: Accuracy, course: Course, curves: Curves) -> None:
-    """Series of the loads and of the way over the stretched drive angle."""
+    """Fit the series of the loads and of the position in the stretched drive angle."""
     series, values, on = curves.series, curves.values, curves.on
     steadiness, way = course.steadiness, course.stop
     last_step = max(accuracy.last_step, _LAST)
@@ -223,7 +224,7 @@ def lay_over_angle(accuracy: Accuracy, course: Course, curves: Curves) -> None:
 
 @compiled
 def left_of(angle: float, course: Course) -> float:
-    """What is left of a stretch at a drive angle, from 1 to 0, so stretched that states are smooth functions of it."""
+    """Remainder of a stretch at a drive angle, from 1 to 0, in a variable in which states are smooth."""
     left = min(max((course.end - angle) / (course.end - course.begin), 0.0), 1.0)
     root = math.sqrt(course.steadiness * course.steadiness + 4.0 * (1.0 - course.steadiness) * left)
     return 2.0 * left / (course.steadiness + root) if left > 0.0 else 0.0
@@ -231,8 +232,7 @@ def left_of(angle: float, course: Course) -> float:
 
 @compiled
 def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
-    """Largest curvature of the rod up to a way along a stretch, from the values at its nodes: see
-    `tactile_bayes.mechanics.elastica`."""
+    """Largest curvature of the rod up to a position on a stretch [1/L], from values at the nodes; see `elastica`."""
     nodes, values, curvature, series = curves.on.nodes, curves.values, curves.bend, curves.series
     (angle, moment), force_x = value_and_slope(series[ANGLE], series[0], stop), value(series[1], stop)
     at_stop = _curvature(angle - rig.compliance * moment, moment, force_x, value(series[2], stop))
@@ -244,7 +244,7 @@ def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
         count += 1
     if best == 0 or best >= count - 1:
         return max(at_stop, curvature[best] if count else 0.0)
-    # Between the nodes, as a parabola has it.
+    # The maximum of a parabola through three nodes.
     before, after = nodes[best - 1] - nodes[best], nodes[best + 1] - nodes[best]
     falls, falls_on = curvature[best - 1] - curvature[best], curvature[best + 1] - curvature[best]
     bend = (falls_on / after - falls / before) / (after - before)
@@ -254,7 +254,7 @@ def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
 
 @compiled
 def _curvature(drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
-    """Largest curvature of the rod between pivot and contact, of a forward contact [1/L]."""
+    """Largest curvature of the rod between pivot and contact in a forward contact [1/L]."""
     cos, sin = math.cos(drive_angle), math.sin(drive_angle)
     lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
     inflated = 2.0 * (math.hypot(force_x, force_y) - lever) if across < 0.0 else 0.0

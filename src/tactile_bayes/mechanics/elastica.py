@@ -1,7 +1,7 @@
 """The exact rod for arrays: contact → base wrench and base wrench → contact, in closed form (`states`).
 
-Everything here is dimensionless (length L, moment EI/L, force EI/L²), relative to the pivot, and broadcasts. All
-contacts are forward ones (holding moment ≥ 0); `side=-1` mirrors a backward one in and out.
+Quantities are dimensionless (length L, moment EI/L, force EI/L²), relative to the pivot, and broadcast. The formulas
+hold for forward contacts (holding moment ≥ 0); `side=-1` mirrors a backward contact in and out.
 """
 
 from __future__ import annotations
@@ -26,47 +26,47 @@ __all__ = [
 ]
 
 MAX_FRICTION_ANGLE = 0.7
-"""Largest friction angle δ [rad]: 2 E(m) > K(m) must hold for m = (1 + sin δ)/2, else the map of Phase B folds."""
+"""Largest friction angle δ [rad]: the map of Phase B folds unless 2 E(m) > K(m) for m = (1 + sin δ)/2."""
 
 
 class Wrench(NamedTuple):
-    """What the base feels in a contact; NaN where the rod cannot make it (`phase` is then `NONE`)."""
+    """Base wrench of a contact and its derivatives; NaN where the rod cannot make it (`phase` is then `NONE`)."""
 
     drive_angle: Floats
     """Slope φ0 of the rod at the pivot [rad]."""
     holding_moment: Floats
-    """Moment m0 that the drive holds."""
+    """Moment m0 that the drive holds [EI/L]."""
     force_x: Floats
     force_y: Floats
-    """Support reaction (−f sin β, f cos β)."""
+    """Support reaction (−f sin β, f cos β) [EI/L²]."""
     contact_arclength: Floats
-    """Arc length s1 from the pivot to the contact."""
+    """Arc length s1 from the pivot to the contact [L]."""
     tip_angle: Floats
     """Slope φ(s1) of the rod at the contact [rad]."""
     phase: NDArray[np.int8]
     """`NONE`, `TIP` or `TANGENTIAL`."""
     by_slope: Floats
-    """∂φ0/∂α, the contact point held; by rotation of the whole, ∂φ0/∂(polar angle of the point) = 1 − by_slope."""
+    """∂φ0/∂α at a fixed contact point; by rotation of the whole, ∂φ0/∂(polar angle of the point) = 1 − by_slope."""
     by_distance: Floats
-    """∂φ0/∂(r²), r the distance of the contact from the pivot, its direction and α held; zero in tangential contact."""
+    """∂φ0/∂(r²) at a fixed direction of the contact and α, r its distance from the pivot; 0 in tangential contact."""
     tangential_arclength: Floats
-    """Arc length that tangential contact at this point would take; the rod's length is what it is compared with."""
+    """Arc length that tangential contact at this point would take [L]; above 1 the rod is too short for it."""
 
 
 class Contact(NamedTuple):
-    """Where the rod touches, from what the base feels; NaN where there is no answer."""
+    """Contact that follows from a base wrench; NaN where there is none."""
 
     contact_x: Floats
     contact_y: Floats
-    """Contact point relative to the pivot."""
+    """Contact point relative to the pivot [L]."""
     slope_angle: Floats
     """Slope angle α of the contour [rad]."""
     contact_arclength: Floats
-    """Arc length s1 from the pivot to the contact; above 1 it lies beyond the tip."""
+    """Arc length s1 from the pivot to the contact [L]; above 1 it lies beyond the tip."""
     tip_angle: Floats
     """Slope φ(s1) of the rod at the contact [rad]."""
     modulus: Floats
-    """m; the curvature has a zero if and only if m < 1."""
+    """Parameter m of the elliptic integrals; the curvature has a zero if and only if m < 1."""
 
 
 def _refuse_friction(friction_angle: Floats) -> None:
@@ -83,9 +83,10 @@ def _refuse_friction(friction_angle: Floats) -> None:
 def tangential_arclength(
     contact_x: ArrayLike, contact_y: ArrayLike, slope_angle: ArrayLike, friction_angle: ArrayLike = 0.0
 ) -> Floats:
-    """Arc length that tangential contact of a forward sweep takes; above 1 only the tip can touch there.
+    """Arc length [L] that tangential contact of a forward sweep takes; above 1 only the tip can touch there.
 
-    Parameters are those of `wrench_from_contact`. NaN where the contour turns its back.
+    Parameters and errors are those of `wrench_from_contact`. The result has the broadcast shape; it is NaN where the
+    contour faces away from the pivot.
 
     Examples
     --------
@@ -105,7 +106,9 @@ def wrench_from_contact(
     side: ArrayLike = 1,
     phase: ArrayLike | None = None,
 ) -> Wrench:
-    """What the base feels when the rod touches a contour at a given point: Step 1 for one state.
+    """Base wrench of a rod that touches a contour at a given point: Step 1 for one state.
+
+    Equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form.
 
     Parameters
     ----------
@@ -114,17 +117,22 @@ def wrench_from_contact(
     slope_angle : array_like
         Slope angle α of the contour there [rad].
     friction_angle : array_like
-        δ = arctan μ for a rod that slides with Coulomb's coefficient μ [rad].
+        Friction angle δ = arctan μ of a rod that slides with Coulomb's coefficient μ, at most 0.7 [rad].
     side : array_like of +1 or −1
-        +1 for a contact of a forward sweep, −1 for one of a backward sweep, its mirror image.
+        +1 for a contact of a forward sweep, −1 for a contact of a backward sweep, its mirror image.
     phase : array_like of `TIP` or `TANGENTIAL`, optional
-        The phase, where it is known already; then only that one is computed, and not questioned.
+        The phase, if it is known; then only this one is computed, without a check.
 
     Returns
     -------
     Wrench
-        Arrays of the broadcast shape. Where s1 ≤ 1 suffices for tangential contact the phase is `TANGENTIAL`; else it
-        is `TIP` if the point is within reach; else, or where the contour turns its back, it is `NONE` and the rest NaN.
+        Arrays of the broadcast shape. The phase is `TANGENTIAL` where an arc length s1 ≤ 1 suffices, else `TIP` where
+        the point is within reach. It is `NONE`, and the rest is NaN, beyond reach and where the contour faces away.
+
+    Raises
+    ------
+    ParameterError
+        If a friction angle is not between 0 and 0.7.
 
     Examples
     --------
@@ -154,9 +162,9 @@ def wrench_from_contact(
 def _states(
     x: ArrayLike, y: ArrayLike, alpha: ArrayLike, delta: ArrayLike, side: ArrayLike, phase: ArrayLike
 ) -> tuple[NDArray[np.int8], Floats]:
-    """Phases, and columns of states, seen as forward ones."""
+    """Phases, and columns of states, of contacts mirrored to forward ones."""
     from tactile_bayes.mechanics.states import wrenches  # numba takes a second to load
-    from tactile_bayes.mechanics.tables import room, tables
+    from tactile_bayes.mechanics.tables import tables, workspace
 
     _refuse_friction(np.asarray(delta, dtype=float))
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
@@ -164,7 +172,7 @@ def _states(
     shape = given[0].shape
     columns = np.stack([column.ravel() for column in given[:4]], axis=-1).astype(float)
     found, out = given[4].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
-    wrenches(columns, tables(), room(), found, out)
+    wrenches(columns, tables(), workspace(), found, out)
     return found.reshape(shape), np.ascontiguousarray(out.T).reshape(9, *shape)
 
 
@@ -177,24 +185,29 @@ def contact_from_wrench(
     *,
     side: ArrayLike | None = None,
 ) -> Contact:
-    """Where the rod touches, from what the base feels: Step 2 for one state, without integration or root search.
+    """Contact that follows from a base wrench: Step 2 for one state, without integration or root search.
 
-    Equation 26 gives the direction of the force, and the pivot's slope and curvature then fix the elastica; the contact
-    is its first point of zero curvature (equation 27).
+    Equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945, gives the direction of the force. Slope and curvature
+    at the pivot then determine the elastica, and the contact is its first point of zero curvature (equation 27).
 
     Parameters
     ----------
     drive_angle, holding_moment, force_x, force_y : array_like
         Slope of the rod at the pivot [rad] and the wrench there (moment EI/L, force EI/L²).
     friction_angle : array_like
-        δ = arctan μ [rad].
+        Friction angle δ = arctan μ, at most 0.7 [rad].
     side : array_like of +1 or −1, optional
-        +1 for contacts of a forward sweep, −1 backward; by default the sign of the holding moment.
+        +1 for contacts of a forward sweep, −1 for those of a backward one; by default the sign of the holding moment.
 
     Returns
     -------
     Contact
-        NaN where there is no force, or the curvature has no zero (`modulus` ≥ 1).
+        Arrays of the broadcast shape; NaN where there is no force or the curvature has no zero (`modulus` ≥ 1).
+
+    Raises
+    ------
+    ParameterError
+        If a friction angle is not between 0 and 0.7.
 
     Examples
     --------
@@ -222,10 +235,10 @@ def contact_from_wrench(
 
 
 def largest_curvature(wrench: Wrench) -> Floats:
-    """Largest curvature of the rod between pivot and contact, in 1/L: its bending moment in EI/L.
+    """Largest curvature of the rod between pivot and contact [1/L], of the shape of the wrench.
 
-    Along the rod κ²/2 = f (sin ψ − sin ψ1), which is greatest where ψ = π/2 if the rod comes past there, else at the
-    pivot, where it is the holding moment.
+    It is the largest bending moment in EI/L. Along the rod κ²/2 = f (sin ψ − sin ψ1), which is greatest where ψ = π/2
+    if the rod passes that direction, else at the pivot, where it is the holding moment.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""One contact from one noisy sample: what Step 2 makes of it, and the descent to the most likely one (`fitting`)."""
+"""The contact of one noisy sample: by raw Step 2, and the most likely one by descent (`fitting`)."""
 
 from __future__ import annotations
 
@@ -6,44 +6,44 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.contact_map import contact_state, moved
 from tactile_bayes.mechanics.fitting import RawFit, Reading
 from tactile_bayes.mechanics.states import contact
-from tactile_bayes.mechanics.touches import moved, touch
 
-__all__ = ["Room", "descents", "raw_fits"]
+__all__ = ["Workspace", "descents", "raw_fits"]
 
 _MOST_SWEEPS = 30
 
 _ROUNDING = 1e-15
-"""Correlation that counts as none."""
+"""Correlation that counts as zero."""
 
 _BEYOND_ALL = 1e300
-"""Stands for a covariance that is not finite."""
+"""Value that replaces a covariance that is not finite."""
 
 _SAME = 1e-9
-"""Distance below which two places are the same, but for rounding."""
+"""Distance [L] below which two contact points differ by rounding only."""
 
 
-class Room(NamedTuple):
-    """Arrays to write in, for k free coordinates."""
+class Workspace(NamedTuple):
+    """Arrays to write to, for k free coordinates."""
 
     trial: Floats
     """Shape (1, 4)."""
     slopes: Floats
-    """Derivatives of deviations, and these in a last column, shape (4, k + 1)."""
+    """Derivatives of the deviations, and the deviations in the last column, shape (4, k + 1)."""
     inverse: Floats
     """Shape (k, k)."""
     by: Floats
     ratios: Floats
-    """As in `touch`."""
+    """As in `contact_state`."""
 
 
 @compiled
-def _miss(reading: Reading, whitening: Floats, i: int, z: Floats, j: int, free: Index, room: Room) -> float:
-    """Sum of squared deviations, in standard deviations, of a possible contact from a sample; infinite if none."""
-    slopes, by, count = room.slopes, room.by, free.size
-    touch(z, j, by, room.ratios)
+def _miss(reading: Reading, whitening: Floats, i: int, z: Floats, j: int, free: Index, workspace: Workspace) -> float:
+    """Sum of squared deviations of a possible contact from a sample, in standard deviations; infinite if it is none."""
+    slopes, by, count = workspace.slopes, workspace.by, free.size
+    contact_state(z, j, by, workspace.ratios)
     deviation, turned = reading.angle_deviation[i], z[j, 3] - reading.drive_angle[i]
     for r in range(4):
         for c in range(count + 1):
@@ -64,7 +64,7 @@ def _miss(reading: Reading, whitening: Floats, i: int, z: Floats, j: int, free: 
     return math.inf if math.isnan(total) else total
 
 
-@kept
+@cached
 def descents(
     reading: Reading,
     whitening: Floats,
@@ -76,9 +76,9 @@ def descents(
     misfit: Floats,
     normal: Floats,
     hardness: Floats,
-    room: Room,
+    workspace: Workspace,
 ) -> None:
-    """Levenberg's and Marquardt's steps, until the gain that the next one promises is small.
+    """Descend by Levenberg–Marquardt steps until the gain that the next step promises is small.
 
     Parameters
     ----------
@@ -86,18 +86,18 @@ def descents(
     whitening : ndarray, shape (n, 3, 3)
         Inverse of the lower triangular root of the covariance of the loads.
     who : ndarray
-        Samples that are to descend.
+        Indices of the samples that descend.
     free : ndarray, shape (k,)
-        Coordinates that are free, the drive angle as the last if it is among them.
+        Free coordinates; the drive angle is the last if it is among them.
     gain : float
-        What is small, against one and the sum of squares.
+        Gain that is small, relative to one plus the sum of squares.
     steps : int
-        At most; with none, the samples are looked at where they are.
+        Largest number of steps; with 0 the samples are evaluated where they are.
     z, misfit, normal, hardness : ndarray, shapes (n, 4), (n,), (n, k, k + 1) and (n,)
-        Coordinates, sums of squares, Gauss's half of their second derivatives and in a last column half the first ones,
-        and by how much the diagonal is raised.
+        Coordinates; sums of squares; half of their second derivatives in the Gauss–Newton approximation, with half of
+        the first derivatives in the last column; damping of the diagonal.
     """
-    count, inverse, slopes, trial = free.size, room.inverse, room.slopes, room.trial
+    count, inverse, slopes, trial = free.size, workspace.inverse, workspace.slopes, workspace.trial
     for j in range(who.size):
         i = who[j]
         for _ in range(max(steps, 1)):
@@ -116,7 +116,7 @@ def descents(
                     promised += step * normal[i, a, count]
                     trial[0, free[a]] -= step
                 settled = promised <= gain * (1.0 + misfit[i])
-            new = _miss(reading, whitening, i, trial, 0, free, room)
+            new = _miss(reading, whitening, i, trial, 0, free, workspace)
             if steps == 0 or new <= misfit[i]:
                 misfit[i] = new
                 hardness[i] *= 0.1
@@ -136,7 +136,7 @@ def descents(
 
 @compiled
 def _invert(normal: Floats, i: int, harder: float, inverse: Floats) -> None:
-    """A symmetric positive matrix whose diagonal is so many times as large; NaN where there is no inverse."""
+    """Invert a symmetric positive matrix with its diagonal times `harder`; NaN where there is no inverse."""
     count = inverse.shape[0]
     for a in range(count):
         for b in range(count):
@@ -158,7 +158,7 @@ def _invert(normal: Floats, i: int, harder: float, inverse: Floats) -> None:
             inverse[a, b] /= math.sqrt(normal[i, a, a] * normal[i, b, b]) * harder
 
 
-@kept
+@cached
 def raw_fits(
     reading: Reading,
     delta: Floats,
@@ -171,7 +171,7 @@ def raw_fits(
     by: Floats,
     ratios: Floats,
 ) -> None:
-    """Contacts as `raw_contacts` finds them."""
+    """Write the contacts of Step 2; see `raw_contacts`."""
     for i in range(delta.size):
         angle, moment = reading.drive_angle[i], reading.loads[i, 0]
         force_x, force_y = reading.loads[i, 1], reading.loads[i, 2]
@@ -196,7 +196,7 @@ def raw_fits(
         errors[3, 0] = deviation
         z[0, 0], z[0, 1] = math.hypot(force_x, force_y), found.tip_angle - found.slope_angle - delta[i]
         z[0, 2], z[0, 3] = found.arclength, angle
-        bend = touch(z, 0, by, ratios)
+        bend = contact_state(z, 0, by, ratios)
         for k in range(4):
             change = moved(z, 0, bend, by, errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3])
             for p in range(4):
@@ -214,7 +214,7 @@ def raw_fits(
 
 @compiled
 def _spread(changes: Floats, covariance: Floats, i: int) -> None:
-    """Store the covariance of a place, by how far four independent errors move it."""
+    """Store the covariance of a place from its shifts by four independent errors."""
     for a in range(4):
         for b in range(4):
             covariance[i, a, b] = 0.0
@@ -224,7 +224,7 @@ def _spread(changes: Floats, covariance: Floats, i: int) -> None:
 
 @compiled
 def _bent(bend: float, x: float, y: float, covariance: Floats, i: int) -> float:
-    """The larger of two bends, the second of contacts whose mean is off by x and y; NaN counts as the largest."""
+    """Larger of two bends, the second that of contacts whose mean is off by (x, y); NaN counts as the largest."""
     if math.isnan(bend) or x * x + y * y < _SAME * _SAME:
         return bend
     xx, yy, xy = covariance[i, 0, 0], covariance[i, 1, 1], covariance[i, 0, 1]
@@ -234,7 +234,8 @@ def _bent(bend: float, x: float, y: float, covariance: Floats, i: int) -> float:
 
 @compiled
 def _principal(matrix: Floats, axes: Floats) -> None:
-    """Axes of a covariance, one standard deviation long, in columns, by Jacobi's rotations; the matrix is lost."""
+    """Principal axes of a covariance, one standard deviation long, in columns, by Jacobi rotations; the matrix is
+    overwritten."""
     for a in range(3):
         for b in range(3):
             axes[a, b] = 1.0 * (a == b)

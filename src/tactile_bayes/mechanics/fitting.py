@@ -1,9 +1,9 @@
-"""Contacts from noisy samples: taken at their word, or brought onto the sheets of possible contacts.
+"""Contacts from noisy samples: by raw Step 2, or fitted on the sheets of possible contacts.
 
-A contact has three degrees of freedom, a sample has four numbers (drive angle, holding moment, two forces): the sum of
-squares that is left, in standard deviations, has one. Each phase is fitted by Levenberg's and Marquardt's method on its
-sheet (`touching`), sample by sample (`fits`); a sheet's optimum beyond the edge where the two meet does not count, and
-where neither has one before it, the most likely contact lies on the edge.
+A contact has three degrees of freedom, and a sample has four numbers (drive angle, holding moment, two forces), so that
+the sum of squared residuals has one degree of freedom. Each phase is fitted by the Levenberg–Marquardt method on its
+sheet (`contact_coordinates`), sample by sample (`fits`). An optimum beyond the edge where the two sheets meet does not
+count; where neither sheet has one before it, the most likely contact lies on the edge.
 """
 
 from __future__ import annotations
@@ -14,33 +14,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_workspace
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, touch_room
 
 __all__ = ["ContactFit", "RawFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet", "plain", "raw_contacts"]
 
 _FREE = {TIP: (FORCE, PSI1), TANGENTIAL: (FORCE, ARCLENGTH), None: (FORCE,)}
-"""Coordinates that are free on a sheet; None: on the edge."""
+"""Free coordinates on a sheet; None stands for the edge."""
 
 _BLOCK = 4096
 
-_ROUGH, _ROUGH_STEPS = 1e-3, 10
+_COARSE, _COARSE_STEPS = 1e-3, 10
 _SETTLED, _MOST_STEPS = 1e-12, 100
-"""Gain in the sum of squares that the next step promises, against one and the sum, at which a descent ends."""
+"""Gain in the sum of squares that the next step promises, relative to one plus the sum, at which a descent ends."""
 
 _OUTDONE = 2.0, 10.0
-"""Factor on the other sheet's sum of squares, and addend, beyond which a sheet that is roughly fitted is given up."""
+"""Factor on the other sheet's sum of squares, and addend, beyond which a coarsely fitted sheet is given up."""
 
 _STARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Arc lengths to start from in tangential contact, and shares of its whole range for ψ1 in tip contact."""
+"""Arc lengths to start from in tangential contact, and shares of the range of ψ1 in tip contact."""
 
 _LEAST_MOMENT = 0.1
-"""Standard deviations of the moment below which a start has not less of it."""
+"""Least moment of a start, in its standard deviations."""
 
 
 class Reading(NamedTuple):
-    """Samples of forward contacts, with how far they are to be trusted; dimensionless."""
+    """Samples of forward contacts and their uncertainty, dimensionless."""
 
     drive_angle: Floats
     """Shape (n,)."""
@@ -49,21 +49,21 @@ class Reading(NamedTuple):
     angle_deviation: Floats
     """Standard deviation of the drive angle, shape (n,)."""
     leaning: Floats
-    """By how much the error of the loads grows with that of the drive angle, shape (n, 3)."""
+    """Derivative of the errors of the loads by the error of the drive angle, shape (n, 3)."""
     covariance: Floats
-    """Of what else is wrong with the loads, shape (n, 3, 3)."""
+    """Covariance of the other errors of the loads, shape (n, 3, 3)."""
 
     def take(self, where: NDArray[np.intp] | slice) -> Reading:
         return Reading(*(column[where] for column in self))
 
 
 class SheetFit(NamedTuple):
-    """The best contact of one phase, its bounds not heeded."""
+    """Best contact of one phase, regardless of its bounds."""
 
     coordinates: Floats
     """Force, ψ1, arc length and drive angle, shape (n, 4); NaN where there is none."""
     covariance: Floats
-    """Of the coordinates, shape (n, 4, 4); zero for those that are not free."""
+    """Covariance of the coordinates, shape (n, 4, 4); zero for those that are not free."""
     misfit: Floats
     """Sum of squared deviations, shape (n,)."""
 
@@ -76,11 +76,11 @@ class ContactFit(NamedTuple):
     misfit: Floats
     phase: NDArray[np.int8]
     at_edge: NDArray[np.bool_]
-    """Whether the contact lies where tip and tangential contact meet, the best of both lying beyond."""
+    """True if the contact lies on the edge, since the best contacts of both phases lie beyond it."""
     clearance: Floats
     """Distance from the edge, in standard deviations of the coordinate that leads to it."""
     rival: Floats
-    """By how much the sum of squares of the best contact of the other phase is larger; infinite where it has none."""
+    """Excess of the sum of squares of the other phase's best contact; infinite where it has none."""
 
 
 class RawFit(NamedTuple):
@@ -90,32 +90,32 @@ class RawFit(NamedTuple):
     """Contact point, slope angle and arc length, shape (n, 4)."""
     tip_angle: Floats
     covariance: Floats
-    """Of the place, to first order, shape (n, 4, 4)."""
+    """Covariance of the place to first order, shape (n, 4, 4)."""
     bend: Floats
-    """Squared distance, in the metric of the covariance, of the mean of two contacts that are one standard deviation to
-    either side from the contact; the largest of all axes, NaN where there is no such contact, shape (n,)."""
+    """Nonlinearity: squared distance, in the metric of the covariance, from the contact to the mean of two contacts one
+    standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,)."""
 
 
 def raw_contacts(reading: Reading, delta: Floats) -> RawFit:
-    """What Step 2 makes of n samples, with friction angles of shape (n,)."""
+    """Contacts of n samples by Step 2, with friction angles of shape (n,)."""
     from tactile_bayes.mechanics.fits import raw_fits  # numba takes a second to load
 
     count = delta.size
     fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
-    room = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
-    raw_fits(plain(reading), np.array(delta), fit, *room, *touch_room())
+    workspace = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
+    raw_fits(plain(reading), np.array(delta), fit, *workspace, *contact_workspace())
     return fit
 
 
 def fit_contacts(reading: Reading, friction_angle: Floats) -> ContactFit:
-    """Most likely contacts of samples.
+    """Find the most likely contacts of samples.
 
     Parameters
     ----------
     reading : Reading
         n samples.
     friction_angle : ndarray, shape (n,)
-        δ = arctan μ.
+        Friction angle δ = arctan μ [rad].
     """
     size = reading.drive_angle.size
     blocks = []
@@ -130,7 +130,7 @@ def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
     tip, lying = _Descent(target, TIP), _Descent(target, TANGENTIAL)
     everyone = np.arange(delta.size)
     for descent in (tip, lying):
-        descent.go(everyone, _ROUGH, _ROUGH_STEPS)
+        descent.go(everyone, _COARSE, _COARSE_STEPS)
     tip_misfit, lying_misfit = tip.misfit_before(delta), lying.misfit_before(delta)
     for descent, own, other in ((tip, tip_misfit, lying_misfit), (lying, lying_misfit, tip_misfit)):
         descent.go(np.flatnonzero((own <= _OUTDONE[0] * other + _OUTDONE[1]) | np.isinf(other)), _SETTLED, _MOST_STEPS)
@@ -138,7 +138,7 @@ def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
 
     ends = tip_misfit < lying_misfit
     at_edge = np.isinf(np.minimum(tip_misfit, lying_misfit))
-    # Of a contact on the edge the variance is that of the sheet which the data miss by less.
+    # A contact on the edge takes its variance from the sheet with the smaller misfit.
     ends[at_edge] = tip.misfit[at_edge] < lying.misfit[at_edge]
     coordinates = np.where(ends[:, None], tip.z, lying.z)
     covariance = np.where(ends[:, None, None], tip.covariance(), lying.covariance())
@@ -159,14 +159,14 @@ def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
 
 
 def fit_sheet(reading: Reading, delta: Floats, phase: int | None) -> SheetFit:
-    """The best contact of one phase, or on the edge (None), wherever on its sheet, beyond the edge as well.
+    """Find the best contact of one phase, beyond its edge too, or on the edge (None).
 
     Parameters
     ----------
     reading : Reading
         n samples.
     delta : ndarray, shape (n,)
-        δ = arctan μ.
+        Friction angle δ = arctan μ [rad].
     phase : TIP, TANGENTIAL or None
     """
     descent = _Descent(_Target(reading, delta), phase)
@@ -175,7 +175,7 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None) -> SheetFit:
 
 
 class _Descent:
-    """Levenberg's and Marquardt's method on one sheet, for many samples."""
+    """The Levenberg–Marquardt method on one sheet, for many samples."""
 
     def __init__(self, target: _Target, phase: int | None) -> None:
         self._target = target
@@ -189,7 +189,7 @@ class _Descent:
         self._start()
 
     def _start(self) -> None:
-        """Start from raw Step 2, or from the best of several contacts where that has no answer."""
+        """Start from raw Step 2, or from the best of several contacts where it has no solution."""
         reading, delta, phase = self._target.reading, self._target.delta, self._phase
         force = np.hypot(reading.loads[:, 1], reading.loads[:, 2])
         z = np.stack([force, -delta, np.ones(force.size), reading.drive_angle], axis=1)
@@ -221,13 +221,15 @@ class _Descent:
         self._hardness[:] = 1e-3
 
     def go(self, who: NDArray[np.intp], gain: float, most_steps: int) -> None:
-        """Descend until the gain that the next step promises is small."""
-        from tactile_bayes.mechanics.fits import Room, descents  # numba takes a second to load
+        """Descend with the samples `who` until the gain that the next step promises is small."""
+        from tactile_bayes.mechanics.fits import Workspace, descents  # numba takes a second to load
 
         count, target = len(self._free), self._target
-        room = Room(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), *touch_room())
+        workspace = Workspace(
+            np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), *contact_workspace()
+        )
         known = target.reading, target.whitening, who, np.array(self._free)
-        descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, room)
+        descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, workspace)
 
     def misfit_before(self, delta: Floats) -> Floats:
         """Sum of squares; infinite for contacts beyond the edge."""
@@ -235,14 +237,14 @@ class _Descent:
         return np.where(beyond, np.inf, self.misfit)
 
     def covariance(self) -> Floats:
-        """Of the coordinates, shape (n, 4, 4)."""
+        """Covariance of the coordinates, shape (n, 4, 4)."""
         covariance = np.zeros((len(self.z), 4, 4))
         covariance[np.ix_(range(len(self.z)), self._free, self._free)] = _inverse(self._normal[:, :, :-1])
         return covariance
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Of symmetric positive matrices; infinite where there is none."""
+    """Inverses of symmetric positive matrices; infinite where there is none."""
     scale = np.sqrt(np.diagonal(matrix, axis1=1, axis2=2))
     with np.errstate(all="ignore"):
         scaled = matrix / scale[:, :, None] / scale[:, None, :]
@@ -256,7 +258,7 @@ def _inverse(matrix: Floats) -> Floats:
 
 
 class _Target:
-    """Samples, and how deviations from them are weighed."""
+    """Samples, and the weights of deviations from them."""
 
     def __init__(self, reading: Reading, delta: Floats) -> None:
         self.reading = plain(reading)
@@ -266,12 +268,12 @@ class _Target:
 
 
 def plain(reading: Reading) -> Reading:
-    """A reading in arrays of the one layout that is compiled."""
+    """Reading in arrays of the one layout that is compiled."""
     return Reading(*(np.array(column, dtype=float, order="C") for column in reading))
 
 
 def _raw_start(reading: Reading, delta: Floats) -> tuple[Floats, Floats]:
-    """Arc length and ψ1 of raw Step 2; where the moment has the wrong sign, of one that is small and right."""
+    """Arc length and ψ1 by raw Step 2; where the moment has the wrong sign, with a small one of the right sign."""
     moment, force_x, force_y = reading.loads.T
     least = _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
     raw = contact_from_wrench(reading.drive_angle, np.maximum(moment, least), force_x, force_y, delta, side=1.0)

@@ -1,7 +1,7 @@
-"""One contour as one rod sees it: from the pivot, in rod lengths, swept forward.
+"""One contour in the sweep frame: relative to the pivot, in rod lengths, mirrored for a backward sweep.
 
-Two halves of families that have a formula, from a common vertex, or a table. The rod's centreline stays half the rod's
-diameter outside the object, so what it traces is the parallel curve, strictly convex like the contour.
+An outline consists of two halves of families with a formula, from a common vertex, or of a table. The rod's centreline
+stays half the rod's diameter outside the object: it traces the parallel curve, which is strictly convex too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["Half", "Outline", "Place", "bearing", "ends", "frame", "mirrored", "
 
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3
-"""Rod lengths beyond which an end is as good as none."""
+"""Rod lengths beyond which an end of a contour does not matter."""
 
 
 class Half(NamedTuple):
@@ -29,22 +29,22 @@ class Half(NamedTuple):
     size: float
     shape: float
     unit: float
-    """What the contour's own parameter is one of in rod lengths, for a power law; 1 for others."""
+    """Unit of the contour's own parameter in rod lengths, for a power law; 1 for others."""
 
 
 class Outline(NamedTuple):
-    """One contour as one rod sees it."""
+    """One contour in the sweep frame; lengths in rod lengths."""
 
     left: Half
     right: Half
     low: float
     high: float
-    """Least and greatest parameter where there is a table, else of no meaning."""
+    """Least and greatest parameter of a table; they have no meaning without one."""
     sign: float
-    """−1 where what is in the table is seen in a mirror."""
+    """−1 if the table is mirrored."""
     x: float
     y: float
-    """The vertex."""
+    """Vertex."""
     standoff: float
     table: Floats
     """In rod lengths."""
@@ -57,23 +57,23 @@ class Place(NamedTuple):
     y: float
     sin: float
     cos: float
-    """Of the slope angle."""
+    """Sine and cosine of the slope angle."""
     speed: float
-    """dσ/dp ≥ 0, σ the arc length."""
+    """dσ/dp ≥ 0 with the arc length σ."""
     bend: float
     """dα/dp ≥ 0."""
 
 
 @compiled
 def mirrored(outline: Outline) -> Outline:
-    """As the opposite sweep sees it."""
+    """Outline in the frame of the opposite sweep."""
     left, right, low, high, sign, x, y, standoff, table = outline
     return Outline(right, left, -high, -low, -sign, -x, y, standoff, table)
 
 
 @compiled
 def place(outline: Outline, p: float) -> Place:
-    """The point at a parameter."""
+    """Point at a parameter."""
     kind, size, shape, unit = outline.left if p < 0.0 else outline.right
     if kind == PARABOLA:
         t = math.tan(p)
@@ -112,7 +112,7 @@ def place(outline: Outline, p: float) -> Place:
 
 @compiled
 def _by_slope(table: Floats, alpha: float) -> tuple[float, float, float]:
-    """Point and radius of curvature at a slope angle: polynomials of fifth degree through what is known beside it."""
+    """Point and radius of curvature at a slope angle, by polynomials of fifth degree between the rows of the table."""
     cells = table.shape[0] - 1
     way = (alpha + _UPRIGHT) * (cells / (2.0 * _UPRIGHT))
     cell = min(max(int(way), 0), cells - 1)
@@ -124,7 +124,7 @@ def _by_slope(table: Floats, alpha: float) -> tuple[float, float, float]:
 
 @compiled
 def _between(table: Floats, cell: int, axis: int, t: float) -> tuple[float, float]:
-    """A coordinate and its rate, as `tactile_bayes.contours.smooth` has them."""
+    """Coordinate and its rate, as in `tactile_bayes.contours.smooth`."""
     start, rate, bend = table[cell, axis], table[cell, axis + 2], table[cell, axis + 4]
     rise = table[cell + 1, axis] - start - rate - 0.5 * bend
     rate_rise = table[cell + 1, axis + 2] - rate - bend
@@ -138,9 +138,9 @@ def _between(table: Floats, cell: int, axis: int, t: float) -> tuple[float, floa
 
 @compiled
 def _by_cell(table: Floats, p: float) -> tuple[float, float, float, float, float]:
-    """Point, slope angle, and rates of arc length and slope angle: Chebyshev series in the contour's own parameter.
+    """Point, slope angle, and rates of arc length and slope angle, by Chebyshev series in the contour's own parameter.
 
-    A row holds where its cell begins and ends, and coefficients of x, y and slope angle.
+    A row holds the beginning and the end of its cell, and the coefficients of x, y and slope angle.
     """
     first, last = 0, table.shape[0] - 1
     while first < last:
@@ -152,7 +152,7 @@ def _by_cell(table: Floats, p: float) -> tuple[float, float, float, float, float
     begin, end = table[first, 0], table[first, 1]
     size = (table.shape[1] - 2) // 3
     twice = 4.0 * min(max((p - begin) / (end - begin), 0.0), 1.0) - 2.0
-    # T is followed upward, U one step behind: the derivative of T_k is k U_(k−1).
+    # The recurrence of U runs one step behind that of T: the derivative of T_k is k U_(k−1).
     t_before, t = 1.0, 0.5 * twice
     u_before, u = 0.0, 1.0
     x, y, alpha = table[first, 2], table[first, 2 + size], table[first, 2 + 2 * size]
@@ -171,22 +171,23 @@ def _by_cell(table: Floats, p: float) -> tuple[float, float, float, float, float
 
 @compiled
 def frame(at: Place) -> tuple[float, float]:
-    """The vector from the pivot to the contour along the contour and into the object."""
+    """Components along the contour and into the object of the vector from the pivot to a point."""
     return at.x * at.cos + at.y * at.sin, at.y * at.cos - at.x * at.sin
 
 
 @compiled
 def bearing(outline: Outline, p: float) -> float:
-    """Direction in which the point at a parameter lies from the pivot."""
+    """Polar angle of the point at a parameter about the pivot [rad]."""
     at = place(outline, p)
     return math.atan2(at.y, at.x)
 
 
 @compiled
 def ends(outline: Outline) -> tuple[float, float]:
-    """Least and greatest parameter, brought in to just beyond the rod's reach where the outline runs on.
+    """Least and greatest parameter.
 
-    So are ends so far away that rounding would hide in which direction they are.
+    Where the outline has no end, or one so far away that rounding hides its direction, it is cut just beyond the rod's
+    reach.
     """
     return _end(outline, -1.0), _end(outline, 1.0)
 

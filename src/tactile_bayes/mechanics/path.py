@@ -1,15 +1,15 @@
-"""The equilibrium path of one rod along one contour, from first contact to snap-off, and what it is at drive angles.
+"""The equilibrium path of one rod along one contour, from first contact to snap-off, and its states at drive angles.
 
 A path runs along the contour from first contact (the tip, or a tangent line from the pivot, whichever is first) against
 the sense of the contour's parameter, until the drive angle has its first maximum: the snap-off. It is cut where the
-phase changes and where the contour's curvature jumps; on each stretch all observables are smooth, and interpolated.
-Stretches are halved until the interpolants are as good as asked for. The first maximum of the drive angle is a fold
-(its derivative vanishes), a corner, or where the line of force comes to pass through the pivot. A maximum after which
-the drive angle falls by less than `curves.DIP` before it rises above it is none: the path goes on where it does, as
-happens where a radius of curvature vanishes.
+phase changes and where the contour's curvature jumps; on each stretch all observables are smooth and interpolated.
+Stretches are halved until the interpolants are as accurate as required. The first maximum of the drive angle is a fold
+(its derivative vanishes), a corner, or the point where the line of force passes through the pivot. A maximum after
+which the drive angle falls by less than `curves.DIP` before it exceeds the maximum again does not count: the path
+continues where it does so. This happens where a radius of curvature vanishes.
 
-`follow` is the one program for all: likelihoods take loads from the interpolants, as well as noise asks; where a path
-is wanted exactly, the interpolants say where to look for the state at a drive angle.
+`follow` serves all callers. Likelihoods take loads from the interpolants, as accurate as noise requires. Where a path
+is computed exactly, the interpolants guide the search for the state at a drive angle.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from tactile_bayes.mechanics.curves import (
     regained,
     sample,
 )
-from tactile_bayes.mechanics.fates import Reach, SnapOff
+from tactile_bayes.mechanics.limits import limits
 from tactile_bayes.mechanics.outline import bearing
-from tactile_bayes.mechanics.reach import limits
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
     Asked,
     Followed,
@@ -54,36 +54,36 @@ from tactile_bayes.mechanics.series import tail, value
 from tactile_bayes.mechanics.states import Scene
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 
-__all__ = ["MOST_CHANGES", "Ends", "Work", "follow", "work"]
+__all__ = ["MOST_CHANGES", "Ends", "PathWorkspace", "follow", "path_workspace"]
 
 MOST_CHANGES = 16
-"""Phases of a path, one after the other, of which an account is kept."""
+"""Largest number of phases of a path that are recorded."""
 
 _MOST = 96
-"""Stretches that may wait for being followed."""
+"""Capacity for stretches that are not followed yet."""
 
 _MOST_MORE = 64
-"""Stretches beyond those that are cut from which on none is halved: what is rough everywhere, like a contour whose
-curvature is interpolated, is not smooth in smaller pieces either."""
+"""Number of further stretches beyond which none is halved: a contour that is rough everywhere, as one with interpolated
+curvature, is not smooth in smaller pieces either."""
 
 _FEWER = 0.65
-"""Share of the nodes that usually do where the tip touches."""
+"""Share of the nodes that usually suffices in tip contact."""
 
 _FELT = 15.0
-"""Arc length [L] by which tangential contact may be taken for tip contact, over the tolerated error of loads."""
+"""Arc length [L] by which tangential contact may be mistaken for tip contact, over the tolerated error of loads."""
 
 _IN_A_DIP = 1e-5
-"""Error of the drive angle beyond a maximum, over the depth from which on it is the snap-off."""
+"""Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
 
 _NO_MOMENT = 1e-12
-"""Holding moment [EI/L] that is none."""
+"""Holding moment [EI/L] that counts as zero."""
 
-_TOUCHES, _RUNS_OUT, _GRAZES = int(Reach.TOUCHES), int(Reach.RUNS_OUT), int(Reach.GRAZES)
+_TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 
 
 class Ends(NamedTuple):
-    """How a path begins and ends; NaN where there is none. Drive angles are as seen in forward sweeps."""
+    """Beginning and end of a path; NaN where there is none. Drive angles are in the sweep frame."""
 
     reach: int
     distance: float
@@ -93,44 +93,44 @@ class Ends(NamedTuple):
     snap_parameter: float
     snap_off: int
     phases: int
-    """How many there are."""
+    """Number of phases."""
     curvature: float
-    """The largest one of the rod up to snap-off [1/L]; NaN if states are not wanted."""
+    """Largest curvature of the rod up to snap-off [1/L]; NaN if no states are computed."""
 
 
-class Work(NamedTuple):
-    """Room for what is computed on one path, used again for the next."""
+class PathWorkspace(NamedTuple):
+    """Workspace for one path, reused for the next."""
 
     brief: Curves
-    """With fewer nodes, which do where the tip touches unless it touches for long."""
+    """Workspace with fewer nodes, which suffice in tip contact unless it is long."""
     full: Curves
     asked: Asked
     knots: Floats
-    """Where the contour may not be smooth."""
+    """Parameters at which the contour may not be smooth."""
     pieces: Floats
-    """Stretches as they are cut."""
+    """Stretches as cut."""
     waiting: Floats
-    """Stretches still to be followed, the next one last: as in `Stretch`."""
+    """Stretches to be followed, the next one last, as in `Stretch`."""
     followed: Floats
-    """Stretches that are, each as in `Stretch` and `Course`, if there are samples."""
+    """Stretches that have been followed, as in `Stretch` and `Course`, if there are samples."""
     curves: Floats
-    """Their series, and the values at nodes, shape (stretches, 11, order)."""
+    """Their series and values at nodes, shape (stretches, 11, order)."""
 
 
 class _End(NamedTuple):
-    """What is at the end of a stretch, and how the drive angle came there."""
+    """End of a stretch, and the course of the drive angle up to it."""
 
     fate: int
-    """A `SnapOff`, or never if the drive angle grows to the end."""
+    """A `SnapOff`; `NEVER` if the drive angle grows to the end."""
     parameter: float
     course: Course
     curvature: float
 
 
-def work(samples: int, order: int, knots: int) -> Work:
-    """For so many samples at most, nodes on a stretch, and knots of the contour."""
+def path_workspace(samples: int, order: int, knots: int) -> PathWorkspace:
+    """Workspace for at most so many samples, with `order` nodes on a stretch and `knots` knots of the contour."""
     most = _MOST + 4 * (order + 4) + 4 * knots
-    return Work(
+    return PathWorkspace(
         brief=curves_of(int(_FEWER * order)),
         full=curves_of(order),
         asked=asked(samples),
@@ -153,7 +153,7 @@ def _follow_stretch(
     asks_curvature: bool,
     curves: Curves,
 ) -> _End:
-    """Follow one stretch by its series, from the drive angle at its beginning on."""
+    """Follow one stretch by its series from the drive angle at its beginning."""
     stop = first_fall(accuracy, is_first, curves)
     if not may_fall:
         stop = 2.0
@@ -175,7 +175,7 @@ def _follow_stretch(
     curvature = largest_curvature(stop, scene.rig, curves) if asks_curvature else 0.0
     fate = _NEVER
     if folds:
-        # At a flat vertex the maximum and the end of all moment are one, and rounding must not choose between them.
+        # At a flat vertex the maximum and the zero of the moment coincide, and rounding must not choose between them.
         fate = _THRUST if abs(moment) <= _NO_MOMENT else _FOLD
     return _End(fate, parameter, Course(stop, at_begin, at_end, steadiness), curvature)
 
@@ -187,7 +187,7 @@ def follow(
     samples: Samples,
     accuracy: Accuracy,
     tolerance: Floats,
-    room: Work,
+    workspace: PathWorkspace,
     found: Found,
 ) -> Ends:
     """Follow a path from first contact to snap-off.
@@ -196,20 +196,20 @@ def follow(
     ----------
     scene : Scene
     knots : ndarray, shape (k,)
-        Where the contour may not be smooth, decreasing.
+        Parameters at which the contour may not be smooth, decreasing.
     tolerance : ndarray, shape (3,)
-        By how much loads may miss, of moment and forces [EI/L and EI/L²].
+        Tolerated errors of moment and forces [EI/L and EI/L²].
     """
     outline = scene.outline
     limit = limits(outline, scene.rig.friction_angle, accuracy.first_step)
     if limit.reach != _TOUCHES:
         return _nothing(limit.reach, limit.distance)
-    pieces, waiting = room.pieces, room.waiting
-    whole, full = limit.begin - limit.end, room.full
+    pieces, waiting = workspace.pieces, workspace.waiting
+    whole, full = limit.begin - limit.end, workspace.full
     miss = _FELT * min(tolerance[0], tolerance[1], tolerance[2])
     count = cut(scene, limit, knots, accuracy, miss, full.on, full.values, pieces)
     most = count + _MOST_MORE
-    for k in range(count):  # the first one is to be the last, where a stack ends
+    for k in range(count):  # the stack is taken from its end
         row = waiting[count - 1 - k]
         row[0], row[1], row[2] = pieces[k, 0], pieces[k, 1], pieces[k, 2]
         row[3] = k == 0 and limit.tip_first and row[2] > 0.0
@@ -221,9 +221,9 @@ def follow(
     while count:
         row = waiting[count - 1]
         stretch = _stretch(row)
-        curves = room.brief if stretch.brief else room.full
+        curves = workspace.brief if stretch.brief else workspace.full
         sample(scene, stretch, curves)
-        # What is shorter may be lost in rounding.
+        # Shorter stretches may be lost in rounding.
         halved = stretch.halvings < accuracy.halvings and stretches < most
         halved &= stretch.begin - stretch.end > BRIEF * whole
         dips = fate != _NEVER
@@ -232,7 +232,7 @@ def follow(
             if stretch.brief:
                 row[5] = 0.0
                 continue
-            # Where loads begin like a square root the way does so with its square.
+            # Where loads begin like a square root, the parameter depends on the square of the position.
             middle = along(stretch, 0.5)
             above = waiting[count]
             above[0], above[1], above[2], above[3] = row[0], middle, row[2], row[3]
@@ -240,7 +240,7 @@ def follow(
             row[0], row[3], row[4] = middle, 0.0, row[4] + 1.0
             count, stretches = count + 1, stretches + 1
             continue
-        behind = -1.0  # way to the maximum: of a stretch beyond it nothing is
+        behind = -1.0  # position of the maximum; a stretch beyond it has none
         if fate == _NEVER:
             may_fall = limit.begin - stretch.end >= BRIEF * whole or count == 1
             end = _follow_stretch(scene, stretch, accuracy, may_fall, is_first, at_begin, wants_states, curves)
@@ -256,14 +256,14 @@ def follow(
                 at_begin, snap_parameter, is_first = end.course.end, end.parameter, False
                 if samples.angles.size:
                     for c in range(6):
-                        room.followed[done, c] = row[c]
+                        workspace.followed[done, c] = row[c]
                     for c in range(4):
-                        room.followed[done, 6 + c] = end.course[c]
-                    _copy(curves.series, room.curves[done])
-                    _copy(curves.values, room.curves[done, 6:])
+                        workspace.followed[done, 6 + c] = end.course[c]
+                    _copy(curves.series, workspace.curves[done])
+                    _copy(curves.values, workspace.curves[done, 6:])
                     done += 1
         count -= 1
-        if fate != _NEVER:  # a maximum is behind: whether the drive angle exceeds it again
+        if fate != _NEVER:  # after a maximum: does the drive angle exceed it again?
             onward = regained(behind, at_begin, curves)
             if onward == LOST or stretches >= most:
                 break
@@ -278,16 +278,16 @@ def follow(
         return _nothing(_GRAZES, limit.distance)
     if samples.relative:
         for j in range(samples.angles.size):
-            room.asked.angles[j] = first + samples.angles[j] * (at_begin - first) + scene.rig.offset
-        samples = Samples(room.asked.angles[: samples.angles.size], samples.rows, False)
+            workspace.asked.angles[j] = first + samples.angles[j] * (at_begin - first) + scene.rig.offset
+        samples = Samples(workspace.asked.angles[: samples.angles.size], samples.rows, False)
     for k in range(done):
-        row = room.followed[k]
+        row = workspace.followed[k]
         stretch = _stretch(row)
-        curves = room.brief if stretch.brief else room.full
-        _copy(room.curves[k], curves.series)
-        _copy(room.curves[k, 6:], curves.values)
+        curves = workspace.brief if stretch.brief else workspace.full
+        _copy(workspace.curves[k], curves.series)
+        _copy(workspace.curves[k, 6:], curves.values)
         course = Course(row[6], row[7], row[8], row[9])
-        part = Followed(scene, stretch, accuracy, course, curves, room.asked)
+        part = Followed(scene, stretch, accuracy, course, curves, workspace.asked)
         there = find_samples(samples, part)
         if not wants_states:
             write_loads(there, part, found.loads)
@@ -305,7 +305,7 @@ def _stretch(row: Floats) -> Stretch:
 
 @compiled
 def _copy(rows: Floats, out: Floats) -> None:
-    """What both have room for."""
+    """Copy the common part of two arrays."""
     for c in range(min(rows.shape[0], out.shape[0])):
         for k in range(min(rows.shape[1], out.shape[1])):
             out[c, k] = rows[c, k]

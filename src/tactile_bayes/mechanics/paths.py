@@ -1,7 +1,7 @@
-"""Equilibrium paths of many contours at once, from first contact to snap-off, for arrays.
+"""Equilibrium paths of a batch of contours, from first contact to snap-off, for arrays.
 
-Everything in rod lengths, EI/L and EI/L², seen as forward sweeps (`SeenContour` mirrors backward ones). Paths are
-followed by compiled code (`path`), one lane after the other.
+Quantities are in rod lengths, EI/L and EI/L², and in the sweep frame: `SweepFrame` mirrors backward sweeps to forward
+ones. Compiled code (`path`) follows the paths one after the other.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
 from tactile_bayes.mechanics.shapes import shapes_of
 
 if TYPE_CHECKING:
-    from tactile_bayes.mechanics.sweeps import Answers, Lanes, Shapes
+    from tactile_bayes.mechanics.sweeps import Shapes, Solutions, Sweeps
 
 __all__ = ["Paths", "States", "trace"]
 
@@ -28,106 +28,109 @@ class States(NamedTuple):
     """States on paths."""
 
     parameter: Floats
-    """The contour's parameter, seen."""
+    """Parameter of the contour in the sweep frame."""
     x: Floats
     y: Floats
-    """Point at which rod's centreline and the contour (seen) touch."""
+    """Point of the rod's centreline at the contact."""
     slope_angle: Floats
     wrench: Wrench
 
 
 @dataclass(frozen=True)
 class Paths:
-    """Paths of many contours, a lane each; see `trace`.
+    """Paths of a batch of n contours; see `trace`.
 
-    `reach` says which lanes have one; for the others angles are NaN and nothing is ever loaded.
+    Arrays have the shape (n,) unless stated otherwise. `reach` says which contours have a path; for the others angles
+    are NaN and loads zero.
     """
 
-    seen: SeenContour
+    sweep_frame: SweepFrame
     friction_angle: Floats
     reach: NDArray[np.int8]
     distance: Floats
-    """Least distance of the contour from the pivot, in rod lengths."""
+    """Least distance of the contour from the pivot [L]."""
     first_angle: Floats
-    """Drive angle of first contact."""
+    """Drive angle of first contact [rad]."""
     first_parameter: Floats
     snap_angle: Floats
-    """Drive angle of snap-off."""
+    """Drive angle of snap-off [rad]."""
     snap_parameter: Floats
     snap_off: NDArray[np.int8]
     change_parameter: Floats
-    """Where phases begin, shape (lanes, phases); NaN beyond the last."""
+    """Parameters at which phases begin, shape (n, phases); NaN beyond the last."""
     change_to_tip: NDArray[np.bool_]
-    """Whether the tip touches from there on."""
+    """True if a phase is tip contact, shape (n, phases)."""
     largest_curvature: Floats
-    """Of the rod up to snap-off [1/L], to 1e-4 of it."""
+    """Largest curvature of the rod up to snap-off [1/L], with a relative error of 1e-4."""
     clear_angle: Floats
-    """Drive angle from which on a straight rod is past the contour, as far as that is known."""
+    """Drive angle beyond which a straight rod has passed the contour, as far as that is known [rad]."""
     tolerance: Floats | None
     shapes: Shapes
-    lanes: Lanes
+    sweeps: Sweeps
     sampled: Floats
-    """What is found at the drive angles that `trace` was asked for."""
+    """States at the drive angles given to `trace`, shape (n, k, columns)."""
 
     def is_clear(self) -> NDArray[np.bool_]:
-        """Whether the straight rod is free of the object after snap-off, as far as that is known; shape (lanes,)."""
+        """Return whether the straight rod is clear of the object after snap-off, as far as known; shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)
 
     def observables(self, drive_angles: Floats) -> Floats:
         """Holding moment and forces at given drive angles; zero out of contact.
 
-        They are interpolated, to some 1e-8 of the largest.
+        They are interpolated, with an error of some 1e-8 of the largest.
 
         Parameters
         ----------
-        drive_angles : ndarray, shape (k,) or (lanes, k)
+        drive_angles : ndarray, shape (k,) or (n, k)
+            Drive angles in the sweep frame [rad].
 
         Returns
         -------
-        ndarray, shape (lanes, k, 3)
+        ndarray, shape (n, k, 3)
+            Holding moment [EI/L] and forces [EI/L²], with the signs of the laboratory frame.
         """
-        sign = np.where(self.seen.mirrored[:, None, None], [-1.0, -1.0, 1.0], 1.0)
-        return np.asarray(sign * _swept(self.shapes, self.lanes, self.tolerance, drive_angles).loads)
+        sign = np.where(self.sweep_frame.mirrored[:, None, None], [-1.0, -1.0, 1.0], 1.0)
+        return np.asarray(sign * _swept(self.shapes, self.sweeps, self.tolerance, drive_angles).loads)
 
-    def states(self, lane: Index, drive_angles: Floats) -> States:
-        """Exact states at drive angles, shape (k,), on lanes, shape (k,); NaN and `NONE` out of contact."""
+    def states(self, index: Index, drive_angles: Floats) -> States:
+        """Exact states at drive angles, shape (k,), of contours, shape (k,); NaN and `NONE` out of contact."""
         angles = np.asarray(drive_angles, dtype=float)
-        count = np.bincount(lane, minlength=self.seen.lanes)
-        order = np.argsort(lane, kind="stable")
-        rank = np.empty(lane.size, dtype=np.intp)
-        rank[order] = np.arange(lane.size) - (np.cumsum(count) - count)[lane[order]]
-        by_lane = np.full((self.seen.lanes, int(count.max(initial=0))), np.nan)
-        by_lane[lane, rank] = angles
-        found = _swept(self.shapes, self.lanes, self.tolerance, by_lane, states=True)
-        return _as_states(found.states[lane, rank])
+        count = np.bincount(index, minlength=self.sweep_frame.size)
+        order = np.argsort(index, kind="stable")
+        rank = np.empty(index.size, dtype=np.intp)
+        rank[order] = np.arange(index.size) - (np.cumsum(count) - count)[index[order]]
+        by_contour = np.full((self.sweep_frame.size, int(count.max(initial=0))), np.nan)
+        by_contour[index, rank] = angles
+        found = _swept(self.shapes, self.sweeps, self.tolerance, by_contour, states=True)
+        return _as_states(found.states[index, rank])
 
     def loaded_states(self) -> tuple[Index, Index, States]:
-        """States at the drive angles that `trace` was asked for, of those in contact only.
+        """States in contact at the drive angles given to `trace`.
 
         Returns
         -------
-        lane, sample : ndarray, shape (n,)
-            Which they are.
+        index, sample : ndarray, shape (m,)
+            Indices of contour and sample.
         states : States
-            Their states, shape (n,).
+            Their states, shape (m,).
         """
-        lane, sample = np.nonzero(self.sampled[..., 0] != NONE)
-        return lane, sample, _as_states(self.sampled[lane, sample])
+        index, sample = np.nonzero(self.sampled[..., 0] != NONE)
+        return index, sample, _as_states(self.sampled[index, sample])
 
-    def sampled_states(self, lane: Index) -> States:
-        """States on lanes at all of these drive angles, shape (*lane.shape, k); NaN and `NONE` out of contact."""
-        return _as_states(self.sampled[lane])
+    def sampled_states(self, index: Index) -> States:
+        """States of contours at the drive angles given to `trace`, shape (*index.shape, k); NaN out of contact."""
+        return _as_states(self.sampled[index])
 
-    def states_at(self, lane: Index, parameter: Floats) -> States:
-        """Exact states at the contour's parameters, whether on the path or beyond its end."""
-        locus = self.seen.locate(lane, parameter)
-        wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, self.friction_angle[lane])
+    def states_at(self, index: Index, parameter: Floats) -> States:
+        """Exact states at parameters of the contours, on the path or beyond its end."""
+        locus = self.sweep_frame.locate(index, parameter)
+        wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, self.friction_angle[index])
         return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
 
 
 def trace(
-    seen: SeenContour,
+    sweep_frame: SweepFrame,
     *,
     friction_angle: ArrayLike = 0.0,
     suspension_compliance: ArrayLike = 0.0,
@@ -136,67 +139,68 @@ def trace(
     relative: bool = False,
     polished: bool = True,
 ) -> Paths:
-    """Follow the equilibria of every lane from first contact to snap-off.
+    """Follow the equilibria of every contour from first contact to snap-off.
 
     Parameters
     ----------
-    seen : SeenContour
-    friction_angle : float or array_like, shape (lanes,)
-        δ = arctan μ [rad].
-    suspension_compliance : float or array_like, shape (lanes,)
+    sweep_frame : SweepFrame
+        n contours.
+    friction_angle : float or array_like, shape (n,)
+        Friction angle δ = arctan μ [rad].
+    suspension_compliance : float or array_like, shape (n,)
         Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)].
     tolerance : ndarray, shape (3,), optional
-        By how much loads may miss [EI/L and EI/L²], which is what a likelihood needs and several times faster; by
-        default events are computed to rounding.
-    drive_angles : ndarray, shape (k,) or (lanes, k), optional
-        At which states are wanted.
+        Tolerated errors of the loads [EI/L and EI/L²], for likelihoods, which is several times faster; by default
+        events are computed to rounding.
+    drive_angles : ndarray, shape (k,) or (n, k), optional
+        Drive angles of states, in the sweep frame [rad].
     relative : bool
-        Whether they are shares of the way from first contact to snap-off.
+        Whether they are shares of the drive angle from first contact to snap-off.
     polished : bool
-        Whether states at drive angles are exact; or else as good as series, 1e-10 of the largest, and without
-        derivatives, which takes a third of the time.
+        Whether states at drive angles are exact. Otherwise they come from the series, with an error of 1e-10 of the
+        largest and without derivatives, in a third of the time.
     """
-    from tactile_bayes.mechanics.sweeps import Lanes  # numba takes a second to load
+    from tactile_bayes.mechanics.sweeps import Sweeps  # numba takes a second to load
 
-    count, every = seen.lanes, np.arange(seen.lanes)
+    count, every = sweep_frame.size, np.arange(sweep_frame.size)
     friction_angle = np.broadcast_to(np.asarray(friction_angle, dtype=float), (count,))
     compliance = np.broadcast_to(np.asarray(suspension_compliance, dtype=float), (count,))
-    shapes = shapes_of(seen.contour, *(seen.own_domain() if seen.contour.halves is None else ()))
-    lanes = Lanes(
+    shapes = shapes_of(sweep_frame.contour, *(sweep_frame.own_domain() if sweep_frame.contour.halves is None else ()))
+    sweeps = Sweeps(
         contour=every,
-        stroke=every,
-        base_x=_each(seen.base_x, count),
-        base_y=_each(seen.base_y, count),
-        length=_each(seen.length, count),
-        standoff=_each(seen.standoff, count),
-        backward=np.ascontiguousarray(seen.mirrored),
+        segment=every,
+        base_x=_each(sweep_frame.base_x, count),
+        base_y=_each(sweep_frame.base_y, count),
+        length=_each(sweep_frame.length, count),
+        standoff=_each(sweep_frame.standoff, count),
+        backward=np.ascontiguousarray(sweep_frame.mirrored),
         friction_angle=_each(friction_angle, count),
         compliance=_each(compliance, count),
         offset=np.zeros(count),
         rigidity=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
-    answers = _swept(shapes, lanes, tolerance, angles, relative, states=True, polished=polished)
-    there = np.arange(answers.changes.shape[1]) < answers.phases[:, None]
-    most = int(answers.phases.max(initial=0))
+    solutions = _swept(shapes, sweeps, tolerance, angles, relative, states=True, polished=polished)
+    there = np.arange(solutions.changes.shape[1]) < solutions.phases[:, None]
+    most = int(solutions.phases.max(initial=0))
     return Paths(
-        seen=seen,
+        sweep_frame=sweep_frame,
         friction_angle=friction_angle,
-        reach=answers.reach,
-        distance=answers.distance,
-        first_angle=answers.first_angle,
-        first_parameter=answers.first_parameter,
-        snap_angle=answers.snap_angle,
-        snap_parameter=answers.snap_parameter,
-        snap_off=answers.snap_off,
-        change_parameter=np.where(there, answers.changes[..., 0], np.nan)[:, :most],
-        change_to_tip=(there & (answers.changes[..., 1] > 0.0))[:, :most],
-        largest_curvature=answers.curvature,
-        clear_angle=answers.clear_angle,
+        reach=solutions.reach,
+        distance=solutions.distance,
+        first_angle=solutions.first_angle,
+        first_parameter=solutions.first_parameter,
+        snap_angle=solutions.snap_angle,
+        snap_parameter=solutions.snap_parameter,
+        snap_off=solutions.snap_off,
+        change_parameter=np.where(there, solutions.changes[..., 0], np.nan)[:, :most],
+        change_to_tip=(there & (solutions.changes[..., 1] > 0.0))[:, :most],
+        largest_curvature=solutions.curvature,
+        clear_angle=solutions.clear_angle,
         tolerance=tolerance,
         shapes=shapes,
-        lanes=lanes,
-        sampled=answers.states,
+        sweeps=sweeps,
+        sampled=solutions.states,
     )
 
 
@@ -206,27 +210,27 @@ def _each(values: Any, count: int) -> Floats:
 
 def _swept(
     shapes: Shapes,
-    lanes: Lanes,
+    sweeps: Sweeps,
     tolerance: Floats | None,
     drive_angles: Floats,
     relative: bool = False,
     **options: Any,
-) -> Answers:
-    """What is found at drive angles, shape (k,) for all or (lanes, k), as seen in forward sweeps."""
-    from tactile_bayes.mechanics.sweeps import Strokes, answered
+) -> Solutions:
+    """Solutions at drive angles in the sweep frame, shape (k,) for all or (n, k)."""
+    from tactile_bayes.mechanics.sweeps import Segments, solve_sweeps
 
     angles = np.atleast_2d(np.asarray(drive_angles, dtype=float))
     order = np.argsort(angles, axis=1, kind="stable")
-    strokes, each = angles.shape
-    asked = Strokes(
-        each * np.arange(strokes + 1), order.ravel(), np.take_along_axis(angles, order, axis=1).ravel(), relative
+    segments, each = angles.shape
+    asked = Segments(
+        each * np.arange(segments + 1), order.ravel(), np.take_along_axis(angles, order, axis=1).ravel(), relative
     )
-    lanes = lanes._replace(stroke=lanes.contour % strokes)
-    return answered(shapes, lanes, asked, (lanes.contour.size, each), tolerance=tolerance, **options)
+    sweeps = sweeps._replace(segment=sweeps.contour % segments)
+    return solve_sweeps(shapes, sweeps, asked, (sweeps.contour.size, each), tolerance=tolerance, **options)
 
 
 def _as_states(columns: Floats) -> States:
-    """States from what is kept of them, shape (..., columns); NaN where nothing is."""
+    """States from their columns, shape (..., columns); NaN where there is none."""
     side_by_side = np.moveaxis(columns, -1, 0).copy()
     phase = side_by_side[0].astype(np.int8)
     np.copyto(side_by_side, np.nan, where=phase == NONE)

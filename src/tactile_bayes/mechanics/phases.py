@@ -1,4 +1,4 @@
-"""How a rod touches, in numbers and in words."""
+"""Contact phases: codes and names."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ NONE, TIP, TANGENTIAL = 0, 1, 2
 """Codes of the contact phase: no contact, Phase A (the tip touches), Phase B (the rod touches tangentially)."""
 
 PHASE_NAMES = ("none", "tip", "tangential")
-"""Words for the contact phases, by code."""
+"""Names of the contact phases, by code."""

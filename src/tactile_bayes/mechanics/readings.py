@@ -1,4 +1,4 @@
-"""What the base feels at the drive angles of samples that lie on a stretch of a path."""
+"""Loads and states at the drive angles of the samples on a stretch of a path."""
 
 from __future__ import annotations
 
@@ -31,50 +31,50 @@ __all__ = [
 ]
 
 STATE_COLUMNS = 13
-"""Numbers that are kept of a state: phase, parameter, point, slope angle, and those of `State`."""
+"""Numbers that describe a state: phase, parameter, point, slope angle, and the fields of `State`."""
 
 _SETTLED = 1e-14
-"""Share of a stretch by which an exact state may miss its drive angle, for the interpolant to make up for it."""
+"""Share of a stretch by which an exact state may miss its drive angle; the interpolant corrects for it."""
 
 _NEAR, _MOST_STEPS = 1e-5, 6
-"""Newton step, as a share of the stretch, after which nothing is left to do, and how many there are at most."""
+"""Newton step, as a share of the stretch, after which the search ends, and the largest number of steps."""
 
 _PAST = 1e-6
-"""Share of a stretch by which a step may go past the end."""
+"""Share of a stretch by which a step may pass the end."""
 
 
 class Samples(NamedTuple):
-    """What is asked for."""
+    """Samples of one path."""
 
     angles: Floats
-    """Drive angles, as read and as seen in forward sweeps, increasing."""
+    """Drive angles as read, in the sweep frame, increasing [rad]."""
     rows: NDArray[np.intp]
-    """Where their loads and states go."""
+    """Rows of their loads and states."""
     relative: bool
-    """Whether angles are shares of the way from first contact to snap-off."""
+    """True if angles are shares of the drive angle from first contact to snap-off."""
 
 
 class Found(NamedTuple):
-    """What is known of samples and stretches."""
+    """Results for the samples and stretches of a path."""
 
     loads: Floats
-    """With the sign of the sweep and the rod's rigidity, zero beforehand, shape (rows, 3)."""
+    """Loads with the sign of the sweep and the rod's rigidity, initially zero, shape (rows, 3)."""
     states: Floats
-    """Seen in forward sweeps, zero beforehand, shape (rows, `STATE_COLUMNS`)."""
+    """States in the sweep frame, initially zero, shape (rows, `STATE_COLUMNS`)."""
     changes: Floats
-    """Where phases begin, as seen: parameter and whether the tip touches, shape (phases, 2), or none if no states are
-    wanted."""
+    """Beginnings of phases: parameter in the sweep frame, and 1 for tip contact, shape (phases, 2); no rows if no
+    states are computed."""
 
 
 class Asked(NamedTuple):
-    """Room for samples of a path, and on one stretch."""
+    """Workspace for the samples of a path and of one stretch."""
 
     angles: Floats
-    """Drive angles of all, if shares were asked for."""
+    """Drive angles of all samples, if shares were given."""
     wanted: Floats
-    """Their drive angles."""
+    """Drive angles of the samples on the stretch."""
     twice: Floats
-    """Stretched drive angles z, or ways, as 4z − 2."""
+    """Stretched drive angles z, or positions z, as 4z − 2."""
     now: Floats
     before: Floats
     found: Floats
@@ -82,38 +82,38 @@ class Asked(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """A stretch that has been followed, with what its samples are found by."""
+    """A stretch that has been followed, with its series."""
 
     scene: Scene
     stretch: Stretch
     accuracy: Accuracy
     course: Course
     curves: Curves
-    room: Asked
+    workspace: Asked
 
 
 def asked(samples: int) -> Asked:
-    """Room for so many at most."""
+    """Workspace for at most so many samples."""
     angles, wanted, twice, now, before = np.empty((5, samples))
     return Asked(angles, wanted, twice, now, before, np.empty((4, samples)))
 
 
 @compiled
 def find_samples(samples: Samples, part: Followed) -> Samples:
-    """Those on a stretch; their drive angles go into the room."""
-    course, room, offset = part.course, part.room, part.scene.rig.offset
+    """Samples on a stretch; their drive angles are written to the workspace."""
+    course, workspace, offset = part.course, part.workspace, part.scene.rig.offset
     first, last = _before(samples.angles, course.begin + offset), _before(samples.angles, course.end + offset)
     while last < samples.angles.size and samples.angles[last] - offset <= course.end:
         last += 1
     for j in range(last - first):
-        room.wanted[j] = samples.angles[first + j] - offset
-        room.twice[j] = 2.0 - 4.0 * left_of(room.wanted[j], course)
+        workspace.wanted[j] = samples.angles[first + j] - offset
+        workspace.twice[j] = 2.0 - 4.0 * left_of(workspace.wanted[j], course)
     return Samples(samples.angles[first:last], samples.rows[first:last], samples.relative)
 
 
 @compiled
 def _before(angles: Floats, angle: float) -> int:
-    """How many angles, which increase, are less than one."""
+    """Number of increasing angles that are less than a given one."""
     low, high = 0, angles.size
     while low < high:
         middle = (low + high) // 2
@@ -126,10 +126,12 @@ def _before(angles: Floats, angle: float) -> int:
 
 @compiled
 def _look_for(part: Followed, count: int) -> None:
-    """Turn stretched drive angles of samples into ways along the stretch, as 4z − 2: by Newton's method from between
-    the nodes of the series, all side by side, or each by itself where that does not come near."""
-    course, curves, room = part.course, part.curves, part.room
-    wanted, twice, found, stop = room.wanted, room.twice, room.found, course.stop
+    """Convert the stretched drive angles of samples to positions z on the stretch, as 4z − 2.
+
+    Newton's method starts between the nodes of the series, for all samples together; samples for which it does not
+    converge are solved one by one."""
+    course, curves, workspace = part.course, part.curves, part.workspace
+    wanted, twice, found, stop = workspace.wanted, workspace.twice, workspace.found, course.stop
     nodes, angles, angle, rate = curves.on.nodes, curves.values[ANGLE], curves.series[ANGLE], curves.series[ANGLE + 1]
     k, before, after, way_before, way_after = 0, -2.0, -2.0, 0.0, 0.0
     for j in range(count):
@@ -142,7 +144,7 @@ def _look_for(part: Followed, count: int) -> None:
         share = (twice[j] - before) / (after - before) if after > before else 1.0
         twice[j] = 4.0 * (way_before + share * (way_after - way_before)) - 2.0
     for _ in range(_MOST_STEPS):
-        at_all(curves.series[ANGLE:], twice, count, room.now, room.before, found)
+        at_all(curves.series[ANGLE:], twice, count, workspace.now, workspace.before, found)
         largest = 0.0
         for j in range(count):
             way = 0.25 * (twice[j] + 2.0)
@@ -162,20 +164,20 @@ def _look_for(part: Followed, count: int) -> None:
 
 @compiled
 def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
-    """Loads of the samples on a stretch, from the series."""
-    count, rig, curves, room = samples.rows.size, part.scene.rig, part.curves, part.room
+    """Write the loads of the samples on a stretch, from the series."""
+    count, rig, curves, workspace = samples.rows.size, part.scene.rig, part.curves, part.workspace
     _look_for(part, count)
     sideward = rig.sign * rig.rigidity
-    at_all(curves.series[:REST], room.twice, count, room.now, room.before, room.found)
+    at_all(curves.series[:REST], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
         row = samples.rows[j]
-        out[row, 0], out[row, 1] = sideward * room.found[0, j], sideward * room.found[1, j]
-        out[row, 2] = rig.rigidity * room.found[2, j]
+        out[row, 0], out[row, 1] = sideward * workspace.found[0, j], sideward * workspace.found[1, j]
+        out[row, 2] = rig.rigidity * workspace.found[2, j]
 
 
 @compiled
 def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> None:
-    """Note phase and place of a state, and the loads that are those of its row."""
+    """Write phase and place of a state, and the loads of its row."""
     states = out.states[row]
     states[0] = TIP if tip else TANGENTIAL
     states[1], states[2], states[3], states[4] = p, at.x, at.y, math.atan2(at.sin, at.cos)
@@ -185,46 +187,46 @@ def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> Non
 
 @compiled
 def write_states(samples: Samples, part: Followed, out: Found) -> None:
-    """States of the samples on a stretch from the series, without derivatives."""
-    scene, stretch, course, curves, room = part.scene, part.stretch, part.course, part.curves, part.room
+    """Write the states of the samples on a stretch, from the series, without derivatives."""
+    scene, stretch, course, curves, workspace = part.scene, part.stretch, part.course, part.curves, part.workspace
     count = samples.rows.size
-    # Just before the end of contact it matters where the drive angle ends.
+    # Just before the end of contact the last drive angle matters.
     off = value(curves.series[ANGLE], course.stop) - course.end
     for j in range(count):
-        room.wanted[j] += off
+        workspace.wanted[j] += off
     _look_for(part, count)
-    at_all(curves.series[:ANGLE], room.twice, count, room.now, room.before, room.found)
+    at_all(curves.series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
         row = samples.rows[j]
-        p = along(stretch, 0.25 * (room.twice[j] + 2.0))
+        p = along(stretch, 0.25 * (workspace.twice[j] + 2.0))
         at, states = place(scene.outline, p), out.states[row]
-        states[5] = room.wanted[j] - off - scene.rig.compliance * room.found[0, j]
+        states[5] = workspace.wanted[j] - off - scene.rig.compliance * workspace.found[0, j]
         for c in range(3):
-            states[6 + c] = room.found[c, j]
+            states[6 + c] = workspace.found[c, j]
         _note(row, p, at, stretch.tip, scene.rig, out)
-        rest = room.found[REST, j]
+        rest = workspace.found[REST, j]
         states[9], states[10] = (1.0, rest) if stretch.tip else (rest, states[4])
         states[11], states[12] = math.nan, math.nan
 
 
 @compiled
 def polish_states(samples: Samples, part: Followed, out: Found) -> None:
-    """Exact states at the drive angles of the samples on a stretch, by Newton in the stretched drive angle."""
-    scene, stretch, course, curves, room = part.scene, part.stretch, part.course, part.curves, part.room
+    """Write exact states at the drive angles of the samples on a stretch, by Newton's method in the stretched angle."""
+    scene, stretch, course, curves, workspace = part.scene, part.stretch, part.course, part.curves, part.workspace
     stop, steadiness, over_angle, rig = course.stop, course.steadiness, curves.over_angle, scene.rig
     lay_over_angle(part.accuracy, course, curves)
     weighted(curves.on.slopes, over_angle[WAY], curves.bend)
     for j in range(samples.rows.size):
-        row, target = samples.rows[j], 0.25 * (room.twice[j] + 2.0)
+        row, target = samples.rows[j], 0.25 * (workspace.twice[j] + 2.0)
         way, pace = value_and_slope(over_angle[WAY], curves.bend, target)
-        way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle is less again
+        way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle falls again
         low, high, before = 0.0, stop, stop
         for _ in range(100):
             p = along(stretch, way)
             at = place(scene.outline, p)
             state = exact_state(scene, at, stretch.tip, MISS)
             driven = state.drive_angle + rig.compliance * state.holding_moment
-            # But for rounding, which may undo the very first contact.
+            # Rounding may undo the very first contact.
             turned = 1.0 - left_of(driven, course) if math.isfinite(driven) else 0.0
             missing = target - turned
             if abs(missing) <= _SETTLED or not high > low:
@@ -235,7 +237,7 @@ def polish_states(samples: Samples, part: Followed, out: Found) -> None:
                 high = way
             rate = angle_rate(at, state) * along_rate(stretch, way)
             newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
-            # Much nearer to the end than the goal is, the rate may be zero or rounding: the interpolant's serves.
+            # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
             sound = rig.compliance == 0.0 and newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target)
             new = way + missing * (newton if sound else pace)
             if not (low < new < high and abs(new - way) <= 0.5 * before):
@@ -246,7 +248,7 @@ def polish_states(samples: Samples, part: Followed, out: Found) -> None:
             way = new
         if not math.isfinite(driven):
             continue
-        # A parameter has only so many digits: what they leave of the way to the angle, the interpolant goes.
+        # The digits of a parameter are limited: the interpolant corrects for the remaining distance to the angle.
         reached = 1.0 - left_of(driven, course)
         states = out.states[row]
         for c in range(8):

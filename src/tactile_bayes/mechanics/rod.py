@@ -1,4 +1,4 @@
-"""The rod: its length and stiffness, and with them the conversion between SI and dimensionless units."""
+"""The rod: its length and stiffness, and the units of dimensionless quantities."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tactile_bayes.errors import ParameterError
 __all__ = ["LARGEST_STRAIN", "Rod"]
 
 _THICKEST = 1e70
-"""A diameter whose fourth power is beyond what numbers hold [m]."""
+"""Diameter whose fourth power overflows [m]."""
 
 LARGEST_STRAIN = 0.1
-"""Bending strain up to which a rod is slender and its bending moment proportional to its curvature."""
+"""Bending strain up to which a rod is slender and its bending moment is proportional to its curvature."""
 
 
 @dataclass(frozen=True)
@@ -32,17 +32,16 @@ class Rod:
         Young's modulus times second moment of area, EI [N m²].
     diameter : float
         Diameter of a rod of circular cross-section [m]. The rod touches with its surface, half a diameter beside
-        its centreline; 0 (the default) is a rod without thickness.
+        its centreline; 0 (the default) stands for a rod without thickness.
     elastic_strain : float, optional
-        Largest bending strain that the material takes without staying bent: about 0.002 for mild steel, 0.005 for
-        spring steel, 0.05 for nitinol. `scan` warns where a rod with a diameter is bent beyond it. Records do not state
-        it.
+        Largest bending strain without permanent deformation: about 0.002 for mild steel, 0.005 for spring steel, 0.05
+        for nitinol. `scan` warns if a rod with a diameter is bent beyond it. Records do not state it.
 
     Raises
     ------
     ParameterError
-        If length or flexural rigidity is not positive and finite, the diameter is negative, or the elastic strain is
-        not positive.
+        If length or flexural rigidity is not positive and finite, the diameter is negative or larger than the length,
+        or the elastic strain is not positive.
 
     Examples
     --------
@@ -94,7 +93,16 @@ class Rod:
         youngs_modulus : float
             Young's modulus E [Pa].
         elastic_strain : float, optional
-            As of `Rod`.
+            As in `Rod`.
+
+        Returns
+        -------
+        Rod
+
+        Raises
+        ------
+        ParameterError
+            As in `Rod`, and if diameter or Young's modulus is not positive.
 
         Examples
         --------
@@ -109,20 +117,20 @@ class Rod:
 
     @property
     def is_dimensionless(self) -> bool:
-        """Whether length and flexural rigidity are both the unit."""
+        """True if length and flexural rigidity are both 1."""
         return self.length == 1.0 and self.flexural_rigidity == 1.0
 
     @property
     def length_unit(self) -> float:
-        """What a dimensionless length of one is [m]."""
+        """Unit of length, L [m]."""
         return self.length
 
     @property
     def moment_unit(self) -> float:
-        """What a dimensionless moment of one is, EI/L [N m]."""
+        """Unit of moment, EI/L [N m]."""
         return self.flexural_rigidity / self.length
 
     @property
     def force_unit(self) -> float:
-        """What a dimensionless force of one is, EI/L² [N]."""
+        """Unit of force, EI/L² [N]."""
         return self.flexural_rigidity / self.length**2

@@ -25,17 +25,17 @@ __all__ = [
 
 
 class Nodes(NamedTuple):
-    """What belongs to interpolation with so many nodes."""
+    """Matrices of the interpolation with a given number of nodes."""
 
     nodes: Floats
     fit: Floats
-    """Coefficients for a one at each node, a row each."""
+    """Coefficients of the interpolant that is 1 at one node and 0 at the others, a row each."""
     slopes: Floats
-    """Those of the derivative of each polynomial."""
+    """Coefficients of the derivative of each polynomial."""
     grid: Floats
-    """Where it is asked whether a series still grows."""
+    """Points at which the sign of a derivative is checked."""
     on_grid: Floats
-    """Each polynomial there."""
+    """Values of each polynomial there."""
 
 
 @functools.cache
@@ -52,7 +52,7 @@ def nodes_of(order: int) -> Nodes:
 
 @compiled
 def weighted(rows: Floats, weights: Floats, out: Floats) -> None:
-    """Σ weights[i] · rows[i], an inner loop that has no order to keep."""
+    """Write Σ weights[i] · rows[i], in an inner loop whose order is free."""
     out[:] = 0.0
     for i in range(weights.size):
         weight = weights[i]
@@ -62,7 +62,7 @@ def weighted(rows: Floats, weights: Floats, out: Floats) -> None:
 
 @compiled
 def value(coefficients: Floats, z: float) -> float:
-    """By Clenshaw's recurrence, so bracketed that one step waits for the last as short as may be."""
+    """Value of a series by Clenshaw's recurrence, bracketed for the shortest latency between steps."""
     twice = 4.0 * z - 2.0
     now, before = 0.0, 0.0
     for k in range(coefficients.size - 1, 0, -1):
@@ -72,7 +72,7 @@ def value(coefficients: Floats, z: float) -> float:
 
 @compiled
 def value_and_slope(one: Floats, other: Floats, z: float) -> tuple[float, float]:
-    """Two series at once, which takes no longer than one."""
+    """Values of two series at once, which takes no longer than one."""
     twice = 4.0 * z - 2.0
     a, a_before, b, b_before = 0.0, 0.0, 0.0, 0.0
     for k in range(one.size - 1, 0, -1):
@@ -83,8 +83,9 @@ def value_and_slope(one: Floats, other: Floats, z: float) -> tuple[float, float]
 
 @compiled
 def at_all(rows: Floats, twice: Floats, count: int, now: Floats, before: Floats, out: Floats) -> None:
-    """Series, one in each row, at many z, given as 4 z − 2: Chebyshev's polynomials go by in `now` and `before`, side
-    by side for all z, and the sums are in `out`, shape (at least rows, at least count)."""
+    """Write the values of series, one in each row, at many z, given as 4 z − 2.
+
+    `now` and `before` hold the Chebyshev polynomials of all z; `out` has at least the shape (rows, count)."""
     for j in range(count):
         before[j], now[j] = 1.0, 0.5 * twice[j]
     for c in range(rows.shape[0]):
@@ -103,13 +104,13 @@ def at_all(rows: Floats, twice: Floats, count: int, now: Floats, before: Floats,
 
 @compiled
 def tail(coefficients: Floats) -> float:
-    """About how far a series is from what it interpolates."""
+    """Estimate of the error of a series."""
     return max(abs(coefficients[-1]), abs(coefficients[-2]))
 
 
 @compiled
 def change_of(coefficients: Floats) -> float:
-    """The largest coefficient but the first."""
+    """Largest coefficient except the first."""
     largest = 0.0
     for k in range(1, coefficients.size):
         largest = max(largest, abs(coefficients[k]))
@@ -120,9 +121,9 @@ def change_of(coefficients: Floats) -> float:
 def crossing(
     function: Floats, slope: Floats, wanted: float, left: float, right: float, z: float, last_step: float
 ) -> float:
-    """Where a series takes a value from above on its way from left to right, or, with left > right, from right to left.
+    """Point at which a series falls through a value from left to right, or, with left > right, from right to left.
 
-    Newton kept in its bracket, until a step is as small a share of that as given.
+    Newton's method within a bracket, until a step is a given share of the bracket.
     """
     before = abs(right - left)
     settled = last_step * before
@@ -134,7 +135,7 @@ def crossing(
         else:
             right = z
         new = z - missing / rate
-        # Steps that do not shrink by half go round in circles, for instance about a kink.
+        # Steps that do not shrink by half may cycle, for instance about a kink.
         if (new - left) * (new - right) <= 0.0 and abs(new - z) <= 0.5 * before:
             before = abs(new - z)
         elif missing == 0.0:

@@ -1,4 +1,4 @@
-"""Contours as the compiled forward model takes them."""
+"""Contours in the form that the compiled forward model takes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["shapes_of"]
 
 
 def shapes_of(contours: Contour, low: Floats | None = None, high: Floats | None = None) -> Shapes:
-    """Contours with parameters of shape (n,), by their formula, or by tables from a parameter to another."""
+    """Contours with parameters of shape (n,), by their formula, or by tables from parameter `low` to `high`."""
     from tactile_bayes.mechanics.sweeps import Shapes  # numba takes a second to load
 
     halves = contours.halves

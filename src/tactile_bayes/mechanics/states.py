@@ -1,9 +1,9 @@
-"""One state of a rod in contact, exactly or from tables: contact → what the base feels, and back.
+"""One state of a rod in contact, exactly or from tables: contact → base wrench, and back.
 
-Dimensionless (length L, moment EI/L, force EI/L²), relative to the pivot, forward contacts. A contact force of
-magnitude f acts on the rod along (sin β, −cos β), with β = α + δ for slope angle α and friction angle δ. With ψ = φ − β
-the rod obeys κ' = f cos ψ and κ(s1) = 0 (equations 19, 20 and 27 of Merker et al. 2018, doi 10.1155/2018/1613945): a
-piece of Euler's elastica that begins at a point of zero curvature, the contact (`arc`).
+Quantities are dimensionless (length L, moment EI/L, force EI/L²) and relative to the pivot; contacts are forward ones.
+A contact force of magnitude f acts on the rod along (sin β, −cos β), with β = α + δ for slope angle α and friction
+angle δ. With ψ = φ − β the rod obeys κ' = f cos ψ and κ(s1) = 0 (equations 19, 20 and 27 of Merker et al. 2018, doi
+10.1155/2018/1613945): a piece of Euler's elastica that begins at a point of zero curvature, the contact (`arc`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from tactile_bayes.mechanics.arc import (
     Arc,
     arc_and_slopes,
     arc_at,
-    chord_rate,
-    slack,
-    slack_rate,
+    chord_deficit,
+    chord_deficit_rate,
+    chord_direction_rate,
 )
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
-from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.outline import Outline, Place, frame, place
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.tables import (
@@ -34,8 +34,8 @@ from tactile_bayes.mechanics.tables import (
     MOST_FRICTION,
     STRETCH,
     TURN,
-    Room,
     Tables,
+    Workspace,
     in_polar,
     prepare,
     series,
@@ -56,40 +56,40 @@ __all__ = [
 ]
 
 _BEYOND = 1e-12
-"""By how much rounding may turn a chord beyond where the line of force passes through the pivot [rad]."""
+"""Angle by which rounding may turn a chord beyond the line of force through the pivot [rad]."""
 
 _NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
 
 
 class Rig(NamedTuple):
-    """What loads depend on beside rod and contour."""
+    """Parameters of the loads other than rod and contour."""
 
     friction_angle: float
-    """δ = arctan μ [rad]."""
+    """Friction angle δ = arctan μ [rad]."""
     compliance: float
     """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
     offset: float
-    """What the encoder reads too much, as seen in forward sweeps [rad]."""
+    """Encoder offset in the sweep frame [rad]."""
     sign: float
-    """−1 in backward sweeps."""
+    """−1 in backward sweeps, else 1."""
     rigidity: float
-    """Factor on loads: flexural rigidity over that of their unit."""
+    """Factor on loads: flexural rigidity over the rigidity in their unit."""
 
 
 class Scene(NamedTuple):
-    """One contour as one rod sees it from one pivot, and what is known of rods: all that a state depends on."""
+    """All that a state depends on: one contour in the sweep frame, the rig, and the tables."""
 
     outline: Outline
     rig: Rig
     exact: bool
-    """Whether states are computed to rounding; else from tables."""
+    """True if states are computed to rounding; otherwise they come from tables."""
     known: Tables
-    room: Room
+    workspace: Workspace
     """Prepared for the friction angle."""
 
 
 class State(NamedTuple):
-    """What the base feels in a contact, and how it changes; NaN where the rod cannot make it."""
+    """Base wrench of a contact and its derivatives; NaN where the rod cannot make the contact."""
 
     drive_angle: float
     holding_moment: float
@@ -103,7 +103,7 @@ class State(NamedTuple):
 
 
 class QuickState(NamedTuple):
-    """The part of it that a likelihood needs."""
+    """The part of a `State` that a likelihood needs."""
 
     drive_angle: float
     holding_moment: float
@@ -115,8 +115,8 @@ _NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, mat
 
 
 @compiled
-def _touch(x: float, y: float, alpha: float, delta: float, room: Room) -> tuple[float, Arc, Arc]:
-    """Arc length that tangential contact takes, its arc, and the arc's derivatives by amplitude."""
+def _tangential(x: float, y: float, alpha: float, delta: float, workspace: Workspace) -> tuple[float, Arc, Arc]:
+    """Arc length of tangential contact, its arc, and the derivatives of the arc by the amplitude."""
     sin, cos = math.sin(alpha), math.cos(alpha)
     along, across = x * cos + y * sin, y * cos - x * sin
     angle, largest = math.atan2(across, along), 0.5 * math.pi + delta
@@ -125,7 +125,7 @@ def _touch(x: float, y: float, alpha: float, delta: float, room: Room) -> tuple[
     angle = min(angle, largest)
     m = 0.5 * (1.0 + math.sin(delta))
     if delta <= MOST_FRICTION:
-        guess = math.sqrt(max(angle * series(room, AMPLITUDE, angle / largest), 0.0))
+        guess = math.sqrt(max(angle * series(workspace, AMPLITUDE, angle / largest), 0.0))
     else:
         guess = min(math.sqrt(3.0 * angle / math.sqrt(m * (1.0 - m))), math.pi)
     chi, arc, by_chi = tangential_arc(angle, m, guess)
@@ -136,10 +136,10 @@ def _touch(x: float, y: float, alpha: float, delta: float, room: Room) -> tuple[
 
 
 @compiled
-def _lying(x: float, y: float, alpha: float, delta: float, length: float, arc: Arc, by_chi: Arc) -> State:
-    """Phase B."""
+def _tangential_state(x: float, y: float, alpha: float, delta: float, length: float, arc: Arc, by_chi: Arc) -> State:
+    """State in tangential contact (Phase B)."""
     force = (arc.length / length) ** 2
-    turning = by_chi.turn / chord_rate(arc, by_chi) if arc.turn > 0.0 else 3.0
+    turning = by_chi.turn / chord_direction_rate(arc, by_chi) if arc.turn > 0.0 else 3.0
     beta = alpha + delta
     sin, cos = math.sin(beta), math.cos(beta)
     moment = force * (x * cos + y * sin)
@@ -147,71 +147,80 @@ def _lying(x: float, y: float, alpha: float, delta: float, length: float, arc: A
 
 
 @compiled
-def _ending(x: float, y: float, alpha: float, delta: float, miss: float, known: Tables, room: Room) -> State:
-    """Phase A: distance and direction of the tip give amplitude and direction at the contact.
+def _tip_state(
+    x: float, y: float, alpha: float, delta: float, miss: float, known: Tables, workspace: Workspace
+) -> State:
+    """State in tip contact (Phase A): distance and direction of the tip give amplitude and direction at the contact.
 
-    Derivatives are right to 1e-8, or to rounding if they may not miss by anything.
+    Derivatives have an error of 1e-8, or of rounding if `miss` is 0.
     """
     larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
-    slack2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
-    if not slack2 >= 0.0:
+    deficit2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
+    if not deficit2 >= 0.0:
         return _NOWHERE
     beta = alpha + delta
     sin, cos = math.sin(beta), math.cos(beta)
     u, v = x * cos + y * sin, y * cos - x * sin
-    lack, tilt = math.sqrt(slack2), max(math.atan2(u, v), 0.0)
-    angle, share, by_angle, by_share = in_polar(known, lack, tilt, AMPLITUDE, room)
-    chi, tilt1, arc, by_chi, by_psi1 = tip_arc(lack, tilt, math.sqrt(max(angle * by_angle, 0.0)), share * by_share)
+    deficit, chord_angle = math.sqrt(deficit2), max(math.atan2(u, v), 0.0)
+    angle, share, by_angle, by_share = in_polar(known, deficit, chord_angle, AMPLITUDE, workspace)
+    chi, epsilon1, arc, by_chi, by_psi1 = tip_arc(
+        deficit, chord_angle, math.sqrt(max(angle * by_angle, 0.0)), share * by_share
+    )
     by_slope, by_distance = math.nan, -math.inf
     if chi > 0.0:
         if miss == 0.0:
-            _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * tilt1) ** 2)
-        angle_x, angle_1, value = chord_rate(arc, by_chi), 1.0 + chord_rate(arc, by_psi1), slack(arc)
-        value_x, value_1 = slack_rate(arc, value, by_chi), slack_rate(arc, value, by_psi1)
+            _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * epsilon1) ** 2)
+        angle_x, angle_1, value = (
+            chord_direction_rate(arc, by_chi),
+            1.0 + chord_direction_rate(arc, by_psi1),
+            chord_deficit(arc),
+        )
+        value_x, value_1 = chord_deficit_rate(arc, value, by_chi), chord_deficit_rate(arc, value, by_psi1)
         det = value_x * angle_1 - value_1 * angle_x
         by_slope = 1.0 - (value_x * (1.0 + by_psi1.turn) - value_1 * by_chi.turn) / det
         by_distance = -0.5 * (angle_1 * by_chi.turn - angle_x * (1.0 + by_psi1.turn)) / det / value
-    force, tip_angle = arc.length * arc.length, beta + 0.5 * math.pi - tilt1
+    force, tip_angle = arc.length * arc.length, beta + 0.5 * math.pi - epsilon1
     return State(tip_angle + arc.turn, force * u, -force * sin, force * cos, 1.0, tip_angle, by_slope, by_distance)
 
 
 @compiled
 def exact_state(scene: Scene, at: Place, tip: bool, miss: float) -> State:
-    """A contact of known phase to rounding; derivatives as in `_ending`."""
+    """State in a contact of known phase, to rounding; derivatives as in `_tip_state`."""
     alpha, delta = math.atan2(at.sin, at.cos), scene.rig.friction_angle
     if tip:
-        return _ending(at.x, at.y, alpha, delta, miss, scene.known, scene.room)
-    length, arc, by_chi = _touch(at.x, at.y, alpha, delta, scene.room)
-    return _lying(at.x, at.y, alpha, delta, length, arc, by_chi)
+        return _tip_state(at.x, at.y, alpha, delta, miss, scene.known, scene.workspace)
+    length, arc, by_chi = _tangential(at.x, at.y, alpha, delta, scene.workspace)
+    return _tangential_state(at.x, at.y, alpha, delta, length, arc, by_chi)
 
 
-@kept
-def wrenches(columns: Floats, known: Tables, room: Room, phase: NDArray[np.int8], out: Floats) -> None:
-    """States, and arc lengths of tangential contact, of contacts seen as forward ones.
+@cached
+def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArray[np.int8], out: Floats) -> None:
+    """Write states, and arc lengths of tangential contact, of contacts mirrored to forward ones.
 
     Parameters
     ----------
     columns : ndarray, shape (n, 4)
         Contact point, slope angle, friction angle.
     phase : ndarray, shape (n,)
-        Known phases; where it is `NONE` it is found, and stored.
+        Known phases; a phase that is `NONE` is determined and stored.
     out : ndarray, shape (n, 9)
+        Fields of `State`, and the arc length of tangential contact.
     """
     prepared = math.nan
     for i in range(columns.shape[0]):
         x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
         if delta != prepared:
-            prepare(known, delta, room)
+            prepare(known, delta, workspace)
             prepared = delta
         out[i] = math.nan
         if phase[i] != TIP:
-            length, arc, by_chi = _touch(x, y, alpha, delta, room)
+            length, arc, by_chi = _tangential(x, y, alpha, delta, workspace)
             out[i, 8] = length
             if phase[i] == TANGENTIAL or length <= 1.0:
-                _store(_lying(x, y, alpha, delta, length, arc, by_chi), out[i])
+                _store(_tangential_state(x, y, alpha, delta, length, arc, by_chi), out[i])
                 phase[i] = TANGENTIAL
         if phase[i] == TIP or (phase[i] == NONE and out[i, 8] > 1.0):
-            ending = _ending(x, y, alpha, delta, 0.0, known, room)
+            ending = _tip_state(x, y, alpha, delta, 0.0, known, workspace)
             _store(ending, out[i])
             phase[i] = NONE if math.isnan(ending.arclength) else TIP
 
@@ -223,7 +232,7 @@ def _store(state: State, out: Floats) -> None:
 
 
 class Found(NamedTuple):
-    """Where a rod touches, seen as a forward contact; NaN where there is no answer. As `Contact`."""
+    """Contact that follows from a base wrench, mirrored to a forward one; NaN where there is none. See `Contact`."""
 
     x: float
     y: float
@@ -235,7 +244,7 @@ class Found(NamedTuple):
 
 @compiled
 def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
-    """Where a rod touches, from what its base feels."""
+    """Contact that follows from a base wrench, without integration or root search; see `contact_from_wrench`."""
     force, modulus = math.sqrt(fx * fx + fy * fy), math.nan
     root = math.sqrt(force)
     beta = math.atan2(-fx, fy)
@@ -245,17 +254,17 @@ def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> F
     complement = (a_cos - b) * (a_cos + b)
     if force > 0.0:
         modulus = a * a + b * b
-    # A force without moment passes through the pivot of a straight rod: it may be anywhere.
+    # A force without moment passes through the pivot of a straight rod: the contact may be anywhere.
     if not (complement > 0.0 and modulus > 0.0 and (b > 0.0 or (b == 0.0 and a < 0.0)) and force < math.inf):
         return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
-    # θ0 = atan2(a, b) is linked to χ by tan χ = cot θ0 / √(1 − m).
+    # θ0 = atan2(a, b) and χ are related by tan χ = cot θ0 / √(1 − m).
     width = a_cos * math.sqrt(modulus)
     cos_chi = a * math.sqrt(complement) / width
     arc = arc_at(b / width, cos_chi, modulus)
     tip_angle = phi0 - arc.turn
     along, across = (arc.length - arc.shortfall) / root, arc.offset / root
     if cos_chi < SHORT_COSINE:
-        # In a rod bent far round, m0 = f u keeps more digits; the rest of the contact lies along the force.
+        # In a strongly bent rod m0 = f u keeps more digits; the other component lies along the force.
         u, v = moment / force, along * (1.0 - 2.0 * modulus) + across * 2.0 * math.sqrt(modulus * complement)
         x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
     else:
@@ -264,9 +273,9 @@ def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> F
     return Found(x, y, beta - delta, arc.length / root, tip_angle, modulus)
 
 
-@kept
+@cached
 def contacts(columns: Floats, out: Floats) -> None:
-    """Where rods touch, from what their bases feel, seen as forward contacts.
+    """Write the contacts that follow from base wrenches, mirrored to forward ones.
 
     Parameters
     ----------
@@ -283,8 +292,8 @@ def contacts(columns: Floats, out: Floats) -> None:
 
 @compiled
 def tabled_state(scene: Scene, at: Place, tip: bool) -> QuickState:
-    """A contact of known phase from tables, for a friction angle of at most `MOST_FRICTION`."""
-    delta, room = scene.rig.friction_angle, scene.room
+    """State in a contact of known phase from tables, for a friction angle of at most `MOST_FRICTION`."""
+    delta, workspace = scene.rig.friction_angle, scene.workspace
     along, across = frame(at)
     sin, cos = at.sin, at.cos
     slope = math.atan2(sin, cos)
@@ -296,24 +305,24 @@ def tabled_state(scene: Scene, at: Place, tip: bool) -> QuickState:
     if across < 0.0 or u < -_BEYOND or (tip and distance2 > 1.0):
         return QuickState(math.nan, math.nan, math.nan, math.nan)
     if tip:
-        lack, tilt = math.sqrt(1.0 - distance2), max(math.atan2(u, v), 0.0)
-        angle, _, force, turn = in_polar(scene.known, lack, tilt, FORCE, room)
+        deficit, chord_angle = math.sqrt(1.0 - distance2), max(math.atan2(u, v), 0.0)
+        angle, _, force, turn = in_polar(scene.known, deficit, chord_angle, FORCE, workspace)
         force *= angle
         drive_angle = slope + delta + 0.5 * math.pi + turn
     else:
         angle = math.atan2(across, along)
         level = min(angle / (0.5 * math.pi + delta), 1.0)
-        force = series(room, FORCE, level) * angle / distance2
-        drive_angle = slope + series(room, TURN, level) * angle
+        force = series(workspace, FORCE, level) * angle / distance2
+        drive_angle = slope + series(workspace, TURN, level) * angle
     return QuickState(drive_angle, force * u, -force * sin, force * cos)
 
 
 @compiled
 def excess(scene: Scene, p: float) -> float:
-    """Arc length that tangential contact takes at a parameter, less that of the rod."""
+    """Arc length of tangential contact at a parameter, less the length of the rod."""
     at, delta = place(scene.outline, p), scene.rig.friction_angle
     if scene.exact:
-        return _touch(at.x, at.y, math.atan2(at.sin, at.cos), delta, scene.room)[0] - 1.0
+        return _tangential(at.x, at.y, math.atan2(at.sin, at.cos), delta, scene.workspace)[0] - 1.0
     along, across = frame(at)
     level = min(math.atan2(max(across, 0.0), along) / (0.5 * math.pi + delta), 1.0)
-    return math.sqrt(at.x * at.x + at.y * at.y) * series(scene.room, STRETCH, level) - 1.0
+    return math.sqrt(at.x * at.x + at.y * at.y) * series(scene.workspace, STRETCH, level) - 1.0

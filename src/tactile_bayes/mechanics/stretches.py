@@ -6,66 +6,66 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.reach import Limits
+from tactile_bayes.mechanics.limits import Limits
 from tactile_bayes.mechanics.series import Nodes, change_of, crossing, tail, value, weighted
 from tactile_bayes.mechanics.states import Scene, excess
 
 __all__ = ["BRIEF", "Accuracy", "Stretch", "along", "along_rate", "cut"]
 
 BRIEF = 1e-6
-"""Share of a path so short that what changes on it may be lost in rounding."""
+"""Share of a path so short that changes on it may be lost in rounding."""
 
 _NOTHING = 1e-13
-"""Share of a path that is no stretch of it."""
+"""Share of a path that is too short for a stretch."""
 
 _SHORT = 1e-3
-"""Way along a contour on which it matters where tables put a change of the phase."""
+"""Distance along a contour within which the error of tables in a change of the phase matters."""
 
 _HALVINGS = 8
-"""How often a piece is halved in search of changes of the phase; where it is not smooth that is never enough."""
+"""Largest number of halvings of a piece in the search for changes of the phase; a kink exhausts them."""
 
 
 class Accuracy(NamedTuple):
-    """How accurately a path is followed."""
+    """Accuracy of a path."""
 
     resolved: float
-    """Share of the change of the drive angle on a stretch by which an interpolant may miss it."""
+    """Tolerated error of an interpolant, as a share of the change of the drive angle on a stretch."""
     sharp: float
-    """Error that the drive angle of an event may have [rad]."""
+    """Tolerated error of the drive angle of an event [rad]."""
     halvings: int
-    """How often a stretch is halved at most; where something is not smooth at its end that is never enough."""
+    """Largest number of halvings of a stretch; a singularity at its end exhausts them."""
     first_step: float
-    """Newton step, as a share of the bracket, after which first contact is taken for found."""
+    """Newton step, as a share of the bracket, at which the search for first contact ends."""
     last_step: float
-    """The same of what is found on a stretch."""
+    """Newton step, as a share of the bracket, at which searches on a stretch end."""
     polished: bool
-    """Whether states at drive angles are solved for, or taken from the series."""
+    """True if states at drive angles are solved for, and not taken from the series."""
 
 
 class Stretch(NamedTuple):
     """A smooth part of a path."""
 
     begin: float
-    """Contour parameter where it begins, the greater one."""
+    """Contour parameter at its beginning, the greater one."""
     end: float
     tip: bool
-    """Whether the tip touches here."""
+    """True in tip contact."""
     rooted: bool
-    """Whether contact begins here with the tip: loads then grow like the square root of the arc since."""
+    """True if contact begins here with the tip: loads then grow like the square root of the arc."""
     halvings: int
     brief: bool
-    """Whether half of the nodes may do."""
+    """True if fewer nodes may suffice."""
 
 
 @compiled
 def along(stretch: Stretch, way: float) -> float:
-    """Contour parameter a way of 0 to 1 along, in which loads are smooth."""
+    """Contour parameter at a position from 0 to 1 in which loads are smooth."""
     return stretch.begin + (stretch.end - stretch.begin) * (way * way if stretch.rooted else way)
 
 
 @compiled
 def along_rate(stretch: Stretch, way: float) -> float:
-    """Its derivative."""
+    """Derivative of `along` by the position."""
     return (stretch.end - stretch.begin) * (2.0 * way if stretch.rooted else 1.0)
 
 
@@ -73,23 +73,23 @@ def along_rate(stretch: Stretch, way: float) -> float:
 def cut(
     scene: Scene, limit: Limits, knots: Floats, accuracy: Accuracy, miss: float, on: Nodes, series: Floats, out: Floats
 ) -> int:
-    """Cut a path at knots, and where tangential contact takes exactly the rod's length.
+    """Cut a path at knots, and at points where tangential contact takes exactly the rod's length.
 
     Parameters
     ----------
     knots : ndarray, shape (k,)
-        Where the contour may not be smooth, decreasing.
+        Parameters at which the contour may not be smooth, decreasing.
     miss : float
-        By how much, in rod lengths, the arc length of tangential contact may be off at most.
+        Tolerated error of the arc length of tangential contact [L].
     series : ndarray, shape (3, order)
-        Room.
+        Workspace.
     out : ndarray, shape (most, 3)
-        Begin and end of every stretch, in the order of the path, and whether the tip touches.
+        Begin and end of every stretch, in the order of the path, and 1 for tip contact.
 
     Returns
     -------
     int
-        How many there are; as many as there is room for, at most.
+        Number of stretches, at most `most`.
     """
     whole, count = limit.begin - limit.end, 0
     begin = limit.begin
@@ -114,7 +114,7 @@ def _cut_piece(
     series: Floats,
     out: Floats,
 ) -> int:
-    """Cut a smooth piece of a contour, in as large parts as polynomials follow the arc length of tangential contact."""
+    """Cut a smooth piece of a contour, in the largest parts on which a polynomial fits the arc length."""
     values, lengths, slope = series[0], series[1], series[2]
     order, least = on.nodes.size, (first - last) * 0.5**_HALVINGS
     begin, end, count = first, last, 0
@@ -137,7 +137,7 @@ def _cut_piece(
 def _cut_smooth(
     scene: Scene, begin: float, end: float, nothing: float, accuracy: Accuracy, on: Nodes, series: Floats, out: Floats
 ) -> int:
-    """Cut where a polynomial changes its sign."""
+    """Cut at the sign changes of a polynomial."""
     values, lengths, slope = series[0], series[1], series[2]
     span, order, started, old, count = end - begin, on.nodes.size, 0.0, 0.0, 0
     beyond = value(lengths, 0.0) > 0.0
@@ -153,7 +153,7 @@ def _cut_smooth(
             change = crossing(lengths, slope, 0.0, left, right, 0.5 * (old + new), accuracy.last_step)
             most = min(change - started, 1.0 - change)
             change = _polished(scene, begin, span, change, most, accuracy.first_step)
-            if abs(span) * (change - started) > nothing:  # else it is rounding where a piece begins
+            if abs(span) * (change - started) > nothing:  # otherwise it is rounding at the beginning of a piece
                 out[count, 0], out[count, 1], out[count, 2] = begin + span * started, begin + span * change, beyond
                 count += 1
             started, beyond = change, not beyond
@@ -164,7 +164,7 @@ def _cut_smooth(
 
 @compiled
 def _nearest_zero(nodes: Floats, values: Floats, k: int) -> float:
-    """Where a parabola through a node and its neighbours is nearest to zero, or the node itself."""
+    """Point at which a parabola through a node and its neighbours is nearest to zero, or the node itself."""
     before, after = nodes[k - 1] - nodes[k], nodes[k + 1] - nodes[k]
     rise, rise_on = values[k - 1] - values[k], values[k + 1] - values[k]
     if not (rise * values[k] > 0.0 and rise_on * values[k] > 0.0):
@@ -175,11 +175,11 @@ def _nearest_zero(nodes: Floats, values: Floats, k: int) -> float:
 
 @compiled
 def _polished(scene: Scene, begin: float, span: float, change: float, most: float, last_step: float) -> float:
-    """A change of the phase beyond the interpolant's answer, by secants until a step is as small as given.
+    """Change of the phase, refined from the interpolant's by secants until a step is small enough.
 
-    The tip may touch on so short a way that a table's error is a large share of it: then there is none.
+    Where tip contact is so short that the error of a table is a large share of it, states are exact.
     """
-    scene = Scene(scene.outline, scene.rig, scene.exact or abs(span) * most < _SHORT, scene.known, scene.room)
+    scene = Scene(scene.outline, scene.rig, scene.exact or abs(span) * most < _SHORT, scene.known, scene.workspace)
     old, now = change + 1e-4 * most, change
     at_old = excess(scene, begin + span * old)
     at_now = excess(scene, begin + span * now)

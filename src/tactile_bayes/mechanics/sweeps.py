@@ -1,4 +1,4 @@
-"""Many sweeps: every lane is one contour as one rod sees it from one pivot, in one direction."""
+"""Many sweeps, each of one rod along one contour, about one pivot and in one direction."""
 
 from __future__ import annotations
 
@@ -10,55 +10,55 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
-from tactile_bayes.mechanics.compiler import compiled, kept
-from tactile_bayes.mechanics.fates import Reach
+from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.limits import clear_angle
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
-from tactile_bayes.mechanics.path import MOST_CHANGES, Work, follow, work
-from tactile_bayes.mechanics.reach import clear_angle
+from tactile_bayes.mechanics.path import MOST_CHANGES, PathWorkspace, follow, path_workspace
+from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
 from tactile_bayes.mechanics.states import Rig, Scene
 from tactile_bayes.mechanics.stretches import Accuracy
-from tactile_bayes.mechanics.tables import MOST_FRICTION, Room, Tables, prepare, room, tables
+from tactile_bayes.mechanics.tables import MOST_FRICTION, Tables, Workspace, prepare, tables, workspace
 
-__all__ = ["Answers", "Lanes", "Shapes", "Strokes", "answered"]
+__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_sweeps"]
 
-_TOUCHES = int(Reach.TOUCHES)
+_TOUCHES = int(Reachability.TOUCHES)
 
 _EXACT = Accuracy(resolved=1e-8, sharp=np.inf, halvings=8, first_step=4e-16, last_step=4e-16, polished=True)
-"""States and events to rounding."""
+"""Accuracy with states and events to rounding."""
 
 _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
-"""Events to rounding, and states from series."""
+"""Accuracy with events to rounding and states from series."""
 
 _FAST = Accuracy(resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, polished=True)
-"""As well as noise asks."""
+"""Accuracy that noise requires."""
 
 _EXACT_ORDER, _FAST_ORDER = 32, 16
-"""Nodes on a stretch."""
+"""Numbers of nodes on a stretch."""
 
 _NEVER_MISSED = np.full(3, np.inf)
 
 
 class Shapes(NamedTuple):
-    """Contours in their own unit of length."""
+    """Contours, in their own unit of length."""
 
     kinds: tuple[int, int]
-    """Of the left and the right half of all of them."""
+    """Kinds of the left and the right half of all contours."""
     halves: Floats
-    """Sizes and shapes of left and right half, and the vertex, shape (n, 6)."""
+    """Size and shape of the left and the right half, and the vertex, shape (n, 6)."""
     tables: Floats
-    """Shape (n, rows, columns), without rows if there are formulas."""
+    """Tables, shape (n, rows, columns), without rows if there are formulas."""
     knots: Floats
-    """Where contours may not be smooth, increasing, shape (n, knots)."""
+    """Parameters at which contours may not be smooth, increasing, shape (n, knots)."""
 
 
-class Lanes(NamedTuple):
-    """Sweeps that are asked for, arrays of shape (lanes,)."""
+class Sweeps(NamedTuple):
+    """Sweeps to solve, as arrays of shape (sweeps,)."""
 
     contour: Index
-    """Which of the contours; loads of a contour's lanes are put together."""
-    stroke: Index
-    """Which of the strokes of samples."""
+    """Index of the contour; the loads of a contour's sweeps are put together."""
+    segment: Index
+    """Index of the sweep segment whose samples are read."""
     base_x: Floats
     base_y: Floats
     length: Floats
@@ -67,35 +67,35 @@ class Lanes(NamedTuple):
     friction_angle: Floats
     compliance: Floats
     offset: Floats
-    """What the encoder reads too much, in the world's sense [rad]."""
+    """Encoder offset in the laboratory frame [rad]."""
     rigidity: Floats
-    """Flexural rigidity over that in the unit of loads."""
+    """Flexural rigidity over the rigidity in the unit of loads."""
 
 
-class Strokes(NamedTuple):
-    """Samples that are seen together lie side by side."""
+class Segments(NamedTuple):
+    """Samples of sweep segments, one segment after the other."""
 
     first: Index
-    """Where the samples of every stroke begin, and at last their number."""
+    """First sample of every segment, and the number of samples at the end."""
     rows: Index
-    """Where what is found of a sample goes."""
+    """Row of the results of each sample."""
     angles: Floats
-    """Drive angles, as read and as seen in forward sweeps, increasing in each stroke."""
+    """Drive angles as read, in the sweep frame, increasing in each segment [rad]."""
     relative: bool = False
-    """Whether they are shares of the way from first contact to snap-off."""
+    """True if they are shares of the drive angle from first contact to snap-off."""
 
 
-class Answers(NamedTuple):
-    """What is found. Drive angles are as seen in forward sweeps; events are of shape (lanes,), NaN where none is."""
+class Solutions(NamedTuple):
+    """Solutions of sweeps. Drive angles are in the sweep frame; events have the shape (sweeps,), NaN without a path."""
 
     loads: Floats
-    """In the world's signs, in EI/L and EI/L² for a rigidity of one, zero out of contact, shape (contours, rows, 3)."""
+    """Loads in the laboratory frame [EI/L, EI/L² for a rigidity of 1], 0 out of contact, shape (contours, rows, 3)."""
     states: Floats
-    """See `Found`, shape (contours, rows or 0, columns)."""
+    """States as in `Found`, shape (contours, rows or 0, columns)."""
     changes: Floats
-    """See `Found`, shape (lanes, phases or 0, 2)."""
+    """Beginnings of phases as in `Found`, shape (sweeps, phases or 0, 2)."""
     phases: Index
-    """How many there are."""
+    """Number of phases."""
     reach: NDArray[np.int8]
     distance: Floats
     first_angle: Floats
@@ -104,26 +104,26 @@ class Answers(NamedTuple):
     snap_parameter: Floats
     snap_off: NDArray[np.int8]
     curvature: Floats
-    """The largest one of the rod up to snap-off [1/L], where states are wanted."""
+    """Largest curvature of the rod up to snap-off [1/L], if states are computed."""
     clear_angle: Floats
-    """From which on the straight rod is clear; NaN if it is not asked."""
+    """Drive angle beyond which the straight rod is clear [rad]; NaN if it is not computed."""
 
 
-_INDICES, _FLAGS, _CODES = ("contour", "stroke", "phases"), ("backward",), ("reach", "snap_off")
+_INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")
 
 
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
-    """Numbers that lie side by side, so that compiled code is handed one array and not one for each name."""
+    """Structured type, so that compiled code takes one array instead of one for each name."""
     kinds = {**dict.fromkeys(_INDICES, np.intp), **dict.fromkeys(_FLAGS, np.bool_), **dict.fromkeys(_CODES, np.int8)}
     return np.dtype([(name, kinds.get(name, np.float64)) for name in names], align=True)
 
 
-_LANE, _EVENTS = _side_by_side(Lanes._fields), _side_by_side(Answers._fields[3:])
+_SWEEP, _EVENTS = _side_by_side(Sweeps._fields), _side_by_side(Solutions._fields[3:])
 
 
 @compiled
 def _half(kind: int, size: float, shape: float, length: float) -> Half:
-    """One in rod lengths."""
+    """Half of a contour in rod lengths."""
     if kind == PARABOLA:
         return Half(kind, size * length, shape, 1.0)
     if kind == OVAL:
@@ -134,9 +134,9 @@ def _half(kind: int, size: float, shape: float, length: float) -> Half:
 
 
 @compiled
-def _outline(shapes: Shapes, lane: Any, table: Floats) -> Outline:
-    """As the rod of a lane sees it; the table is put where there is room for it."""
-    c, length = lane.contour, lane.length
+def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
+    """Contour of a sweep in the sweep frame; its table is written to `table`."""
+    c, length = sweep.contour, sweep.length
     kind, of = shapes.kinds[0], shapes.halves[c]
     left, right = _half(kind, of[0], of[1], length), _half(shapes.kinds[1], of[2], of[3], length)
     if kind in (SLOPES, CELLS):
@@ -144,63 +144,63 @@ def _outline(shapes: Shapes, lane: Any, table: Floats) -> Outline:
         for r in range(table.shape[0]):
             for k in range(table.shape[1]):
                 table[r, k] = shapes.tables[c, r, k] / (length if begin <= k < end else 1.0)
-    x, y = (of[4] - lane.base_x) / length, (of[5] - lane.base_y) / length
+    x, y = (of[4] - sweep.base_x) / length, (of[5] - sweep.base_y) / length
     low = -left.size if kind == SLOPES else left.size
-    outline = Outline(left, right, low, right.size, 1.0, x, y, lane.standoff / length, table)
-    return mirrored(outline) if lane.backward else outline
+    outline = Outline(left, right, low, right.size, 1.0, x, y, sweep.standoff / length, table)
+    return mirrored(outline) if sweep.backward else outline
 
 
-@kept
-def _sweep(
+@cached
+def _solve(
     shapes: Shapes,
-    lanes: Any,
-    strokes: Strokes,
+    sweeps: Any,
+    segments: Segments,
     exact: bool,
     accuracy: Accuracy,
     tolerance: Floats,
     asks_clearance: bool,
     known: Tables,
-    states: Room,
-    room: Work,
+    states: Workspace,
+    workspace: PathWorkspace,
     table: Floats,
     loads: Floats,
     all_states: Floats,
     changes: Floats,
     events: Any,
 ) -> None:
-    """Follow the path of every lane, and put what its samples feel into the answers.
+    """Follow the path of every sweep, and write the results of its samples.
 
     Parameters
     ----------
-    lanes : ndarray, shape (lanes,)
-        As in `Lanes`, side by side.
+    sweeps : structured ndarray, shape (sweeps,)
+        Fields as in `Sweeps`.
     exact : bool
-        Whether states are computed to rounding, also where there are tables.
+        Whether states are computed to rounding, even where there are tables.
     tolerance : ndarray, shape (3,)
-        By how much loads may miss, of moment and forces [EI/L and EI/L²].
-    states, room
-        Room for one state, and for one path.
+        Tolerated errors of moment and forces [EI/L and EI/L²].
+    states, workspace
+        Workspaces for one state, and for one path.
     table : ndarray, shape (rows, columns)
-        Room for the table of one contour.
+        Workspace for the table of one contour.
     loads, all_states, changes, events
-        As in `Answers`, the events side by side.
+        As in `Solutions`; the events are a structured array.
     """
-    count, knots, prepared = shapes.knots.shape[1], room.knots, math.nan
-    for i in range(lanes.size):
-        lane, event = lanes[i], events[i]
-        outline = _outline(shapes, lane, table)
-        c, sign = lane.contour, -1.0 if lane.backward else 1.0
+    count, knots, prepared = shapes.knots.shape[1], workspace.knots, math.nan
+    for i in range(sweeps.size):
+        sweep, event = sweeps[i], events[i]
+        outline = _outline(shapes, sweep, table)
+        c, sign = sweep.contour, -1.0 if sweep.backward else 1.0
         for k in range(count):
-            knots[k] = -shapes.knots[c, k] if lane.backward else shapes.knots[c, count - 1 - k]
-        first, last = strokes.first[lane.stroke], strokes.first[lane.stroke + 1]
-        samples = Samples(strokes.angles[first:last], strokes.rows[first:last], strokes.relative)
-        if lane.friction_angle != prepared:
-            prepared = lane.friction_angle
+            knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
+        first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
+        samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
+        if sweep.friction_angle != prepared:
+            prepared = sweep.friction_angle
             prepare(known, prepared, states)
-        rig = Rig(lane.friction_angle, lane.compliance, sign * lane.offset, sign, lane.rigidity)
+        rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
         found = Found(loads[c], all_states[c], changes[i])
         scene = Scene(outline, rig, exact or prepared > MOST_FRICTION, known, states)
-        ends = follow(scene, knots, samples, accuracy, tolerance, room, found)
+        ends = follow(scene, knots, samples, accuracy, tolerance, workspace, found)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
         event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
@@ -210,63 +210,64 @@ def _sweep(
             event.clear_angle = clear_angle(outline, accuracy.first_step)
 
 
-def answered(
+def solve_sweeps(
     shapes: Shapes,
-    lanes: Lanes,
-    strokes: Strokes,
+    sweeps: Sweeps,
+    segments: Segments,
     shape: tuple[int, int],
     *,
     tolerance: Floats | None = None,
     states: bool = False,
     polished: bool = True,
     asks_clearance: bool = True,
-) -> Answers:
-    """Follow paths, and tell what samples feel.
+) -> Solutions:
+    """Follow the paths of sweeps, and compute loads and states of their samples.
 
     Parameters
     ----------
     shapes : Shapes
-    lanes : Lanes
-    strokes : Strokes
+    sweeps : Sweeps
+    segments : Segments
     shape : (int, int)
-        How many contours, and rows for each.
+        Number of contours, and of rows for each.
     tolerance : ndarray, shape (3,), optional
-        By how much loads may miss, of moment and forces [EI/L and EI/L²]; by default events are exact, and loads right
-        to some 1e-8 of the largest.
+        Tolerated errors of moment and forces [EI/L and EI/L²]; by default events are exact, and loads have errors of
+        some 1e-8 of the largest.
     states : bool
-        Whether states are wanted.
+        Whether states are computed.
     polished : bool
-        Whether they are exact; or else as good as series, 1e-10 of the largest, and without derivatives.
+        Whether they are exact. Otherwise they come from the series, with an error of 1e-10 of the largest and without
+        derivatives.
     asks_clearance : bool
-        Whether it is asked from which angle on the straight rod is clear.
+        Whether `clear_angle` is computed.
     """
     accuracy, order = _FAST, _FAST_ORDER
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     count, rows = shape
-    lane = np.empty(lanes.contour.size, dtype=_LANE)
-    for name, values in zip(Lanes._fields, lanes, strict=True):
-        lane[name] = values
+    sweep = np.empty(sweeps.contour.size, dtype=_SWEEP)
+    for name, values in zip(Sweeps._fields, sweeps, strict=True):
+        sweep[name] = values
     loads = np.zeros((count, rows, 3))
     all_states = np.zeros((count, rows if states else 0, STATE_COLUMNS))
-    changes = np.empty((lane.size, MOST_CHANGES if states else 0, 2))
-    events = np.empty(lane.size, dtype=_EVENTS)
-    longest = int(np.diff(strokes.first).max(initial=0))
-    _sweep(
+    changes = np.empty((sweep.size, MOST_CHANGES if states else 0, 2))
+    events = np.empty(sweep.size, dtype=_EVENTS)
+    longest = int(np.diff(segments.first).max(initial=0))
+    _solve(
         shapes,
-        lane,
-        strokes,
+        sweep,
+        segments,
         tolerance is None,
         accuracy,
         _NEVER_MISSED if tolerance is None else tolerance,
         asks_clearance,
         tables(),
-        room(),
-        work(longest, order, shapes.knots.shape[1]),
+        workspace(),
+        path_workspace(longest, order, shapes.knots.shape[1]),
         np.empty(shapes.tables.shape[1:]),
         loads,
         all_states,
         changes,
         events,
     )
-    return Answers(loads, all_states, changes, *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ()))
+    return Solutions(loads, all_states, changes, *(np.ascontiguousarray(events[name]) for name in _EVENTS.names or ()))

@@ -1,10 +1,10 @@
-"""Chebyshev tables of the two maps of a straight rod in contact: how its ends lie → force, turn and where to look.
+"""Chebyshev tables of the two maps of a straight rod in contact: position of its ends → force, turn, and first guesses.
 
-In tangential contact they are series in the angle of the chord over the contour's tangent, as a share of the largest
-one, and in the friction angle; in tip contact in polar coordinates of (tilt, lack): the angle, and the radius as a
-share of the largest one. What makes a quantity vanish at first contact is divided out. Toward where the maps fold they
-are divided into cells, so that few terms serve everywhere: loads and drive angles are right to 5e-8 (`tests/`). Tables
-are made once a process, from exact arcs, in a few milliseconds.
+In tangential contact they are series in the angle of the chord to the contour's tangent, as a share of the largest
+angle, and in the friction angle. In tip contact they are series in polar coordinates of (chord angle, chord deficit):
+the polar angle, and the radius as a share of the largest radius. Factors that vanish at first contact are divided out.
+Cells become smaller toward the folds of the maps, so that few terms suffice everywhere: loads and drive angles have
+errors of 5e-8 (`tests/`). Tables are computed once a process, from exact arcs, in a few milliseconds.
 """
 
 from __future__ import annotations
@@ -16,97 +16,104 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.arc import arc_to, chord_angle, slack
+from tactile_bayes.mechanics.arc import arc_to, chord_deficit, chord_direction
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
-from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "AMPLITUDE",
+    "EPSILON1",
     "FORCE",
     "MOST_FRICTION",
     "STRETCH",
-    "TILT",
     "TURN",
-    "Room",
     "Tables",
+    "Workspace",
     "in_polar",
     "prepare",
-    "room",
     "series",
     "tables",
+    "workspace",
 ]
 
 MOST_FRICTION = 0.58
-"""Friction angle up to which there are tables [rad]: the nearer to where the map folds, the longer their series."""
+"""Largest friction angle of the tables [rad]: nearer to the fold of the map the series would be longer."""
 
-FORCE, TURN, AMPLITUDE, STRETCH, TILT = 0, 1, 2, 3, 3
-"""What tables hold. Tangential contact: force times the square of the chord, turn, and χ², all over the angle; arc
+FORCE, TURN, AMPLITUDE, STRETCH, EPSILON1 = 0, 1, 2, 3, 3
+"""Tabulated quantities. Tangential contact: force times the square of the chord, turn, and χ², all over the angle; arc
 length over chord. Tip contact: force over the angle, turn less ε1, χ² over the angle, ε1 over the share."""
 
 _TERMS = 10
-"""Of each series in a cell of tip contact, over angle and share."""
+"""Terms of each series in a cell of tip contact, in angle and in share."""
 
 _ANGLES = np.array([0.0, 0.1, 0.25, 0.45, 0.6, 0.75, 0.9, 1.0])
-"""Where cells of tip contact begin and end, shares of the right angle."""
+"""Ends of the cells of tip contact, as shares of the right angle."""
 
 _SHARES = np.array([0.0, 0.5, 0.75, 0.9, 0.97, 0.993, 1.0])
-"""And shares of the largest radius."""
+"""Ends of the cells of tip contact, as shares of the largest radius."""
 
-_LYING = 12, 20
-"""Terms of a cell in tangential contact, over the angle, and over the friction angle."""
+_TANGENTIAL_TERMS = 12, 20
+"""Terms of a cell in tangential contact, in the angle and in the friction angle."""
 
 _LEVELS = np.array([0.0, 0.45, 0.65, 0.82, 1.0])
-"""Where these cells begin and end, shares of the largest angle."""
+"""Ends of the cells of tangential contact, as shares of the largest angle."""
 
 _MARGIN = 0.02
-"""By how much ε1 of tables exceeds that of tangential contact."""
+"""Excess of the largest ε1 of the tables over ε1 of tangential contact [rad]."""
 
 _CHI_MAX = 3.2
 
 
 class Tables(NamedTuple):
-    """All of them."""
+    """Coefficients of all tables."""
 
-    lying: Floats
+    tangential: Floats
     """Tangential contact, shape (4, friction angles, cells, terms)."""
     radius: Floats
-    """The largest one in tip contact, over the angle, shape (angles, terms)."""
+    """Largest radius in tip contact in the angle, shape (angles, terms)."""
     tip: Floats
-    """Tip contact: what is tabulated side by side, so that one loop runs over all, shape (angles, shares, terms over
-    the share, 4 · terms over the angle)."""
+    """Tip contact: the tabulated quantities side by side, for one loop over all, shape (angles, shares, terms in the
+    share, 4 · terms in the angle)."""
 
 
-class Room(NamedTuple):
-    """Where a state is put together, for one friction angle."""
+class Workspace(NamedTuple):
+    """Workspace for one state, with the series for one friction angle."""
 
-    lying: Floats
-    """Series of tangential contact over the angle, shape (4, cells, terms)."""
+    tangential: Floats
+    """Series of tangential contact in the angle, shape (4, cells, terms)."""
     by_angle: Floats
     by_share: Floats
     row: Floats
-    """Two series over the angle, one after the other."""
+    """Two series in the angle, one after the other."""
 
 
-def room() -> Room:
+def workspace() -> Workspace:
     by_angle, by_share = np.empty((2, _TERMS))
-    row, lying = np.empty(max(2 * _TERMS, _LYING[1])), np.empty((4, _LEVELS.size - 1, _LYING[0]))
-    return Room(lying, by_angle, by_share, row)
+    row, tangential = (
+        np.empty(max(2 * _TERMS, _TANGENTIAL_TERMS[1])),
+        np.empty((4, _LEVELS.size - 1, _TANGENTIAL_TERMS[0])),
+    )
+    return Workspace(tangential, by_angle, by_share, row)
 
 
 @functools.cache
 def tables() -> Tables:
     """Tables for any friction angle up to `MOST_FRICTION`."""
-    angles, shares, levels = _in_cells(_ANGLES, _TERMS), _in_cells(_SHARES, _TERMS), _in_cells(_LEVELS, _LYING[0])
+    angles, shares, levels = (
+        _in_cells(_ANGLES, _TERMS),
+        _in_cells(_SHARES, _TERMS),
+        _in_cells(_LEVELS, _TANGENTIAL_TERMS[0]),
+    )
     radius, tip = np.empty(angles.size), np.empty((4, angles.size, shares.size))
-    _tips_on(0.5 * np.pi * angles.ravel(), shares.ravel(), 0.5 * np.pi + _MARGIN + MOST_FRICTION, radius, tip)
+    _tabulate_tip(0.5 * np.pi * angles.ravel(), shares.ravel(), 0.5 * np.pi + _MARGIN + MOST_FRICTION, radius, tip)
     by_share = chebyshev.coefficients(tip.reshape(4, *angles.shape, *shares.shape))
     by_both = chebyshev.coefficients(by_share.swapaxes(-1, -2)).transpose(3, 4, 1, 2, 0)
-    lying = np.empty((4, levels.size, _LYING[1]))
-    _lying_on(levels.ravel(), MOST_FRICTION * chebyshev.nodes(_LYING[1]), lying)
-    by_friction = chebyshev.coefficients(lying.reshape(4, *levels.shape, -1))
+    tangential = np.empty((4, levels.size, _TANGENTIAL_TERMS[1]))
+    _tabulate_tangential(levels.ravel(), MOST_FRICTION * chebyshev.nodes(_TANGENTIAL_TERMS[1]), tangential)
+    by_friction = chebyshev.coefficients(tangential.reshape(4, *levels.shape, -1))
     return Tables(
-        lying=np.ascontiguousarray(chebyshev.coefficients(by_friction).transpose(2, 1, 3, 0)),
+        tangential=np.ascontiguousarray(chebyshev.coefficients(by_friction).transpose(2, 1, 3, 0)),
         radius=np.ascontiguousarray(chebyshev.coefficients(radius.reshape(angles.shape)).T),
         tip=by_both.reshape(*by_both.shape[:3], -1),
     )
@@ -117,8 +124,8 @@ def _in_cells(ends: Floats, terms: int) -> Floats:
     return np.asarray(ends[:-1, None] + np.diff(ends)[:, None] * chebyshev.nodes(terms))
 
 
-@kept
-def _lying_on(levels: Floats, deltas: Floats, out: Floats) -> None:
+@cached
+def _tabulate_tangential(levels: Floats, deltas: Floats, out: Floats) -> None:
     for j in range(deltas.size):
         m, largest = 0.5 * (1.0 + math.sin(deltas[j])), 0.5 * math.pi + deltas[j]
         for i in range(levels.size):
@@ -130,9 +137,9 @@ def _lying_on(levels: Floats, deltas: Floats, out: Floats) -> None:
             out[AMPLITUDE, i, j], out[STRETCH, i, j] = chi * chi / angle, arc.length / chord
 
 
-@kept
-def _tips_on(angles: Floats, shares: Floats, largest: float, radius: Floats, out: Floats) -> None:
-    """Largest radius at every angle, where ε1 is the largest, and into `out` what is tabulated, shape (4, angles,
+@cached
+def _tabulate_tip(angles: Floats, shares: Floats, largest: float, radius: Floats, out: Floats) -> None:
+    """Write the largest radius at every angle, at the largest ε1, and the tabulated quantities, shape (4, angles,
     shares)."""
     m = math.sin(0.5 * largest) ** 2
     for i in range(angles.size):
@@ -140,37 +147,40 @@ def _tips_on(angles: Floats, shares: Floats, largest: float, radius: Floats, out
         for _ in range(60):
             chi = 0.5 * (low + high)
             arc, _ = arc_to(chi, m)
-            lack, tilt = slack(arc), largest - chord_angle(arc)
-            if math.atan2(lack, tilt) > angles[i]:
+            deficit, chord_angle = chord_deficit(arc), largest - chord_direction(arc)
+            if math.atan2(deficit, chord_angle) > angles[i]:
                 high = chi
             else:
                 low = chi
-        radius[i] = math.hypot(lack, tilt)
-        chi, tilt1 = low, largest
+        radius[i] = math.hypot(deficit, chord_angle)
+        chi, epsilon1 = low, largest
         for j in range(shares.size - 1, -1, -1):
-            lack, tilt = math.sin(angles[i]) * radius[i] * shares[j], math.cos(angles[i]) * radius[i] * shares[j]
-            chi, tilt1, arc, _, _ = tip_arc(lack, tilt, chi, tilt1)
-            out[FORCE, i, j], out[TURN, i, j] = arc.length * arc.length / angles[i], arc.turn - tilt1
-            out[AMPLITUDE, i, j], out[TILT, i, j] = chi * chi / angles[i], tilt1 / shares[j]
+            deficit, chord_angle = (
+                math.sin(angles[i]) * radius[i] * shares[j],
+                math.cos(angles[i]) * radius[i] * shares[j],
+            )
+            chi, epsilon1, arc, _, _ = tip_arc(deficit, chord_angle, chi, epsilon1)
+            out[FORCE, i, j], out[TURN, i, j] = arc.length * arc.length / angles[i], arc.turn - epsilon1
+            out[AMPLITUDE, i, j], out[EPSILON1, i, j] = chi * chi / angles[i], epsilon1 / shares[j]
 
 
 @compiled
-def prepare(known: Tables, friction_angle: float, room: Room) -> None:
-    """Series of tangential contact at a friction angle, into the room."""
-    frictions = known.lying.shape[1]
-    _polynomials(min(friction_angle / MOST_FRICTION, 1.0), frictions, room.row)
-    room.lying[:] = 0.0
+def prepare(known: Tables, friction_angle: float, workspace: Workspace) -> None:
+    """Write the series of tangential contact at a friction angle to the workspace."""
+    frictions = known.tangential.shape[1]
+    _polynomials(min(friction_angle / MOST_FRICTION, 1.0), frictions, workspace.row)
+    workspace.tangential[:] = 0.0
     for k in range(4):
         for j in range(frictions):
-            weight = room.row[j]
-            for c in range(room.lying.shape[1]):
-                for i in range(room.lying.shape[2]):
-                    room.lying[k, c, i] += weight * known.lying[k, j, c, i]
+            weight = workspace.row[j]
+            for c in range(workspace.tangential.shape[1]):
+                for i in range(workspace.tangential.shape[2]):
+                    workspace.tangential[k, c, i] += weight * known.tangential[k, j, c, i]
 
 
 @compiled
 def _cell(ends: Floats, z: float) -> tuple[int, float]:
-    """In which cell one is, and where in it."""
+    """Index of the cell of a number, and its position in the cell."""
     cell = 0
     for k in range(1, ends.size - 1):
         cell += z > ends[k]
@@ -178,14 +188,14 @@ def _cell(ends: Floats, z: float) -> tuple[int, float]:
 
 
 @compiled
-def series(room: Room, k: int, level: float) -> float:
-    """What is tabulated of tangential contact at a share of the largest angle, by Clenshaw's recurrence."""
+def series(workspace: Workspace, k: int, level: float) -> float:
+    """Tabulated quantity k of tangential contact at a share of the largest angle, by Clenshaw's recurrence."""
     cell, z = _cell(_LEVELS, level)
     twice = 4.0 * z - 2.0
     now, before = 0.0, 0.0
-    for i in range(room.lying.shape[2] - 1, 0, -1):
-        now, before = (room.lying[k, cell, i] - before) + twice * now, now
-    return (room.lying[k, cell, 0] - before) + 0.5 * twice * now
+    for i in range(workspace.tangential.shape[2] - 1, 0, -1):
+        now, before = (workspace.tangential[k, cell, i] - before) + twice * now, now
+    return (workspace.tangential[k, cell, 0] - before) + 0.5 * twice * now
 
 
 @compiled
@@ -198,27 +208,29 @@ def _polynomials(z: float, size: int, out: Floats) -> None:
 
 
 @compiled
-def in_polar(known: Tables, lack: float, tilt: float, first: int, room: Room) -> tuple[float, float, float, float]:
-    """Angle, share of the largest radius, and two of what is tabulated there, from the first on."""
+def in_polar(
+    known: Tables, deficit: float, chord_angle: float, first: int, workspace: Workspace
+) -> tuple[float, float, float, float]:
+    """Polar angle, share of the largest radius, and two tabulated quantities there, beginning with `first`."""
     terms = _TERMS
-    angle = math.atan2(lack, tilt)
+    angle = math.atan2(deficit, chord_angle)
     i, z = _cell(_ANGLES, angle / (0.5 * math.pi))
-    _polynomials(z, terms, room.by_angle)
+    _polynomials(z, terms, workspace.by_angle)
     largest = 0.0
     for a in range(terms):
-        largest += known.radius[i, a] * room.by_angle[a]
-    share = min(math.sqrt(lack * lack + tilt * tilt) / largest, 1.0)
+        largest += known.radius[i, a] * workspace.by_angle[a]
+    share = min(math.sqrt(deficit * deficit + chord_angle * chord_angle) / largest, 1.0)
     j, z = _cell(_SHARES, share)
-    _polynomials(z, terms, room.by_share)
+    _polynomials(z, terms, workspace.by_share)
     begin = first * terms
     for a in range(2 * terms):
-        room.row[a] = 0.0
+        workspace.row[a] = 0.0
     for s in range(terms):
-        weight = room.by_share[s]
+        weight = workspace.by_share[s]
         for a in range(2 * terms):
-            room.row[a] += weight * known.tip[i, j, s, begin + a]
+            workspace.row[a] += weight * known.tip[i, j, s, begin + a]
     one, other = 0.0, 0.0
     for a in range(terms):
-        one += room.row[a] * room.by_angle[a]
-        other += room.row[terms + a] * room.by_angle[a]
+        one += workspace.row[a] * workspace.by_angle[a]
+        other += workspace.row[terms + a] * workspace.by_angle[a]
     return angle, share, one, other

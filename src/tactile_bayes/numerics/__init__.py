@@ -1,1 +1,1 @@
-"""Numerical methods that know nothing of rods: Chebyshev series, roots, differences, blocks of points."""
+"""General numerical methods: Chebyshev series, roots, differences, blocks of points."""

@@ -1,4 +1,4 @@
-"""Blocks: many points, but no more of them at a time than memory should hold."""
+"""Blocks of points, to limit the memory of a computation on many of them."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from numpy.typing import NDArray
 __all__ = ["blocks"]
 
 _MOST = 2_000_000
-"""Numbers in one array of a block: 16 MB, of which a few are alive at a time."""
+"""Largest number of entries in one array of a block: 16 MB, of which a few exist at a time."""
 
 
 def blocks(points: int, numbers: int, largest: int | None = None) -> list[NDArray[np.intp]]:
-    """Indices of points in blocks of about equal size.
+    """Split the indices of points into blocks of about equal size.
 
     Parameters
     ----------
     points : int
-        How many there are.
+        Number of points.
     numbers : int
-        Of each point, in the largest array that is made of it.
+        Numbers for each point in the largest array of the computation.
     largest : int, optional
-        Points in a block, whatever their numbers.
+        Largest number of points in a block.
 
     Returns
     -------
-    list of ndarray
-        At least one, which is empty if there are no points.
+    list of ndarray of int, shape (n_block,)
+        At least one block, which is empty if there are no points.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Chebyshev interpolation on [0, 1], many functions at once."""
+"""Chebyshev interpolation on [0, 1] of many functions at once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = [
 
 @functools.cache
 def nodes(count: int) -> Floats:
-    """The roots of the Chebyshev polynomial of degree `count`, increasing, in (0, 1)."""
+    """Roots of the Chebyshev polynomial of degree `count` on [0, 1], increasing."""
     return 0.5 * (1.0 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
 
 
@@ -43,24 +43,24 @@ def coefficients(values: Floats) -> Floats:
 
 
 def evaluate(coefficients: Floats, z: Floats) -> Floats:
-    """Interpolants at z, which broadcasts against the trailing axes of the coefficients."""
+    """Values of interpolants at z, which broadcasts with the trailing axes of the coefficients."""
     at, dimensions = basis(coefficients.shape[0], z), max(coefficients.ndim - 1, z.ndim)
     each, at = (a.reshape(a.shape[0], *(1,) * (dimensions + 1 - a.ndim), *a.shape[1:]) for a in (coefficients, at))
     return np.asarray((each * at).sum(axis=0))
 
 
 def tabulate(coefficients: Floats, z: Floats) -> Floats:
-    """All interpolants at the same points z, shape (k,): an array of shape (…, k)."""
+    """Values of all interpolants at the same points z, shape (k,), as an array of shape (…, k)."""
     return np.moveaxis(np.tensordot(polynomials(coefficients.shape[0], z), coefficients, 1), 0, -1)
 
 
 def polynomials(count: int, z: Floats) -> Floats:
-    """The first `count` Chebyshev polynomials on [0, 1] at z, along a new last axis."""
+    """Values of the first `count` Chebyshev polynomials on [0, 1] at z, along a new last axis."""
     return np.moveaxis(basis(count, z), 0, -1)
 
 
 def basis(count: int, z: Floats) -> Floats:
-    """The first `count` Chebyshev polynomials on [0, 1] at z, along a new first axis, one after the other in memory."""
+    """Values of the first `count` Chebyshev polynomials on [0, 1] at z, contiguous along a new first axis."""
     out = np.empty((count, *z.shape))
     x = 2.0 * z - 1.0
     out[0] = 1.0
@@ -83,14 +83,14 @@ def _slopes(count: int) -> Floats:
 
 
 def with_slope(coefficients: Floats) -> Floats:
-    """Of interpolants, shape (count, n), and of their derivatives side by side, shape (count, 2, n)."""
+    """Coefficients of interpolants, shape (count, n), and of their derivatives side by side, shape (count, 2, n)."""
     both = np.zeros((coefficients.shape[0], 2, coefficients.shape[1]))
     both[:, 0], both[:-1, 1] = coefficients, derivative(coefficients)
     return both
 
 
 def value_and_slope(both: Floats, z: Floats) -> tuple[Floats, Floats]:
-    """Of what `with_slope` has put side by side, each at its own z, shape (n,)."""
+    """Values and derivatives from the coefficients of `with_slope`, each at its own z, shape (n,)."""
     value, slope = evaluate(both, z)
     return value, slope
 

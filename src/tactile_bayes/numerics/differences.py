@@ -1,4 +1,4 @@
-"""Slopes of what a record would show, by differences; samples at a snap-off jump."""
+"""Derivatives of predicted readings by differences; samples at a snap-off jump."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from tactile_bayes.arrays import Floats
 __all__ = ["central_slopes"]
 
 _JUMP = 0.01
-"""Bend of a value over a step, in its unit, from which on it may be a jump."""
+"""Second difference of a value over a step, in its unit, above which it may be a jump."""
 
 
 def central_slopes(values: Callable[[Floats], Floats], point: Floats, steps: Floats | float) -> Floats:
-    """Derivatives of values by central differences, zero where a value jumps.
+    """Derivatives of values by central differences; zero where a value jumps.
 
-    A sample at a snap-off that lets go on one side of the point and not on the other jumps from there to here: that is
-    no slope, but the end of a contour's being possible.
+    A sample near snap-off may be in contact on one side of the point and released on the other. Its value then jumps;
+    this is not a slope but a limit of the possible contours.
 
     Parameters
     ----------
     values : callable
-        From points (n, d) to values (n, k), in standard deviations of what they are compared with.
+        Maps points (n, d) to values (n, k), in standard deviations of the data.
     point : ndarray, shape (d,)
+        Point at which derivatives are taken.
     steps : ndarray, shape (d,), or float
-        Not too small where values are interpolated.
+        Steps of the differences; not too small if values are interpolated.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Roots of many monotone functions at once."""
+"""Roots of many monotonic functions at once."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tactile_bayes.arrays import Floats, Index
 __all__ = ["ROUNDING", "falling_root"]
 
 ROUNDING = 1e-14
-"""Step, as a share of the bracket, that is rounding."""
+"""Step, as a share of the bracket, at the level of rounding."""
 
 
 def falling_root(
@@ -22,19 +22,18 @@ def falling_root(
     *,
     last_step: float = ROUNDING,
 ) -> Floats:
-    """Where functions that are positive at `lo` and not positive at `hi` change sign: Newton kept in its bracket.
+    """Roots of functions that are positive at `lo` and not positive at `hi`, by Newton's method within the bracket.
 
     Parameters
     ----------
     function : callable
-        From indices (which of the functions) and arguments to values and derivatives.
+        Maps indices of functions and arguments to values and derivatives, each of shape (k,).
     lo, hi : ndarray, shape (n,)
-        `lo` may be greater than `hi`.
+        Bracket; `lo` may be greater than `hi`.
     start : ndarray, shape (n,), optional
-        First guess, between them; by default the middle.
+        First guess in the bracket; by default its middle.
     last_step : float
-        Step, as a share of the bracket, after which no further one is made. What is still missing then is of the order
-        of its square.
+        Step, as a share of the bracket, at which the iteration ends. The remaining error is of the order of its square.
 
     Returns
     -------
@@ -52,7 +51,7 @@ def falling_root(
             positive = value > 0.0
             lo, hi = np.where(positive, x, lo), np.where(positive, hi, x)
             new = x - value / slope
-            # Steps that do not shrink by half go round in circles, for instance about a kink.
+            # Steps that do not shrink by half may cycle, for instance about a kink.
             trusted = ((new - lo) * (new - hi) <= 0.0) & (np.abs(new - x) <= 0.5 * before)
             new = np.where(trusted, new, np.where(value == 0.0, x, 0.5 * (lo + hi)))
             step = np.abs(new - x)

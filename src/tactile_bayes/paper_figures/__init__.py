@@ -1,6 +1,6 @@
 """Figures 2 to 11 of Merker et al. 2018 (doi 10.1155/2018/1613945), each computed anew.
 
-`figure` makes one, `draw_all` writes them to files. They take the look of `plotting.style`, which `draw_all` applies.
+`figure` makes a figure, `draw_all` writes figures to files in a look of `plotting.style`.
 """
 
 from tactile_bayes.paper_figures.catalogue import NUMBERS, caption, figure

@@ -1,4 +1,4 @@
-"""Which figures there are: their numbers, captions and usual distances."""
+"""The catalogue of figures: numbers, captions and default distances."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class _Entry(NamedTuple):
     words: str
     """A caption, without distances."""
     distances: tuple[float, ...]
-    """By default."""
+    """Default distances q [L]."""
 
 
 def _observables(profile: Profile) -> _Entry:
@@ -66,7 +66,7 @@ _ENTRIES: Mapping[int, _Entry] = {
 }
 
 NUMBERS = tuple(_ENTRIES)
-"""Of the figures, in order."""
+"""Numbers of the figures, in order."""
 
 
 def figure(
@@ -79,40 +79,40 @@ def figure(
     seed: int = 1,
     width: float = PAGE_WIDTH,
 ) -> Figure:
-    """A figure of Merker et al. 2018 (doi 10.1155/2018/1613945), computed anew.
+    """Draw a figure of Merker et al. 2018 (doi 10.1155/2018/1613945), computed anew.
 
-    Figure 2 explains tip and tangential contact. Figures 3 to 6 are moment and forces over the drive angle for profiles
-    I to IV, 7 to 10 the deformed rods, and 11 the contact points that Step 2 reconstructs from these records. The sweep
-    of profile I is shown forward; that of the others forward and backward.
+    Figure 2 explains tip and tangential contact. Figures 3 to 6 show moment and forces over the drive angle for
+    profiles I to IV, Figures 7 to 10 the deformed rods, and Figure 11 the contact points that Step 2 reconstructs from
+    these records. Profile I is swept forward; the others are swept forward and backward.
 
     Parameters
     ----------
     number : int
-        From 2 to 11.
+        Number of the figure, from 2 to 11.
     distances : sequence of float, optional
-        Of the profile's vertex above the pivot, q [L]. By default 0.5 in Figure 2 (of several the first at which a
-        phase occurs); 0.3, 0.4, 0.5 and 0.6 in Figures 3 to 6; 0.4 and 0.6 in Figures 7 to 10; 0.3 and 0.6 in
+        Distances of the profile's vertex above the pivot, q [L]. By default 0.5 in Figure 2 (of several the first at
+        which a phase occurs); 0.3, 0.4, 0.5 and 0.6 in Figures 3 to 6; 0.4 and 0.6 in Figures 7 to 10; 0.3 and 0.6 in
         Figure 11.
     drive_step : float
         Step of the drive [rad], at most 0.5.
     rods : int
-        How many are drawn of a sweep in Figures 7 to 10, first contact, phase changes and snap-off not counted.
+        Number of rods drawn of a sweep in Figures 7 to 10, except those at first contact, phase changes and snap-off.
     load_cell : LoadCell, optional
-        Measures the records of Figure 11, which else are without noise.
+        Load cell that measures the records of Figure 11; by default they are without noise.
     seed : int
-        Of the load cell's noise.
+        Seed of the load cell's noise.
     width : float
-        Of the figure [inches]: 7 for a page, 3.5 for a column, where panels stand below one another.
+        Width of the figure [inches]: 7 for a page, 3.5 for a column, with panels below one another.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Unknown to pyplot. It has the look of the settings that hold while it is made and saved: see `plotting.style`.
+        Figure outside pyplot. Its look follows the settings while it is made and saved: see `plotting.style`.
 
     Raises
     ------
     ParameterError
-        If there is no such figure, or an argument is none that is offered.
+        If there is no such figure, or an argument is not valid.
     ContourError
         If a distance is beyond the rod's reach.
 
@@ -130,7 +130,7 @@ def figure(
 
 
 def caption(number: int, **options: Any) -> str:
-    """What a figure shows, in a sentence; options are those of `figure`.
+    """Return the caption of a figure; options are those of `figure`.
 
     Raises
     ------

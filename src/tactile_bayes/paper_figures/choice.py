@@ -1,4 +1,4 @@
-"""What can be chosen of a figure, and the scans that it is drawn from."""
+"""The options of a figure, and the scans from which it is drawn."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ Limits = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Choice:
-    """What a figure is drawn with.
+    """Options of a figure.
 
     Attributes
     ----------
     distances : tuple of float
-        Of the vertex above the pivot, increasing [L].
+        Distances of the vertex above the pivot, increasing [L].
     drive_step : float
-        [rad].
+        Step of the drive [rad].
     rods : int
-        Drawn at most in one sweep.
+        Largest number of rods drawn in one sweep.
     load_cell : LoadCell or None
-        Whose noise reconstructed points show.
+        Load cell that measures the records of reconstructed points.
     seed : int
-        Of that noise.
+        Seed of its noise.
     width : float
-        Of the figure [inches].
+        Width of the figure [inches].
     """
 
     distances: tuple[float, ...]
@@ -55,13 +55,13 @@ class Choice:
 
     @property
     def is_column(self) -> bool:
-        """Whether panels have to stand below one another."""
+        """True if panels must stand below one another."""
         return self.width < 0.5 * (COLUMN_WIDTH + PAGE_WIDTH)
 
     def map_panels(
         self, count: int, limits: Limits, *, beside: float, between: float, above: float, widest: float = np.inf
     ) -> tuple[Figure, AxesArray]:
-        """A figure of maps of one scale, shape (rows, columns), with room for labels, titles and legend [inches]."""
+        """Return a figure of maps at one scale, shape (rows, columns), with margins for labels and legend [inches]."""
         from matplotlib.figure import Figure
 
         columns = 1 if self.is_column else min(2, count)
@@ -73,12 +73,12 @@ class Choice:
         return figure, figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False, subplot_kw=options)
 
     def scan(self, profile: Profile, distance: float, direction: Direction = "both") -> Scan:
-        """Of a profile of the paper at a distance.
+        """Return the scan of a profile of the paper at a distance.
 
         Raises
         ------
         ContourError
-            If it is too near, or out of reach.
+            If the profile is too near, or out of reach.
         """
         try:
             return scan(paper_profile(profile, q=distance), direction=direction, drive_step=self.drive_step)
@@ -89,12 +89,12 @@ class Choice:
 def choice_of(
     distances: Sequence[float], *, drive_step: float, rods: int, load_cell: LoadCell | None, seed: int, width: float
 ) -> Choice:
-    """The same, if it can be drawn.
+    """Return the checked options of a figure.
 
     Raises
     ------
     ParameterError
-        If it cannot.
+        If an option is not valid.
     """
     q = as_numbers(distances)
     if q is None or q.ndim != 1 or not q.size or not np.all(np.isfinite(q) & (q > 0.0)):

@@ -1,4 +1,4 @@
-"""Figure 2: the rod in tip and in tangential contact, with the words for what is seen."""
+"""Figure 2: the rod in tip and in tangential contact, with the names of its quantities."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 __all__ = ["draw_contact_kinds"]
 
 _WAY = {"tip": 0.6, "tangential": 0.45}
-"""Which state of a phase is shown, between its first and its last."""
+"""Position of the state shown between the first and the last of a phase."""
 
 _LIMITS = (-0.36, 1.02), (-0.24, 0.98)
-"""In x and y of both panels [L]."""
+"""Limits of both panels in x and y [L]."""
 
 _BESIDE = {"tip": 0.2, "tangential": 0.36}
 """Radius at which the slope angle is drawn: beyond the rod's end [L]."""
@@ -39,7 +39,7 @@ _THIN: dict[str, Any] = {"color": "0.35", "linewidth": 0.7}
 
 
 def draw_contact_kinds(profile: Profile, choice: Choice) -> Figure:
-    """A panel for each kind of contact: angles, contact point, and the forces on the rod and its support."""
+    """Draw a panel for each kind of contact: angles, contact point, and the forces on the rod and its support."""
     from matplotlib.figure import Figure
 
     columns = 1 if choice.is_column else 2
@@ -58,7 +58,7 @@ def draw_contact_kinds(profile: Profile, choice: Choice) -> Figure:
 
 
 def _state(profile: Profile, phase: str, choice: Choice) -> tuple[float, Scan, dict[str, float]]:
-    """At the first distance at which there is one of this phase."""
+    """Return distance, scan and state of a phase, at the first distance at which it occurs."""
     for distance in choice.distances:
         made = choice.scan(profile, distance, "forward")
         of_phase = np.flatnonzero(made.record["truth_contact_phase"].values == phase)
@@ -100,7 +100,7 @@ def _draw_state(ax: Axes, made: Scan, state: dict[str, float], phase: str) -> No
     ends = "$s_1 = L$" if phase == "tip" else "$s_1 < L$"
     _write(ax, f"contact $(\\xi, \\eta)$\n{ends}", contact, 0.09 * normal - 0.03 * along, ha="right", va="bottom")
 
-    # The contact's force on the rod, and what the support answers with.
+    # The contact force on the rod, and the support reaction.
     force = np.array([state["force_x"], state["force_y"]])
     scale = _ARROW / float(np.hypot(*force))
     _draw_arrow(ax, contact, contact - scale * force)
@@ -133,7 +133,7 @@ def _draw_arrow(ax: Axes, begin: Any, end: Floats) -> None:
 
 
 def _draw_moment(ax: Axes, moment: float) -> None:
-    """An arrow about the pivot, in the sense of the moment."""
+    """Draw an arrow about the pivot, in the sense of the moment."""
     turn = np.radians(np.linspace(-150.0, -30.0, 41))
     turn = turn if moment > 0.0 else turn[::-1]
     x, y = 0.11 * np.cos(turn), 0.11 * np.sin(turn)

@@ -1,4 +1,4 @@
-"""Figures 7 to 10: the rod along a sweep, deformed."""
+"""Figures 7 to 10: the deformed rod along a sweep."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ __all__ = ["draw_deformed_rods"]
 _LEGEND = ([*PHASES.values(), "contour", "pivot"], ["first contact", "phase change", "snap-off"])
 
 _ROOM = 0.05
-"""Around the rods [L]."""
+"""Margin around the rods [L]."""
 
 
 def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -> Figure:
-    """Deformed rods in a panel for each distance and sweep, all at one scale."""
+    """Draw deformed rods in a panel for each distance and sweep, all at one scale."""
     from matplotlib.ticker import MaxNLocator
 
     scans = [choice.scan(profile, distance, direction) for distance in choice.distances]
@@ -56,7 +56,7 @@ def draw_deformed_rods(profile: Profile, direction: Direction, choice: Choice) -
 
 
 def _limits(sweeps: list[tuple[Scan, int]]) -> Limits:
-    """In x and in y, in which all the rods of all sweeps have room."""
+    """Return limits in x and y that hold all rods of all sweeps."""
     corners = []
     for made, number in sweeps:
         record, events = made.record, made.sweeps[number]
@@ -72,5 +72,5 @@ def _limits(sweeps: list[tuple[Scan, int]]) -> Limits:
 
 
 def _distance(made: Scan) -> float:
-    """Height of the contour above the pivot's place."""
+    """Return the height of the contour above the pivot."""
     return float(np.asarray(made.contour.height(0.0)))

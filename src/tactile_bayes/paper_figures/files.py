@@ -30,35 +30,35 @@ def draw_all(
     progress: Callable[[int], object] | None = None,
     **options: Any,
 ) -> dict[int, dict[str, Path]]:
-    """Write figures of the paper to a folder, and tell where each is.
+    """Write figures of the paper to a folder, and return their files.
 
-    Files are named figure_02.pdf and so on, and carry their caption. They are written whole: after an interrupt each
-    one is the old or the new one, and the same call makes all of them anew. The same options give the same bytes.
+    Files are named figure_02.pdf and so on, and hold their caption. They are written whole: after an interrupt each
+    file is the old or the new one, and the same call makes all of them anew. The same options give the same bytes.
 
     Parameters
     ----------
     out : path-like
-        Folder, made if it is not there.
+        Folder, created if missing.
     only : sequence of int, optional
         Numbers of the figures, from 2 to 11; by default all.
     formats : sequence of {"pdf", "svg", "png"}
-        In which each is written.
+        File formats of each figure.
     style : {"print", "screen"}
-        As in `plotting.style`.
+        Look of the figures, as in `plotting.style`.
     progress : callable, optional
-        Is given how many figures are done, after each.
+        Called with the number of figures done, after each.
     **options
-        As in `figure`.
+        Options of `figure`.
 
     Returns
     -------
     dict of int to dict of str to Path
-        The file by number and format.
+        Files by number and format.
 
     Raises
     ------
     ParameterError, ContourError
-        As in `figure`, or if there is no such format. Figures are made one by one: those before it are there.
+        As in `figure`, or if there is no such format. Figures are made one by one: those made before an error remain.
 
     Examples
     --------
@@ -77,24 +77,24 @@ def draw_all(
     folder = Path(out)
     files: dict[int, dict[str, Path]] = {}
     with styled(style):
-        for done, (number, words) in enumerate(captions.items(), start=1):
+        for done, (number, text) in enumerate(captions.items(), start=1):
             made = figure(number, **options)
             folder.mkdir(parents=True, exist_ok=True)
             files[number] = {name: folder / f"figure_{number:02d}.{name}" for name in wanted}
             for name, path in files[number].items():
                 with write_atomically(path) as temporary:
-                    _save(made, temporary, name, number, words)
+                    _save(made, temporary, name, number, text)
             if progress is not None:
                 progress(done)
     return files
 
 
-def _save(made: Figure, path: Path, name: str, number: int, words: str) -> None:
-    """With a caption, and without a date."""
+def _save(made: Figure, path: Path, name: str, number: int, text: str) -> None:
+    """Save a figure with a caption, and without a date."""
     title = f"Figure {number}"
     metadata: dict[str, dict[str, Any]] = {
-        "pdf": {"Title": title, "Subject": words, "CreationDate": None},
-        "svg": {"Title": title, "Description": words, "Date": None},
-        "png": {"Title": title, "Description": words},
+        "pdf": {"Title": title, "Subject": text, "CreationDate": None},
+        "svg": {"Title": title, "Description": text, "Date": None},
+        "png": {"Title": title, "Description": text},
     }
     made.savefig(path, format=name, metadata=metadata[name])

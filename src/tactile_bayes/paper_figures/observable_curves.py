@@ -1,4 +1,4 @@
-"""Figures 3 to 6: what the base feels along a sweep, for several distances of the object."""
+"""Figures 3 to 6: moment and forces at the base along a sweep, for several distances of the object."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ __all__ = ["draw_observable_curves"]
 _LINES = {"forward": "-", "backward": (0, (3.0, 1.2))}
 _WIDTHS = {"tip": 0.8, "tangential": 1.7}
 _BETWEEN = 48
-"""Points of a line between two events, beside those of the drive's steps."""
+"""Number of points of a line between two events, beside those of the drive's steps."""
 
 _SHRUNK = 0.75
-"""Of the markers of events, of which there are many."""
+"""Size of the many event markers, over their usual size."""
 
 
 def draw_observable_curves(profile: Profile, direction: Direction, choice: Choice) -> Figure:
-    """Moment and forces over the drive angle: a colour for each distance, thin in tip contact, thick in tangential.
+    """Draw moment and forces over the drive angle: a colour for each distance, thin lines in tip contact.
 
-    Lines run from first contact to snap-off, and both are on them; toward events, where loads may change as the root of
-    the angle that is left, their points are denser than the drive's steps.
+    Lines extend from first contact to snap-off, both included. Toward events, where loads may change with the square
+    root of the remaining angle, their points are denser than the drive's steps.
     """
     from matplotlib import colormaps
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ def _distance_in_words(distance: float) -> str:
 
 
 def _finer(made: Scan, number: int) -> xr.Dataset:
-    """Samples of a sweep in contact, at the drive's steps and between events, denser toward these."""
+    """Return samples of a sweep in contact, at the drive's steps and between events, denser toward these."""
     events = made.sweeps[number]
     marked = [events.first_contact, *events.transitions, events.snap_off]
     ends = np.array([event.drive_angle for event in marked])

@@ -1,4 +1,4 @@
-"""Figure 11: contact points that Step 2 makes of the records, on the contours that they are from."""
+"""Figure 11: contact points that Step 2 reconstructs from the records, on the true contours."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ __all__ = ["draw_reconstructed_points"]
 _COLOURS = {"forward": BASES[3], "backward": BASES[2]}
 _X = (-0.92, 0.92)
 _Y = (-0.06, 1.0)
-"""What every panel shows [L]: no rod reaches farther."""
+"""Limits of every panel [L]: no rod reaches farther."""
 
 
 def draw_reconstructed_points(profiles: Sequence[Profile], choice: Choice) -> Figure:
-    """Points of a forward and a backward sweep, and the gap between them, in a panel for each profile."""
+    """Draw points of a forward and a backward sweep, and the gap between them, in a panel for each profile."""
     from matplotlib.ticker import MultipleLocator
 
     figure, grid = choice.map_panels(len(profiles), (_X, _Y), beside=0.4, between=0.3, above=0.8)

@@ -10,7 +10,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, place_by_wrench, touching_and_slopes
+from tactile_bayes.mechanics.contact_coordinates import (
+    ARCLENGTH,
+    DRIVE_ANGLE,
+    FORCE,
+    PSI1,
+    contact_states_and_slopes,
+    place_by_wrench,
+)
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS
 
@@ -193,7 +200,7 @@ def _raw(contacts: _Forward) -> Floats:
 
 def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Floats:
     """The same of the most likely contact on the sheet of its phase."""
-    _, slopes = touching_and_slopes(contacts.coordinates, delta)
+    _, slopes = contact_states_and_slopes(contacts.coordinates, delta)
     from_readings = contacts.from_readings
     covariance = from_readings @ contacts.covariance @ np.swapaxes(from_readings, 1, 2)
     whiten = np.linalg.inv(np.linalg.cholesky(covariance))

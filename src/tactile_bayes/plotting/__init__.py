@@ -1,9 +1,9 @@
 """Figures: every function takes and returns Axes.
 
-Without Axes a function makes a figure itself, about 7 inches wide. Axes hold data in the units of the record, angles in
-degrees; in SI their tick labels carry the prefix that the axis label names. Matplotlib is loaded when a figure is
-made; its settings are left alone, and nothing is shown. `style` is a block in which figures have one look, for print or
-for the screen.
+If no Axes are given, a function makes a figure, about 7 inches wide. Axes hold data in the units of the record, angles
+in degrees; in SI, tick labels carry the prefix that the axis label names. Matplotlib is loaded when a figure is made;
+its settings do not change, and no figure is shown. `style` is a context manager that gives figures one look, for print
+or for the screen.
 """
 
 from tactile_bayes.plotting.calibration_panels import calibration_ranks, coverage

@@ -1,4 +1,4 @@
-"""Axes: how they are made or checked, and what they say where nothing is drawn."""
+"""Axes: new ones, checks of given ones, and notes where nothing is drawn."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def single_axes() -> Axes:
 
 
 def new_panels(rows: int, columns: int, height: float, width: float = 7.0, **options: Any) -> AxesArray:
-    """Axes of a new figure, shape (rows, columns); options are those of `pyplot.subplots`."""
+    """Return Axes of a new figure, shape (rows, columns); options are those of `pyplot.subplots`."""
     from matplotlib import pyplot as plt
 
     size = (width, height)
@@ -45,7 +45,7 @@ def new_panels(rows: int, columns: int, height: float, width: float = 7.0, **opt
 
 
 def check_panels(axes: Any, shape: tuple[int, ...], meaning: str) -> AxesArray:
-    """Return Axes that were given, which are to have a shape; `meaning` says what they are for."""
+    """Return the given Axes if they have the wanted shape, and refuse others; `meaning` describes the wanted ones."""
     panels = np.atleast_1d(np.asarray(axes, dtype=object))
     if panels.shape != shape:
         raise ParameterError(f"axes have shape {panels.shape}, and {shape} is wanted: {meaning}")
@@ -53,7 +53,7 @@ def check_panels(axes: Any, shape: tuple[int, ...], meaning: str) -> AxesArray:
 
 
 def check_dataset(found: Any, names: set[str], kind: str, source: str, attrs: Sequence[str] = ()) -> None:
-    """Refuse what is no dataset with these variables and attributes; `source` names the function that returns one."""
+    """Refuse all but a dataset with these variables and attributes; `source` names the function that returns one."""
     is_one = isinstance(found, xr.Dataset) and names <= set(found.variables) and set(attrs) <= set(found.attrs)
     if not is_one:
         raise ParameterError(f"this is no {kind}: give what {source} returned")
@@ -74,7 +74,7 @@ def write_not_measured(ax: Axes, label: str) -> None:
 
 
 def tile_edges(values: Floats) -> Floats:
-    """Edges of tiles around values in increasing order: midway between two."""
+    """Return the edges of tiles around increasing values: midway between neighbours."""
     if values.size == 1:
         return np.array([0.95, 1.05]) * values
     middle = 0.5 * (values[1:] + values[:-1])

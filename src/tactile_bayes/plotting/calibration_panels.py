@@ -1,4 +1,4 @@
-"""A calibration: whether ranks of the truth are uniform, and what is stated with a probability holds as often."""
+"""Figures of a calibration: ranks of the truth, and coverage of intervals and bands."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ __all__ = ["calibration_ranks", "coverage"]
 _MOST_COLUMNS = 4
 _BAND = 0.95
 _ROOM = 1.55
-"""Limits of the panels over the largest value drawn: words stand above and below it."""
+"""Limits of the panels over the largest value drawn, with room for text above and below."""
 
 _LETTERS = 82
-"""In a line of the heading."""
+"""Letters in a line of the heading."""
 
 _FEWEST = 2
-"""Replicates below which a claim is left out."""
+"""Number of replicates below which a claim is left out."""
 
 _LETTERS_PER_INCH = 10.0
-"""In a line of the note on claims that are left out."""
+"""Letters per inch in the note on claims that are left out."""
 
 _COLOURS = {"": PALETTE["median"], "leaves the band": "#E69F00", "not uniform": "#D55E00"}
-"""Of a line, by the word that stands in its panel."""
+"""Colour of a line, by the label of its panel."""
 
 
 class _Ranks(NamedTuple):
-    """What is drawn of one quantity, over the ranks 0, 1, …, and in which way it is marked."""
+    """Curves of one quantity over the ranks 0, 1, …, with the label of its panel."""
 
     name: str
     replicates: int
@@ -51,15 +51,16 @@ class _Ranks(NamedTuple):
 
 
 def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray:
-    """Ranks of the truth among draws of the posterior: those of right posteriors are uniform.
+    """Draw the ranks of the truth among draws of the posterior, which are uniform for correct posteriors.
 
-    A panel for each quantity has the share of ranks up to each rank, less the share that is expected of uniform ranks.
-    If these are uniform the whole line stays in the shaded band with 95 %: one line in twenty "leaves the band", and
-    its panel says so. "not uniform" is stronger: the p value is at most ``attrs["level"]``, as the verdict
-    has it. Over the panels of a new figure stands what they show together.
+    Each quantity has a panel with the empirical distribution function of its ranks less that of uniform ranks
+    (Säilynoja, Bürkner & Vehtari 2022, doi 10.1007/s11222-022-10090-6). Uniform ranks stay in the shaded band, all
+    along the line, with a probability of 95 %: one line in twenty leaves it, and its panel is labelled "leaves the
+    band". The label "not uniform" is stronger: the p-value is at most ``attrs["level"]``, as in the verdict. The
+    heading of a new figure summarises the panels.
 
-    A line above 0 tells that posteriors lie too high, one below 0 that they lie too low; one that is above 0 on the
-    left and below 0 on the right that they are too narrow, the other way round too wide.
+    A line above 0 means that posteriors lie too high, a line below 0 that they lie too low; a line above 0 on the left
+    and below 0 on the right means that they are too narrow, the reverse that they are too wide.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
     Raises
     ------
     ParameterError
-        If this is no calibration, none of its replicates has a posterior, or the axes have another shape.
+        If the argument is not a calibration, none of its replicates has a posterior, or the axes have another shape.
 
     Examples
     --------
@@ -94,7 +95,7 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
     check_dataset(calibration, {"ranks", "rank_p_value", "quantity"}, "calibration", "calibrate", ["level"])
     if not np.any(calibration["ranks"].values >= 0):
         raise ParameterError(
-            f"none of {calibration.sizes['replicate']} replicates has a posterior: see message, that says why"
+            f"none of {calibration.sizes['replicate']} replicates has a posterior: see message, which says why"
         )
     drawn = _ranks(calibration)
     panels = _new_panels(calibration, drawn) if axes is None else _panels_given(axes, len(drawn))
@@ -111,17 +112,17 @@ def calibration_ranks(calibration: xr.Dataset, *, axes: Any = None) -> AxesArray
 
 
 def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """How often what is stated with a probability holds: each claim's share of replicates, and its standard error.
+    """Draw the coverage of each claim: the share of replicates in which it holds, and its standard error.
 
-    A dot is the share, its bar reaches two standard errors to both sides, as far as shares go; the vertical line is
-    the probability that is stated. At the right stands the share, and of how many replicates.
+    A dot is the share, its bar reaches two standard errors to either side, within 0 and 1; the vertical line is the
+    stated probability. The share and the number of replicates are written at the right.
 
     Parameters
     ----------
     calibration : xr.Dataset
         From `tactile_bayes.calibrate`.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -131,7 +132,7 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ParameterError
-        If this is no calibration.
+        If the argument is not a calibration.
 
     Examples
     --------
@@ -190,7 +191,7 @@ def _panels_given(axes: Any, wanted: int) -> AxesArray:
 
 
 def _new_panels(calibration: xr.Dataset, drawn: list[_Ranks]) -> AxesArray:
-    """In rows that are about as long as one another, below what they show together."""
+    """Return panels in rows of about equal length, below a heading that summarises them."""
     wanted = len(drawn)
     rows = -(-wanted // _MOST_COLUMNS)
     columns = -(-wanted // rows)
@@ -232,7 +233,7 @@ def _ranks_of(name: str, ranks: Any, top: int, p_value: float, level: float) -> 
     shares = np.cumsum(np.bincount(ranks, minlength=top + 1))[:top] / ranks.size
     low, high = simultaneous_band(ranks.size, top, _BAND)
     leaves = bool(np.any((shares < low) | (shares > high)))
-    # All ranks are up to the last, and are expected to be.
+    # At the last rank both distribution functions are 1.
     excess, low, high = (np.append(each - expected_shares(top), 0.0) for each in (shares, low, high))
     word = "not uniform" if p_value <= level else "leaves the band" if leaves else ""
     return _Ranks(name, int(ranks.size), p_value, excess, low, high, word)

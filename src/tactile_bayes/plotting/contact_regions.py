@@ -1,4 +1,4 @@
-"""Contacts with their uncertainty: ellipses of first order, and regions of a posterior."""
+"""Contacts with their uncertainty: first-order ellipses, and regions of a posterior."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ def contact_ellipses(
     truth: Contour | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Contact points of `reconstruct` with ellipses that contain them with a probability, to first order.
+    """Draw contact points of `reconstruct` with first-order ellipses of a given probability.
 
     Parameters
     ----------
     contacts : xr.Dataset
         From `reconstruct`, with standard deviations, or from `contact_moments`.
     probability : float
-        Of each ellipse.
+        Probability of each ellipse, in (0, 1).
     samples : sequence of int, optional
-        Which samples, of which those without a contact are left out; by default a dozen of those whose status is "ok",
-        or whose every draw is in contact, evenly spread.
+        Numbers of the samples, of which those without a contact are left out; by default a dozen, evenly spread, of
+        those whose status is "ok", or whose draws are all in contact.
     truth : Contour, optional
-        The true contour.
+        The true contour, in the units of the contacts.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -96,21 +96,21 @@ def contact_regions(
     truth: Contour | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Regions that contain contact points with a probability, as the draws of `infer_contacts` have them.
+    """Draw highest-density regions of contact points from the draws of `infer_contacts`.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contacts` or `implied_contacts`.
     probability : float
-        Of each region.
+        Probability of each region, in (0, 1).
     samples : sequence of int, optional
-        Which samples, by the coordinate "sample", of which those without a contact are left out; by default a dozen of
-        those with one, evenly spread. A region has the colour of its likelier phase.
+        Labels of samples in the coordinate "sample", of which those without a contact are left out; by default a dozen
+        of those with one, evenly spread. A region has the colour of its more probable phase.
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -146,17 +146,17 @@ def contact_regions(
         region = contact_region(draws, int(labels[i]), probability)
         grid_x, grid_y, density = region.grid()
         lines = ax.contour(grid_x, grid_y, density, levels=[region.level], colors=[PALETTE[phase[i]]], linewidths=1.0)
-        lines.sticky_edges.x[:], lines.sticky_edges.y[:] = [], []  # those of the grid, which would cut regions off
+        lines.sticky_edges.x[:], lines.sticky_edges.y[:] = [], []  # the grid's edges would cut regions off
         corners.extend(line for path in lines.get_paths() for line in path.to_polygons(closed_only=False))
         ax.plot(x[i], y[i], color=PALETTE[phase[i]], **_MIDDLE)
-    ax.dataLim.update_from_data_xy(np.concatenate(corners), ignore=True)  # of the outlines, not of their grids
+    ax.dataLim.update_from_data_xy(np.concatenate(corners), ignore=True)  # limits of the outlines, not of the grids
     return _finished(ax, draws, phase[chosen], f"{percent(probability)} region", truth, own)
 
 
 def ellipse_of(
     contacts: xr.Dataset, sample: int, radius: float, centre: tuple[float, float] | None = None, **style: Any
 ) -> Ellipse:
-    """The ellipse of one contact, of a radius in standard deviations, around the contact if not elsewhere."""
+    """Return the ellipse of one contact with a radius in standard deviations, by default around the contact."""
     from matplotlib.patches import Ellipse
 
     at = contacts.isel(sample=sample)
@@ -169,12 +169,12 @@ def ellipse_of(
 
 
 def radius_of(probability: float) -> float:
-    """Of an ellipse that holds a probability, in standard deviations."""
+    """Return the radius, in standard deviations, of the ellipse that holds a probability."""
     return float(np.sqrt(chdtri(2.0, 1.0 - probability)))
 
 
 def _spread(has: Any, is_candidate: Any, samples: Sequence[int] | None) -> list[int]:
-    """The samples asked for, or a dozen of the candidates, without those that have nothing to be drawn."""
+    """Return the requested samples, or a dozen of the candidates, without those that have no contact."""
     chosen = np.flatnonzero(is_candidate)
     if samples is not None:
         chosen = np.atleast_1d(np.asarray(samples, dtype=np.intp))

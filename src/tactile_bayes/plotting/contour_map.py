@@ -1,4 +1,4 @@
-"""The contour as it was found: a map, its band in detail, and its gap enlarged."""
+"""Figures of an inferred contour: a map, its band in detail, and its gap enlarged."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 __all__ = ["band_detail", "contour", "gap"]
 
 _MARGIN = 0.12
-"""What is drawn beside the gap, as a share of its width."""
+"""Margin beside the gap, as a share of its width."""
 
 _ROOM = 0.12
-"""Room above and below what is drawn, as a share of its height."""
+"""Margin above and below the curves, as a share of their height."""
 
 _ENDS: dict[str, Any] = {
     "color": "black",
@@ -53,26 +53,26 @@ def contour(
     base: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """The contour as it was found: contact points, band and gap, with the true contour where it is known.
+    """Draw an inferred contour: contact points, band and gap, with the true contour where it is known.
 
     Parameters
     ----------
     x : array_like
-        The range drawn, from its least to its greatest value, in the unit of the record.
+        The range drawn, from the smallest to the largest value, in the record's unit of length.
     truth : Contour, optional
         The true contour.
     contacts : xr.Dataset, optional
-        Over "sample": contact_x, contact_y, and where present contact_phase, which colours the points, and status, of
-        which only "ok" is drawn.
+        Over "sample": contact_x, contact_y; if present, contact_phase colours the points, and only those with status
+        "ok" are drawn.
     band : xr.Dataset, optional
         Over coordinate "x": lower, upper and median, with the probability of the band as attribute.
     gap : (float, float) or xr.Dataset, optional
-        x of the contacts between which nothing was touched; if the first is the greater one, they overlap. Or what
-        `tactile_bayes.gap` returns, of which the medians are drawn.
+        x of the contacts between which nothing was touched; if the first is the larger, the sweeps overlap. Or the
+        result of `tactile_bayes.gap`, of which the medians are drawn.
     base : (float, float), optional
-        The pivot.
+        The pivot, in the record's unit of length.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def contour(
     Raises
     ------
     ParameterError
-        If `x` is no range.
+        If `x` does not span a range.
 
     Examples
     --------
@@ -128,7 +128,7 @@ def band_detail(
     gap: tuple[float, float] | xr.Dataset | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """A band measured from its median, enlarged as far as it fills the Axes; a good one is invisible on a map.
+    """Draw a band measured from its median, enlarged to fill the Axes; on a map a good band is invisible.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def band_detail(
     gap : (float, float) or xr.Dataset, optional
         As in `contour`.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -170,9 +170,9 @@ def band_detail(
 
 
 def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = None) -> Axes:
-    """What is known of the contour inside the gap, measured from the chord between the end contacts.
+    """Draw certificate and band of the contour inside the gap, measured from the chord between the end contacts.
 
-    The triangle is what convexity alone leaves open, with a paler rim for the uncertainty of the end contacts; the
+    Convexity alone confines the contour to the triangle, with a paler rim for the uncertainty of the end contacts; the
     bands are the posterior's. The legend gives the largest width of each in y.
 
     Parameters
@@ -182,12 +182,12 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
     Axes
-        Where the sweeps overlap there is nothing to be drawn, and the Axes say so.
+        If the sweeps overlap, the Axes hold a note instead.
 
     Examples
     --------
@@ -247,7 +247,7 @@ def gap(found: xr.Dataset, *, truth: Contour | None = None, ax: Axes | None = No
         ax.fill_between(x, lower, upper, color="0.86", linewidth=0.0, zorder=0.4, label=label)
         for edge in (lower, upper):
             ax.plot(x, edge, color="0.4", linewidth=0.9, linestyle=(0, (1.0, 1.2)), zorder=2.1)
-        # A band much wider than the triangle runs out of the figure: else nothing would be seen of the rest.
+        # A band much wider than the triangle leaves the figure, so that the rest stays visible.
         room = 0.7 * float(np.ptp(drawn))
         drawn = np.concatenate([drawn, np.clip([*lower, *upper], drawn.min() - room, drawn.max() + room)])
     lower, median, upper = edges("band", "lower", "median", "upper")
@@ -292,7 +292,7 @@ def _draw_gap(ax: Axes, gap: tuple[float, float] | xr.Dataset) -> None:
 
 
 def _draw_ends(ax: Axes, found: xr.Dataset, above_chord: Any) -> None:
-    """The end contacts, with the intervals of their x."""
+    """Draw the end contacts with the intervals of their x."""
     for side in ("left", "right"):
         lower, middle, upper = (float(found[side].sel(bound=bound)) for bound in ("lower", "median", "upper"))
         y = above_chord(np.array([middle]), np.array([float(found[f"{side}_y"].sel(bound="median"))]))

@@ -1,4 +1,4 @@
-"""Where to put the next pivot: what is to be expected from every place that it could have."""
+"""Figures of a design: the expected criterion over candidate pivots."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["design"]
 
 _HEIGHTS_OF_A_MAP = 3
-"""From which on a grid of places is drawn as a map, and not as lines."""
+"""Smallest number of rows and columns of pivots that is drawn as a map, not as lines."""
 
 _HIGHEST, _ROOM = 7.0, 0.1
-"""Of the figure of a map, and what is left free in it [inches]."""
+"""Largest height of a map's figure, and the margin in it [inches]."""
 
 _KINDS = {
     "band": ("width", "width of the band to be expected", True),
@@ -35,28 +35,28 @@ _BARS: dict[str, Any] = {"markersize": 4.0, "linewidth": 1.2, "elinewidth": 0.8,
 
 
 def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """The criterion over the place of the pivot, the best place of all, and the pivots so far.
+    """Draw the criterion of a design over candidate pivots, the best of them, and the pivots so far.
 
-    Places that form a grid of at least three heights and as many columns are a map, in tiles; with several drive steps
-    it is that of the step of the best. Else there is a line for each height and drive step, with bars of two standard
-    errors over the objects drawn; where posteriors were sampled as well, crosses show what these gave.
+    Candidates that form a grid of at least three rows and columns are drawn as a map of tiles, for the drive step of
+    the best candidate. Otherwise each height and drive step has a line, with bars of two standard errors over the
+    objects drawn; crosses show values from sampled posteriors, where there are some.
 
     Parameters
     ----------
     found : xr.Dataset
         From `tactile_bayes.design`.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
     Axes
-        Beside a map, in its figure, stands the scale of colours.
+        The figure of a map also holds its colour bar.
 
     Raises
     ------
     ParameterError
-        If this is no design.
+        If the argument is not a design.
 
     Examples
     --------
@@ -82,12 +82,12 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
 
 def _kind_of(found: xr.Dataset) -> tuple[str, str, bool]:
-    """Name of the criterion's variable, the criterion in words, and whether it is a length, of which less is better."""
+    """Return the criterion's variable, its label, and True if it is a length, of which less is better."""
     return _KINDS[str(found.attrs["criterion"])]
 
 
 def _draw_lines(ax: Axes, found: xr.Dataset, pivots: Floats) -> None:
-    """Draw the lines, and where pivots are already, which are of shape (pivots, 2)."""
+    """Draw the lines, and the present pivots, shape (pivots, 2)."""
     name, words_of_it, is_length = _kind_of(found)
     si = found.base_x.attrs.get("units") == "m"
     scale = 1e3 if si and is_length else 1.0
@@ -130,18 +130,18 @@ def _draw_lines(ax: Axes, found: xr.Dataset, pivots: Floats) -> None:
 
 
 class _Grid(NamedTuple):
-    """Places in rows and columns, and what is expected from each."""
+    """Candidate pivots in rows and columns, with the expected criterion of each."""
 
     x: Floats
     y: Floats
     values: Floats
-    """Shape (rows, columns); NaN where there is no candidate, or nothing is to be expected."""
+    """Shape (rows, columns); NaN without a candidate or without an expected value."""
     drive_step: float
     has_other_steps: bool
 
 
 def _grid_of(found: xr.Dataset) -> _Grid | None:
-    """The candidates of the best one's drive step, if they fill a grid that is worth a map."""
+    """Return the candidates with the best one's drive step, if they fill a grid large enough for a map."""
     steps = found["drive_step"].values
     step = float(steps[int(found["best"])])
     chosen = found.isel(candidate=np.flatnonzero(steps == step))
@@ -191,7 +191,7 @@ def _fit_figure(ax: Axes) -> None:
     figure: Any = ax.figure
     wide, _ = figure.get_size_inches()
     figure.set_size_inches(wide, _HIGHEST)
-    for _ in range(2):  # the room for the scale of colours goes with the height
+    for _ in range(2):  # the room for the colour bar depends on the height
         figure.draw_without_rendering()
         taken = figure.get_tightbbox()
         figure.set_size_inches(min(wide, taken.width + _ROOM), min(_HIGHEST, taken.height + _ROOM))

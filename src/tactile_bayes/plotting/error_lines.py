@@ -1,4 +1,4 @@
-"""How wrong contacts and bands are over the noise, by contour and distance."""
+"""Errors of contacts and widths of bands over the noise, by contour and distance."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Quantity = Literal["across", "along", "touched", "gap"]
 _MARKS: list[dict[str, Any]] = [{"marker": mark, "markersize": 5.0} for mark in "osD^vP*X<>"]
 _MOST_TICKS = 8
 _MOST_IN_LINE = 6
-"""Entries of the legend."""
+"""Largest number of legend entries in a row."""
 
 _BANDS = {"touched": "where it is touched", "gap": "in the gap"}
 
@@ -37,12 +37,12 @@ def error_map(
     reconstruction: Literal["raw", "constrained"] = "constrained",
     ax: Axes | None = None,
 ) -> Axes:
-    """Errors of contacts, or widths of bands, over the noise: a line for each contour and distance.
+    """Draw errors of contacts, or widths of bands, over the noise: a line for each contour and distance.
 
-    Of contacts, a solid line is the root mean square error of those with the status "ok", and a dashed one is what
-    first order foretells for the same. Of bands, filled markers are those of posteriors, where some were inferred, and
-    dashed lines with hollow markers those that are to be expected from Fisher's information. Where the two part, first
-    order stops holding.
+    For contacts, a solid line is the root mean square error of those with the status "ok", and a dashed line its
+    first-order prediction. For bands, filled markers are widths of posterior bands, where some were inferred, and
+    dashed lines with hollow markers are widths expected from Fisher's information. Where the two part, first order
+    ceases to hold.
 
     Parameters
     ----------
@@ -51,19 +51,19 @@ def error_map(
     quantity : {"across", "along", "touched", "gap"}
         Errors of contacts across the contour or along it, or widths of bands where it is touched or in the gap.
     reconstruction : {"raw", "constrained"}
-        Whose contacts.
+        Method of Step 2 that made the contacts.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
     Axes
-        Colours are contours, markers are distances. Those of which no cell has an answer are left out, and named.
+        Colours denote contours, markers distances. Combinations without any result are left out, and named.
 
     Raises
     ------
     ParameterError
-        If this is no error map, or it has not what is chosen.
+        If the argument is not an error map, or does not hold the choice.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def error_map(
     check_among("reconstruction", reconstruction, found)
     ax = single_axes() if ax is None else ax
     found = found.isel(noise_factor=np.argsort(found["noise_factor"].values))
-    seen, foretold = _seen_and_foretold(found, quantity, reconstruction)
+    observed, predicted = _observed_and_predicted(found, quantity, reconstruction)
     factor = found["noise_factor"].values
     contours, distances = found["contour"].values, found["distance"].values
     is_band = quantity in _BANDS
@@ -86,7 +86,7 @@ def error_map(
     missing: list[str] = []
     is_there = np.zeros((contours.size, distances.size), dtype=bool)
     for i, j in np.ndindex(is_there.shape):
-        there, first = seen.values[i, j], foretold.values[i, j]
+        there, first = observed.values[i, j], predicted.values[i, j]
         if not np.isfinite([*there, *first]).any():
             missing.append(f"{contours[i]} at {number(float(distances[j]))} L")
             continue
@@ -104,12 +104,12 @@ def error_map(
     for j in np.flatnonzero(is_there.any(axis=0)):
         legend_entry(ax, f"at {number(distances[j])} L", color="0.35", linestyle="none", **_MARKS[j % len(_MARKS)])
     legend_entry(ax, "first order", color="0.35", linestyle="--", linewidth=1.3)
-    set_log_scale(ax.yaxis, _label(found, quantity), "contact_x", foretold.attrs, np.concatenate(drawn))
+    set_log_scale(ax.yaxis, _label(found, quantity), "contact_x", predicted.attrs, np.concatenate(drawn))
     set_log_scale(ax.xaxis, _noise_label(found), "sweep", {}, factor)
     if factor.size <= _MOST_TICKS:
         ax.set_xticks(factor)
     entries = len(ax.get_legend_handles_labels()[1])
-    title = _title(quantity, reconstruction, bool(np.isfinite(seen.values).any()))
+    title = _title(quantity, reconstruction, bool(np.isfinite(observed.values).any()))
     legend_above(ax, entries if entries <= _MOST_IN_LINE else -(-entries // 2), title=title)
     if missing:
         corner: dict[str, Any] = {"transform": ax.transAxes, "ha": "right", "va": "bottom"}
@@ -117,15 +117,15 @@ def error_map(
     return ax
 
 
-def _seen_and_foretold(found: xr.Dataset, quantity: str, reconstruction: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Over contour, distance and noise_factor."""
+def _observed_and_predicted(found: xr.Dataset, quantity: str, reconstruction: str) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return both over contour, distance and noise_factor."""
     if quantity in _BANDS:
         both = found[f"posterior_{quantity}_width"], found[f"expected_{quantity}_width"]
     else:
         of_method = found.sel(reconstruction=reconstruction)
         both = of_method[f"rms_{quantity}"], of_method[f"first_order_{quantity}"]
-    seen, foretold = (each.transpose("contour", "distance", "noise_factor") for each in both)
-    return seen, foretold
+    observed, predicted = (each.transpose("contour", "distance", "noise_factor") for each in both)
+    return observed, predicted
 
 
 def _label(found: xr.Dataset, quantity: str) -> str:
@@ -134,14 +134,14 @@ def _label(found: xr.Dataset, quantity: str) -> str:
     return f"RMS error {quantity} the contour"
 
 
-def _title(quantity: str, reconstruction: str, is_seen: bool) -> str:
+def _title(quantity: str, reconstruction: str, has_posteriors: bool) -> str:
     if quantity in _BANDS:
-        return f"bands {_BANDS[quantity]}" + (": filled markers are posteriors" if is_seen else "")
+        return f"bands {_BANDS[quantity]}" + (": filled markers are posteriors" if has_posteriors else "")
     return f'{reconstruction} contact points with the status "ok"'
 
 
 def _noise_label(found: xr.Dataset) -> str:
-    """With what the factor is on, where that is known."""
+    """Return the label of the noise factor, with the noise at factor 1 if known."""
     if "force_noise" not in found.variables or "moment_noise" not in found.variables:
         return "noise factor"
     units = {"units": "1"} if found["rms_across"].attrs.get("units", "1") == "1" else None

@@ -1,4 +1,4 @@
-"""Families of contours side by side: how probable each is, and how well it foretells what it has not seen."""
+"""Families of contours side by side: probability and leave-one-out prediction."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ if TYPE_CHECKING:
 __all__ = ["families"]
 
 _WIDTHS = {0.5: ("v", -0.26, "priors half as wide"), 2.0: ("^", 0.26, "priors twice as wide")}
-"""Marker, place beside the bar's middle, and what it says."""
+"""Marker, distance from the bar's middle, and label."""
 
 _LITTLE = 4.0
-"""A difference of elpd below which little is to be concluded."""
+"""Difference of elpd below which it is inconclusive."""
 
 _FAR = -100.0
-"""Differences from which on the axis is logarithmic."""
+"""Difference beyond which the axis is logarithmic."""
 
 _LEGEND_BELOW = 34.0
-"""Points between the panel and its legend, in which ticks and label are."""
+"""Distance of the legend from the panel, with room for ticks and label [points]."""
 
 _WARNING = "#D55E00"
 _DOTS: dict[str, Any] = {"linestyle": "none", "markersize": 5.0, "zorder": 3}
 
 
 def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
-    """Families of contours compared: the probability of each, and its elpd difference where there is one.
+    """Draw a comparison of families: the probability of each, and its elpd difference where there is one.
 
-    Over both panels stands the verdict. A family whose check fails has a grey, hatched bar and says "does not fit"; one
-    that was not sampled, being far from fitting, says so.
+    The title is the verdict. A family whose check fails has a grey, hatched bar and the label "does not fit"; a family
+    that was not sampled, being far from fitting, has the label "not sampled".
 
     Parameters
     ----------
     comparison : xr.Dataset
         From `tactile_bayes.compare_families`.
     axes : array_like of Axes, shape (2,), optional
-        For probabilities and elpd differences; of shape (1,) where the comparison is without leave-one-out densities.
+        Axes for probabilities and elpd differences; shape (1,) if the comparison has no leave-one-out densities.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def families(comparison: xr.Dataset, *, axes: Any = None) -> AxesArray:
     Raises
     ------
     ParameterError
-        If this is no comparison, or the axes have another shape.
+        If the argument is not a comparison, or the axes have another shape.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
             ax.barh(place, share, height=0.5, **style)
             _write_share(ax, place, share, inside_colour="white" if fits else "black", sampled=bool(sampled))
     if np.isnan(probability).any():
-        ax.text(0.5, 0.5, "no probabilities to be had", transform=ax.transAxes, ha="center", va="center")
+        ax.text(0.5, 0.5, "no probabilities", transform=ax.transAxes, ha="center", va="center")
     else:
         for width, (marker, beside, label) in _WIDTHS.items():
             sampled = comparison["sampled"].values
@@ -128,7 +128,7 @@ def _draw_probabilities(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
 
 
 def _family_label(family: xr.Dataset) -> str:
-    """Name and, below it, what is wrong."""
+    """Return the family's name and, below it, what is wrong."""
     name = str(family["family"].values)
     if not family["sampled"]:
         return f"{name}\nnot sampled: far off"
@@ -166,12 +166,12 @@ def _draw_differences(ax: Axes, comparison: xr.Dataset, places: Any) -> None:
         ax.set_xticks([0.0, *(-(10.0**k) for k in range(1, decades + 1) if k % 2 or decades < 4)])
         ax.set_xlim(1.5 * least, 3.0)
         show_numbers(ax.xaxis)
-    ax.set_xlabel("how left-out samples are foretold:\nelpd difference ± standard error")
+    ax.set_xlabel("prediction of left-out samples:\nelpd difference ± standard error")
     ax.tick_params(axis="y", length=0.0)
 
 
 def _write_verdict(panels: AxesArray, comparison: xr.Dataset) -> None:
-    """Above the panels, from the left edge of the first one."""
+    """Write the verdict above the panels, from the left edge of the first one."""
     words, style, letters = str(comparison.attrs["verdict"]), {"fontsize": "medium"}, 10.5
     if not comparison["fits"].any():
         words, letters = NONE_FITS, 6.5

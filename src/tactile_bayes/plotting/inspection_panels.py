@@ -33,17 +33,17 @@ _LEGEND = ["forward", "backward", "first contact", "snap-off", *(words for words
 
 
 def inspection(inspected: Inspection, *, axes: Any = None) -> AxesArray:
-    """Observables of a record over the drive angle, with what looks wrong, and its unloaded samples enlarged.
+    """Draw the observables of a record over the drive angle, marks of wrong samples, and unloaded samples enlarged.
 
     Parameters
     ----------
     inspected : Inspection
         From `tactile_bayes.inspect_record`.
     axes : array of Axes, shape (3, 2), optional
-        A row for each of holding_moment, force_x and force_y. To the left are readings over the drive angle: vertical
-        lines are between the samples beside first contact (dotted) and snap-off (dashed), in the colour of the sweep's
-        direction; rings and other marks are what looks wrong. To the right are readings of the unloaded samples in the
-        order in which they were measured, with their mean and two standard deviations to either side.
+        A row for each of holding_moment, force_x and force_y. The left Axes hold readings over the drive angle:
+        vertical lines between the samples beside first contact (dotted) and snap-off (dashed) have the colour of the
+        sweep's direction; rings and other marks show samples that look wrong. The right Axes hold readings of the
+        unloaded samples in the order of measurement, with their mean and two standard deviations to either side.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def _draw_unloaded(ax: Axes, inspected: Inspection, index: int) -> None:
 
 
 def _wrong(inspected: Inspection, index: int) -> list[tuple[str, Any]]:
-    """Kinds of wrong samples that are there, with the samples."""
+    """Return the kinds of wrong samples that are present, with their flags."""
     samples = inspected.samples
     flags = {name: samples[name].values for name in _WRONG}
     flags = {name: values[:, index] if values.ndim == 2 else values for name, values in flags.items()}

@@ -1,4 +1,4 @@
-"""Labels: numbers and units, as axes and texts write them."""
+"""Labels: numbers and units as text on axes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
 
 
 def set_unit(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values: Floats) -> None:
-    """Label of an axis with its unit, and in SI tick labels in the fitting multiple of it."""
+    """Label an axis with its unit, and in SI write tick labels in the suitable multiple of it."""
     power, unit = shown_unit(name, attrs, values)
     axis.set_label_text(f"{label}[{unit}]" if unit else label.strip())
     if power:
@@ -37,12 +37,12 @@ def set_unit(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values
 
 
 def show_numbers(axis: Axis, power: int = 0) -> None:
-    """Write ticks of an axis in units of a power of ten."""
+    """Write tick labels of an axis in units of a power of ten."""
     axis.set_major_formatter(lambda value, _: number(value, power))
 
 
 def shown_unit(name: str, attrs: Mapping[Any, Any], values: Floats) -> tuple[int, str]:
-    """Power of ten and name of the unit in which such values of a column are shown; "" for a plain number."""
+    """Return power of ten and name of the unit in which values of a column are shown; "" for a plain number."""
     unit = str(attrs.get("units", "1"))
     column = COLUMNS[name]
     if unit == "1":
@@ -52,12 +52,12 @@ def shown_unit(name: str, attrs: Mapping[Any, Any], values: Floats) -> tuple[int
 
 
 def number(value: float, power: int = 0, *, digits: int = 6) -> str:
-    """A value in units of a power of ten, as a text."""
+    """Return a value as text, in units of a power of ten."""
     return f"{value / 10.0**power:.{digits}g}".replace("-", "−")
 
 
 def percent(share: float) -> str:
-    """A share in per cent, as a text."""
+    """Return a share as text, in per cent."""
     return f"{100.0 * share:.6g} %"
 
 

@@ -13,12 +13,12 @@ __all__ = ["legend", "legend_above", "legend_entries", "legend_entry", "legend_i
 
 
 def legend_entry(ax: Axes, label: str, **style: Any) -> None:
-    """An entry of the legend for a style that is shared by many lines."""
+    """Add a legend entry for a style that many lines share."""
     ax.plot([], [], label=label, **style)
 
 
 def legend_entries(*panels: Axes) -> dict[str, Any]:
-    """Handles of legends by label, each label once."""
+    """Return legend handles by label, each label once."""
     found: dict[str, Any] = {}
     for ax in panels:
         found |= dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
@@ -26,7 +26,7 @@ def legend_entries(*panels: Axes) -> dict[str, Any]:
 
 
 def legend(ax: Axes, entries: Mapping[str, Any] | None = None, **options: Any) -> None:
-    """A legend in small letters without a frame, of given entries or of all that has a label in the Axes."""
+    """Draw a legend in small letters without a frame, of given entries or of all labels in the Axes."""
     if entries is not None:
         if not entries:
             return
@@ -35,12 +35,12 @@ def legend(ax: Axes, entries: Mapping[str, Any] | None = None, **options: Any) -
 
 
 def legend_above(ax: Axes, columns: int, entries: Mapping[str, Any] | None = None, **options: Any) -> None:
-    """Such a legend above the Axes."""
+    """Draw such a legend above the Axes."""
     legend(ax, entries, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, **options)
 
 
 def legend_in_rows(figure: Figure, found: Mapping[str, Any], groups: Sequence[Sequence[str]], columns: int) -> None:
-    """A legend above all panels; each group begins a row, and labels that were not drawn are left out."""
+    """Draw a legend above all panels; each group begins a row, and labels that were not drawn are left out."""
     from matplotlib.lines import Line2D
 
     rows: list[list[str]] = []

@@ -1,4 +1,4 @@
-"""Maps, figures in the plane of object and rod: what they share."""
+"""Common parts of maps, the figures in the plane of object and rod."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ __all__ = [
 
 
 def limits_of(ax: Axes) -> Floats:
-    """Limits of a map in x and in y, with equal scales."""
+    """Return the limits of a map in x and y, after setting equal scales."""
     ax.set_aspect("equal", adjustable="box")
     ax.autoscale_view()
     return np.array([*ax.get_xlim(), *ax.get_ylim()])
 
 
 def finish_map(ax: Axes, attrs: Mapping[Any, Any]) -> None:
-    """Equal scales, labels, and a legend beside or above the data, whichever leaves them larger."""
+    """Set equal scales and labels, and put the legend beside or above the data, whichever leaves more room."""
     limits = limits_of(ax)
     label_map(ax, attrs, limits)
     entries = legend_entries(ax)
@@ -66,7 +66,7 @@ def fit_height(ax: Axes) -> None:
 
 
 def set_below(upper: Axes, lower: Axes) -> None:
-    """Make a panel as wide as the map above it, whose equal scales may leave it narrower, so that their x line up."""
+    """Align a panel in x with the map above it, whose equal scales may make it narrower."""
     from matplotlib.transforms import Bbox
 
     def place(_: Any, renderer: Any) -> Bbox:
@@ -78,7 +78,7 @@ def set_below(upper: Axes, lower: Axes) -> None:
 
 
 def outline(contour: Contour, low: float, high: float) -> tuple[Floats, Floats]:
-    """Points of a contour between two values of x, closest where it may be upright."""
+    """Return points of a contour between two values of x, denser toward the ends, where it may be upright."""
     ends = [float(np.asarray(contour.locate(end).x)) if np.isfinite(end) else float(end) for end in contour.domain]
     low, high = max(low, ends[0]), min(high, ends[1])
     x = low + 0.5 * (high - low) * (1.0 - np.cos(np.linspace(0.0, np.pi, 801)))
@@ -86,7 +86,7 @@ def outline(contour: Contour, low: float, high: float) -> tuple[Floats, Floats]:
 
 
 def draw_object(ax: Axes, contour: Contour, x: Floats, y: Floats, room: float) -> None:
-    """The object, as far as the map shows it: some points with room around them, unless its limits are set."""
+    """Draw the object in a map that shows given points with a margin around them, unless its limits are set."""
     ax.update_datalim([(x.min() - room, y.min() - room), (x.max() + room, y.max() + room)])
     ax.margins(0.0)
     left, right, _, top = limits_of(ax)
@@ -102,7 +102,7 @@ def draw_pivot(ax: Axes, base: tuple[float, float], *, colour: str = "black", la
 
 
 def draw_gap(ax: Axes, left: float, right: float, text: str, *, hatched: bool = True) -> Text:
-    """A stretch in x from bottom to top, and what it is; the text is returned."""
+    """Shade a stretch in x from bottom to top, and return its label."""
     style: dict[str, Any] = {"facecolor": PALETTE["gap"], "alpha": 0.25, "edgecolor": "0.5", "linewidth": 0.0}
     ax.axvspan(left, right, hatch="///" if hatched else None, zorder=0.5, **style)
     return write_on_top(ax, 0.5 * (left + right), text)

@@ -18,10 +18,10 @@ PALETTE: Mapping[str, str] = {
     "median": "#0072B2",
     "gap": "#F0E442",
 }
-"""Colours after Okabe and Ito, told apart with any colour vision."""
+"""Colours after Okabe and Ito, distinguishable with any colour vision."""
 
 BASES = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
-"""Colours of bases in their order, after Okabe and Ito, without the gap's; used over again from the seventh base on."""
+"""Colours of bases in their order, after Okabe and Ito, without the gap's; the seventh base has the first again."""
 
 BEST: Mapping[str, Any] = {"marker": "*", "color": "#D55E00", "markeredgecolor": "white", "linestyle": "none"}
 """The mark on the best of several choices."""

@@ -1,4 +1,4 @@
-"""What figures of a plan have in common: which dataset they draw, and logarithmic axes."""
+"""Common parts of figures of a plan: their dataset, and logarithmic axes."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 __all__ = ["check_among", "group_of", "set_log_scale"]
 
 _TICKS = {0.9: (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0), 2.2: (1.0, 2.0, 5.0), np.inf: (1.0,)}
-"""In a decade of a logarithmic axis, by how many decades it has at most."""
+"""Ticks in a decade of a logarithmic axis, by the largest number of decades."""
 
 
 def group_of(found: Any, name: str, variables: set[str]) -> xr.Dataset:
-    """The dataset that a figure is drawn from: it may be given itself, as a group, or in the whole of a `sensitivity`.
+    """Return the dataset of a figure, given as a dataset, as a group, or in a whole result of `sensitivity`.
 
     Raises
     ------
     ParameterError
-        If it is another.
+        If it is not such a dataset.
     """
     if isinstance(found, xr.DataTree):
         found = (found[name] if name in found.children else found).to_dataset()
@@ -37,21 +37,21 @@ def group_of(found: Any, name: str, variables: set[str]) -> xr.Dataset:
 
 
 def check_among(name: str, value: str, found: xr.Dataset) -> None:
-    """Refuse what is none of the labels along a dimension.
+    """Refuse a value that is not a label along a dimension.
 
     Raises
     ------
     ParameterError
-        If it is another.
+        If it is not one of the labels.
     """
     if value not in found[name].values:
         raise ParameterError(f"{name} is {value!r}: there are {', '.join(map(str, found[name].values))}")
 
 
 def set_log_scale(axis: Axis, label: str, name: str, attrs: Mapping[Any, Any], values: Floats) -> None:
-    """A logarithmic axis that just holds positive values of a column, with its unit in the label.
+    """Make an axis logarithmic, with limits around the positive values of a column and its unit in the label.
 
-    Other than `set_unit`, it labels minor ticks not at all: matplotlib would write them in another unit.
+    Unlike `set_unit` it leaves minor ticks without labels, which Matplotlib would write in another unit.
     """
     from matplotlib.ticker import LogFormatterMathtext, LogLocator, NullFormatter
 

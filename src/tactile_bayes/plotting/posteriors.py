@@ -30,21 +30,22 @@ _TRUTH: dict[str, Any] = {"color": PALETTE["change"], "linestyle": "--", "linewi
 
 
 def trace(posterior: xr.DataTree | xr.Dataset, *, names: Sequence[str] | None = None, axes: Any = None) -> AxesArray:
-    """Draws of each chain, and their density chain by chain: chains that agree look alike.
+    """Draw the trace of each chain, and its density: chains that agree look alike.
 
     Parameters
     ----------
     posterior : xr.DataTree or xr.Dataset
-        Group "posterior" of a tree, or that dataset: variables over "chain" and "draw".
+        Tree with a group "posterior", or that dataset: variables over "chain" and "draw".
     names : sequence of str, optional
-        Which variables; by default all.
+        Names of the variables; by default all.
     axes : array_like of Axes, shape (parameters, 2), optional
         One row for each parameter; a variable with further dimensions is one parameter for each of its elements.
 
     Returns
     -------
     ndarray of Axes, shape (parameters, 2)
-        Left the draws in their order, thinned to at most 2000 a chain; right a histogram for each chain.
+        The left Axes hold the draws in their order, thinned to at most 2000 a chain; the right ones a histogram for
+        each chain.
 
     Raises
     ------
@@ -94,27 +95,27 @@ def pairs(
     truth: Mapping[str, float] | None = None,
     axes: Any = None,
 ) -> AxesArray:
-    """Marginals of the posterior, one by one and in pairs.
+    """Draw the marginals of the posterior, one by one and in pairs.
 
-    On the diagonal a histogram, its central 95 % interval dark; below it the regions of highest density that hold 50 %
+    The diagonal holds histograms, with the central 95 % interval dark; below it are the highest-density regions of 50 %
     and 95 % of the draws, from a histogram smoothed by one bin.
 
     Parameters
     ----------
     posterior : xr.DataTree or xr.Dataset
-        Group "posterior" of a tree, or that dataset: variables over "chain" and "draw".
+        Tree with a group "posterior", or that dataset: variables over "chain" and "draw".
     names : sequence of str, optional
-        Which variables; by default all.
+        Names of the variables; by default all.
     truth : mapping of str to float, optional
-        True values, by name of the parameter; drawn as dashed lines.
+        True values by name of the parameter, in its unit; drawn as dashed lines.
     axes : array_like of Axes, shape (parameters, parameters), optional
-        A variable with further dimensions is one parameter for each of its elements.
+        One for each pair of parameters; a variable with further dimensions is one parameter for each of its elements.
 
     Returns
     -------
     ndarray of Axes, shape (parameters, parameters)
-        Those above the diagonal are switched off. A figure of more than six parameters (seven in print) is wider than 7
-        inches, so that letters have room: for a page, choose `names`.
+        Axes above the diagonal are switched off. A figure of more than six parameters (seven in print) is wider than 7
+        inches, so that labels fit: for a page, choose `names`.
 
     Raises
     ------
@@ -204,7 +205,7 @@ def _parameters(posterior: xr.DataTree | xr.Dataset, names: Sequence[str] | None
 
 
 def _symbol(name: str) -> str:
-    """Short names are symbols, longer ones words."""
+    """Return the label of a parameter: short names are symbols, longer ones text."""
     if match := re.fullmatch(r"([A-Za-z])(?:_([A-Za-z0-9]{1,3}))?", name):
         letter, index = match.groups()
         return f"${letter}$" if index is None else rf"${letter}_{{\mathrm{{{index}}}}}$"
@@ -212,7 +213,7 @@ def _symbol(name: str) -> str:
 
 
 def _label_parameter(axis: Axis, parameter: _Parameter, most_ticks: int, *, lines: bool = True) -> None:
-    """Label and ticks of an axis; where values are small or large, in a power of ten that the label names."""
+    """Set label and ticks of an axis; small or large values are in units of a power of ten that the label names."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     largest = np.max(np.abs(_core(parameter.draws)))
@@ -230,7 +231,7 @@ def _label_parameter(axis: Axis, parameter: _Parameter, most_ticks: int, *, line
 
 
 def _core(draws: Floats) -> tuple[float, float]:
-    """Where the draws are, but for one in a thousand on either side."""
+    """Return the range of the draws, except one in a thousand on either side."""
     finite = draws[np.isfinite(draws)]
     if not finite.size:
         return 0.0, 1.0
@@ -242,7 +243,7 @@ def _core(draws: Floats) -> tuple[float, float]:
 
 
 def _view(parameter: _Parameter, truth: float | None = None) -> tuple[float, float]:
-    """The same with the truth and some room."""
+    """Return the same range, extended by the truth and a margin."""
     low, high = _core(parameter.draws)
     if truth is not None:
         low, high = min(low, truth), max(high, truth)
@@ -271,7 +272,7 @@ def _draw_pair(ax: Axes, x: Floats, y: Floats) -> None:
     counts, *edges = np.histogram2d(x, y, _bins(x, 30), (_core(x), _core(y)))
     density = gaussian_filter(counts, 1.0, mode="nearest")
     levels = _highest_density(density, _REGIONS)
-    # A rim of zeros closes the regions where the draws end, at a wall too.
+    # A rim of zeros closes the regions where the draws end, also at a bound of the prior.
     at = [np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]]) for e in edges]
     rimmed = np.pad(density, 1).T
     colours = [PALETTE["band"], PALETTE["median"]]
@@ -280,7 +281,7 @@ def _draw_pair(ax: Axes, x: Floats, y: Floats) -> None:
 
 
 def _highest_density(density: Floats, probabilities: Sequence[float]) -> list[float]:
-    """Levels above which a density holds given probabilities, from the greatest probability to the least."""
+    """Return levels above which a density holds given probabilities, from the largest probability to the smallest."""
     falling = np.sort(density, axis=None)[::-1]
     mass = np.cumsum(falling) / falling.sum()
     levels = [float(falling[min(int(np.searchsorted(mass, p)), falling.size - 1)]) for p in sorted(probabilities)]

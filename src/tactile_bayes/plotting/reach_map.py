@@ -1,4 +1,4 @@
-"""Contours that the prior expects, and those that the posterior leaves possible, on a map of the rod's reach."""
+"""Contours drawn from prior and posterior, on a map of the rod's reach."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 __all__ = ["posterior_contours", "prior_contours"]
 
 _ROOM = 0.06
-"""What the map shows beside the rod's reach, in rod lengths."""
+"""Margin of the map beside the rod's reach [rod lengths]."""
 
 _BELOW = 0.2
-"""What it shows below the pivot at least, likewise."""
+"""Smallest extent of the map below the pivot [rod lengths]."""
 
 _DRAWS = 400
-"""Of which the posterior's median is taken."""
+"""Number of draws for the posterior's median."""
 
 _THIN = 0.6
-"""Width of a contour's line."""
+"""Width of a contour's line [points]."""
 
 _PRIOR = "#E69F00"
-"""Of the prior where the posterior lies over it."""
+"""Colour of the prior below the posterior."""
 
 _COUNT = "give a whole number from 1 up, like 40"
 _DASHED: dict[str, Any] = {"linestyle": (0, (6.0, 3.0)), "linewidth": 1.0}
@@ -49,23 +49,23 @@ def prior_contours(
     truth: Contour | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Contours drawn from the prior: does it expect what might be there, and nothing that cannot?
+    """Draw contours from the prior, to see whether it covers the possible contours and no others.
 
-    Beyond the rod's reach they are paler. The legend says which share of the prior is within reach of every sweep: the
-    rest is excluded, and not drawn.
+    Contours are paler beyond the rod's reach. The legend states the share of the prior that is within reach of every
+    sweep; the rest is excluded, and not drawn.
 
     Parameters
     ----------
     posterior : xr.DataTree
-        From `infer_contour`, of which the group `prior` is drawn: contours within reach in every sweep.
+        From `infer_contour`; its group `prior` is drawn, which holds contours within reach in every sweep.
     contours : int
-        How many, evenly picked from the draws.
+        Number of contours, evenly picked from the draws.
     median : bool
-        Whether the posterior's median is drawn over them, where the rod touched.
+        If True, the posterior's median is drawn over them, along the touched stretch.
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -102,21 +102,21 @@ def prior_contours(
 def posterior_contours(
     posterior: xr.DataTree, *, contours: int = 40, truth: Contour | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Contours drawn from the posterior over contours drawn from the prior: what the record has told.
+    """Draw contours from the posterior over contours from the prior, to see what the record has added.
 
-    Beyond the rod's reach they are paler. Where both look alike the record says nothing. A good posterior is a single
-    line on a map: `band_detail` enlarges it.
+    Contours are paler beyond the rod's reach. If both look alike, the record is uninformative. A good posterior is a
+    single line on a map: `band_detail` enlarges it.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`; without a group `prior` the posterior alone is drawn.
     contours : int
-        How many of each, evenly picked from the draws.
+        Number of contours of each, evenly picked from the draws.
     truth : Contour, optional
         The true contour.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def posterior_contours(
     Raises
     ------
     ParameterError
-        If the tree is no posterior of a contour, or `contours` is not positive.
+        If the tree is not a posterior of a contour, or `contours` is not positive.
 
     Examples
     --------
@@ -161,10 +161,10 @@ def _draw(
     touched: tuple[Floats, Floats] | None = None,
     entry_width: float = 1.5,
 ) -> Axes:
-    """Layers of contours, paler beyond the circles around the pivots, with what lies over them.
+    """Draw layers of contours, paler beyond the circles around the pivots, with median, truth and pivots over them.
 
-    A layer is a label, many contours, of which some are evenly picked, and a colour. The map shows what is within reach
-    and what is between that and the lowest contour.
+    A layer is a label, many contours, of which some are evenly picked, and a colour. The map extends over the rod's
+    reach and down to the lowest contour.
     """
     from matplotlib.patches import Circle
 
@@ -205,7 +205,7 @@ def _draw(
 
 
 def _median(posterior: xr.DataTree) -> tuple[Floats, Floats]:
-    """Points of the posterior's median, where the rod touched."""
+    """Return points of the posterior's median along the touched stretch."""
     from tactile_bayes.uncertainty.band import contour_heights
 
     events = posterior["events"].to_dataset()

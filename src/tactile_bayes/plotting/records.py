@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["observables", "predictive"]
 
 _SWEEPS = {"forward": "#0072B2", "backward": "#B34700"}
-"""Colours of residuals, after Okabe and Ito, of which two sweeps lie over one another."""
+"""Colours of residuals of two overlapping sweeps, after Okabe and Ito."""
 
 _ENDS = ("lower", "upper")
 _FARTHEST = 8.0
-"""Residual up to which a panel reaches at most: else one far off would flatten all others."""
+"""Largest residual within a panel's limits: a single outlier must not flatten all others."""
 
 _TURNING_LABELS = {
     **LABELS,
@@ -42,17 +42,18 @@ _TURNING_LABELS = {
 def observables(
     record: xr.Dataset, *, events: Mapping[str, SweepEvents] | None = None, axes: Sequence[Axes] | None = None
 ) -> AxesArray:
-    """Holding moment and support reaction over the drive angle, like Figures 3 to 6 of Merker et al. 2018.
+    """Draw holding moment and support reaction over the drive angle, like Figures 3 to 6 of Merker et al. 2018.
 
-    Doi 10.1155/2018/1613945. A record without noise, as `scan` gives it, is drawn as lines coloured by contact phase;
-    any other as points, with its truth, where it has one, as thin lines. Forces are drawn in the frame of the record.
+    The paper's doi is 10.1155/2018/1613945. A record without noise, as `scan` returns it, is drawn as lines coloured by
+    contact phase; any other record as points, with its truth, if it has one, as thin lines. Forces are drawn in the
+    frame of the record.
 
     Parameters
     ----------
     record : xr.Dataset
         A record.
     events : mapping of str to SweepEvents, optional
-        By direction, as a scan has them, in whatever frame the record is; first contact, phase changes and snap-off are
+        Events by direction, as in a scan, for a record in either frame; first contact, phase changes and snap-off are
         marked.
     axes : sequence of 3 Axes, optional
         One for each of holding_moment, force_x and force_y.
@@ -65,7 +66,7 @@ def observables(
     Raises
     ------
     RecordError
-        If `record` is no record.
+        If `record` is not a valid record.
     ParameterError
         If there are not three axes.
 
@@ -93,37 +94,37 @@ def predictive(
     residuals: Sequence[Axes] | None = None,
     label: str = "predicted",
 ) -> AxesArray:
-    """Measured observables over their posterior predictive interval, and how far off it they are.
+    """Draw measured observables over their posterior predictive interval, and their residuals.
 
-    A residual is a reading less the middle of its interval, over half the interval's width: within ±1 it lies in the
-    interval. Readings that such a contour does not explain make their own noise large, and hide in an interval that
-    holds it; their residuals do not scatter, but wander.
+    A residual is a reading less the middle of its interval, over half the interval's width: within ±1 the reading lies
+    in the interval. Misfit enlarges the inferred noise, so that misfitting readings may lie in their intervals; their
+    residuals then drift instead of scattering.
 
     Parameters
     ----------
     record : xr.Dataset
         A record.
     predicted : xr.Dataset
-        Over "sample" as the record: for a channel, say force_x, the interval is force_x_lower to force_x_upper, in the
-        units and the frame of the record. Channels without an interval are drawn without.
+        Over "sample" as the record, from `predictive_interval`: for a channel such as force_x the interval is
+        force_x_lower to force_x_upper, in the units and the frame of the record. Intervals may be missing.
     axes : sequence of 3 Axes, optional
         One for each of holding_moment, force_x and force_y.
     residuals : sequence of 3 Axes, optional
-        Likewise, for the residuals of each; with `axes` alone these are not drawn.
+        Axes for the residuals of each channel; if `axes` alone are given, residuals are not drawn.
     label : str
-        What the interval is called in the legend.
+        Label of the interval in the legend.
 
     Returns
     -------
     ndarray of Axes, shape (3,)
-        Of the channels; drive angles are in degrees. A figure that is made here has residuals below each.
+        Axes of the channels; drive angles are in degrees. A new figure has residuals below each channel.
 
     Raises
     ------
     RecordError
-        If `record` is no record.
+        If `record` is not a valid record.
     ParameterError
-        If there are not three axes, or residuals have some and channels none, or `predicted` has not the samples of the
+        If there are not three axes, or axes for residuals alone, or `predicted` does not have the samples of the
         record, or states another frame.
 
     Examples
@@ -218,7 +219,7 @@ def _finish_panels(panels: AxesArray, own: bool, columns: int = 4) -> None:
 
 
 def _legend_order(label: str) -> int:
-    """Directions, then phases, then the rest in the order of the sweep."""
+    """Return the rank of a label: directions, then phases, then the rest in the order of the sweep."""
     words = ("forward", "backward", "tip contact", "tangential contact", "truth", "first", "change", "snap")
     return next((i for i, word in enumerate(words) if word in label), len(words))
 
@@ -257,7 +258,7 @@ def _sweeps(record: xr.Dataset) -> Iterator[xr.Dataset]:
 
 
 def _is_exact(sweep: xr.Dataset, channel: str) -> bool:
-    """Whether a channel is that of a scan, or of a load cell without noise."""
+    """Return True if a channel comes from a scan, or from a load cell without noise."""
     if "truth_contact_phase" not in sweep:
         return False
     truth = f"truth_{channel}"
@@ -274,7 +275,7 @@ def _draw_line(
     *,
     linewidth: float,
 ) -> None:
-    """A channel without noise, coloured by phase, and complete up to the events."""
+    """Draw a channel without noise, coloured by phase, and complete up to the events."""
     angle_column = "truth_drive_angle" if "truth_drive_angle" in sweep else "drive_angle"
     angle, value = sweep[angle_column].values, sweep[column].values
     direction = str(sweep["direction"].values[0])

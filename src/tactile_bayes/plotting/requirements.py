@@ -1,4 +1,4 @@
-"""What a band of some width requires: the load cell's noise that it allows, and the rod that suits a load cell."""
+"""Requirements for a band of given width: the noise of the load cell, and the rod that suits a load cell."""
 
 from __future__ import annotations
 
@@ -31,26 +31,27 @@ _REFUSED: dict[str, dict[str, Any]] = {
 
 
 def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> Axes:
-    """Mean width of the band that is to be expected over the noise of the load cell, both logarithmic.
+    """Draw the expected mean width of the band over the noise of the load cell, both logarithmic.
 
-    Noise of the forces is below, noise of the moment that goes with it above. The plan's own load cell is marked.
+    The lower axis is the noise of the forces, the upper axis the noise of the moment in proportion. The plan's own load
+    cell is marked.
 
     Parameters
     ----------
     found : xr.Dataset or xr.DataTree
-        What `tactile_bayes.sensitivity` returned, or its group "required_noise".
+        Result of `tactile_bayes.sensitivity`, or its group "required_noise".
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
     Axes
-        Where priors alone give every band that was asked for there is nothing to be drawn, and the Axes say so.
+        If the priors alone give every band that was asked for, the Axes hold a note instead.
 
     Raises
     ------
     ParameterError
-        If this is no such group.
+        If the argument does not hold that group.
 
     Examples
     --------
@@ -97,27 +98,27 @@ def required_noise(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -
 
 
 def required_rod(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """Mean width of the band that is to be expected over the length and the diameter of the rod.
+    """Draw the expected mean width of the band over the length and the diameter of the rod.
 
-    Rods that are bent too far, touch little of the contour or none, or cannot be swept, are hatched; of the others the
-    one with the narrowest band is marked.
+    Rods that are bent too far, touch little or nothing of the contour, or cannot be swept, are hatched; among the
+    others, the rod with the narrowest band is marked.
 
     Parameters
     ----------
     found : xr.Dataset
         From `tactile_bayes.required_rod`.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
     Axes
-        Beside it, in its figure, stands the scale of colours.
+        The figure also holds the colour bar.
 
     Raises
     ------
     ParameterError
-        If this is none.
+        If the argument is not a result of `required_rod`.
 
     Examples
     --------
@@ -192,5 +193,5 @@ def _band_in_words(found: xr.Dataset) -> str:
 
 
 def _plain(attrs: Mapping[Any, Any], si: str) -> dict[str, str]:
-    """In the words of a record: without a unit where it is in units of the rod."""
+    """Return the unit as records state it: "1" for quantities in units of the rod."""
     return {"units": si if attrs.get("units") == si else "1"}

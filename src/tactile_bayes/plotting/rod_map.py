@@ -1,4 +1,4 @@
-"""The rod on the map: deformed, along a sweep."""
+"""Deformed rods along a sweep, on a map."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ def rods(
     count: int = 15,
     ax: Axes | None = None,
 ) -> Axes:
-    """Deformed rods along a sweep, coloured by contact phase, like Figures 7 to 10 of Merker et al. 2018.
+    """Draw deformed rods along a sweep, coloured by contact phase, like Figures 7 to 10 of Merker et al. 2018.
 
-    Doi 10.1155/2018/1613945.
+    The paper's doi is 10.1155/2018/1613945.
 
     Parameters
     ----------
     scan : Scan
         A scan.
     direction : {"forward", "backward"}, optional
-        Which sweep, where there is one of this direction; by default the forward one.
+        Direction of the sweep, if the scan has one sweep of this direction; by default forward.
     sweep : int, optional
-        Which sweep, by its number in the record, instead of the direction: for scans with several bases.
+        Number of the sweep in the record, instead of its direction: for scans with several bases.
     count : int
-        How many of its states are drawn at most, evenly over the samples in contact; first contact, phase changes and
-        snap-off come on top.
+        Largest number of rods, evenly over the samples in contact; those at first contact, phase changes and snap-off
+        are added.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def rods(
 
 
 def _number(scan: Scan, direction: str | None, sweep: int | None) -> int:
-    """Number of the one sweep that is asked for."""
+    """Return the number of the requested sweep."""
     if sweep is not None:
         if direction is not None:
             raise ParameterError(f"both direction={direction!r} and sweep={sweep!r} are given: one of them is enough")

@@ -13,10 +13,10 @@ __all__ = ["COLUMN_WIDTH", "PAGE_WIDTH", "STYLES", "Style", "style"]
 Style = Literal["print", "screen"]
 
 COLUMN_WIDTH = 3.5
-"""Of a figure that fills one column of a journal [inches]."""
+"""Width of a figure that fills one column of a journal [inches]."""
 
 PAGE_WIDTH = 7.0
-"""Of one that fills both columns, or a page [inches]; every figure that a function of `plotting` makes is as wide."""
+"""Width of a figure that fills both columns, or a page [inches]; the default of all functions of `plotting`."""
 
 _COMMON: Mapping[str, Any] = {
     "font.family": ["sans-serif"],
@@ -32,7 +32,7 @@ _COMMON: Mapping[str, Any] = {
 }
 
 _TICKS = {"major.width": 0.6, "minor.width": 0.4, "major.size": 3.0, "minor.size": 1.8}
-"""Of both axes, in print."""
+"""Ticks of both axes, in print."""
 
 
 def _letters(size: float, at_ticks: float) -> dict[str, float]:
@@ -66,14 +66,14 @@ STYLES: Mapping[Style, Mapping[str, Any]] = {
 
 @contextmanager
 def style(name: Style = "print") -> Iterator[None]:
-    """Give figures that are made and saved inside the block one look; matplotlib's settings are put back after it.
+    """Give figures that are made and saved inside the block one look; Matplotlib's settings are restored after it.
 
     Parameters
     ----------
     name : {"print", "screen"}
-        "print" has letters of 8 points and thin axes, for figures that are 7 inches wide or, in one column, 3.5, and
-        are put into a text at that size. "screen" has letters of 10 points. In both, PDF holds text in TrueType fonts
-        and SVG holds it as text, so that both can be searched and edited.
+        "print" has letters of 8 points and thin axes, for figures that are printed 7 inches wide or, in one column, 3.5
+        inches wide. "screen" has letters of 10 points. In both, PDF holds text in TrueType fonts and SVG holds it as
+        text, so that both can be searched and edited.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A sweep over the drive angle: its readings, its lines complete up to the events, and panels of channels."""
+"""Sweeps over the drive angle: readings, lines complete up to the events, and panels of channels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ EVENT_MARKERS: Mapping[str, Mapping[str, Any]] = {
 
 
 def reading_style(direction: str, colour: str) -> dict[str, Any]:
-    """How single readings of a sweep are marked."""
+    """Return the style of single readings of a sweep."""
     style = {"marker": SWEEP_MARKERS[direction], "markersize": 2.6, "color": colour}
     return style | {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 0.6}
 
@@ -53,7 +53,7 @@ def draw_events(ax: Axes, events: SweepEvents, channel: str, frame: Frame, size:
 def with_events(
     angle: Floats, value: Floats, phase: Phases, events: SweepEvents, channel: str, frame: Frame
 ) -> tuple[Floats, Floats, Phases]:
-    """Samples of a channel with those at the events among them, in the order in which the drive comes by."""
+    """Return the samples of a channel and its values at the events, in the order of the drive."""
     marked = [events.first_contact, *events.transitions, events.snap_off]
     following = [event.kind.split(" → ")[-1] for event in marked[:-1]]
     angle = np.append(angle, [event.drive_angle for event in marked])
@@ -64,7 +64,7 @@ def with_events(
 
 
 def phase_runs(phase: Phases) -> Iterator[slice]:
-    """Stretches of one phase, each up to the first state of the next, unless the rod has let go in between."""
+    """Yield stretches of one phase, each up to the first state of the next, unless the rod has let go in between."""
     starts = np.flatnonzero(np.append(True, phase[1:] != phase[:-1]))
     for start, stop in zip(starts, np.append(starts[1:], phase.size), strict=True):
         joined = stop < phase.size and phase[stop] != "none"
@@ -72,7 +72,7 @@ def phase_runs(phase: Phases) -> Iterator[slice]:
 
 
 def _load_of(event: Event, channel: str, frame: Frame) -> float:
-    """A load of an event in the frame of a record; events are in the fixed one."""
+    """Return a load of an event in the frame of a record; events are in the fixed frame."""
     loads = {name: getattr(event, name) for name in CHANNELS}
     if frame == "turning":
         loads["force_x"], loads["force_y"] = turned(event.force_x, event.force_y, event.drive_angle)
@@ -80,7 +80,7 @@ def _load_of(event: Event, channel: str, frame: Frame) -> float:
 
 
 def finish_channels(panels: Iterable[Axes], order: Callable[[str], int], columns: int, **options: Any) -> None:
-    """Give panels few ticks, and the first of them a legend of all in an order of the labels."""
+    """Give panels few ticks, and the first panel a legend for all of them, ordered by label."""
     from matplotlib.ticker import MaxNLocator
 
     panels = list(panels)

@@ -1,4 +1,4 @@
-"""A plan over the drive angle of its sweeps: how errors grow, what a reading tells, and whose noise it is."""
+"""Figures of a plan over the drive angle: error amplification, information, and shares of the noise."""
 
 from __future__ import annotations
 
@@ -42,27 +42,27 @@ _VARIABLES = {
 _STYLES = {"along": "-", "across": "--"}
 
 _CLOSEST = 0.004
-"""Distance from first contact and snap-off, over the sweep's length, from which on all errors are in the figure."""
+"""Distance from first contact and snap-off, over the sweep's length, beyond which all errors are within the limits."""
 
 _STRIP = 0.035
 """Height of the strips below the curves, over that of the Axes."""
 
 
 def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes | None = None) -> Axes:
-    """Standard deviation of contact points along and across the contour, over the drive angle of a sweep.
+    """Draw the standard deviation of contact points along and across the contour, over the drive angle of a sweep.
 
-    To first order, from all errors of the load cell and the encoder together. A shaded strip at the bottom tells for
-    each method where first order does not hold, and its curves are thin there. Toward first contact and snap-off errors
-    may grow without bound: there the curves leave the Axes.
+    It is that of first-order error propagation, from all errors of the load cell and the encoder together. A shaded
+    strip at the bottom shows for each method where first order does not hold, and its curves are thin there. Toward
+    first contact and snap-off errors may grow without bound: there the curves leave the Axes.
 
     Parameters
     ----------
     found : xr.Dataset or xr.DataTree
-        What `tactile_bayes.sensitivity` returned, or its group "amplification".
+        Result of `tactile_bayes.sensitivity`, or its group "amplification".
     sweep : int
         Number of the sweep.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
     Raises
     ------
     ParameterError
-        If this is no such group, or there is no such sweep.
+        If the argument does not hold that group, or there is no such sweep.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
         of_method, colour = grown.sel(reconstruction=method), METHOD_COLOURS[method]
         holds = of_method["holds"].values
         phase = of_method["contact_phase"].values
-        # Constrained errors jump where the phase changes: no line goes over that. Raw ones know of no phase.
+        # Constrained errors jump where the phase changes, so their line is interrupted; raw ones ignore the phase.
         changes = np.flatnonzero((phase[1:] != phase[:-1]) & (method == "constrained")) + 1
         for side, style in _STYLES.items():
             deviation = of_method[f"sd_{side}"].values
@@ -123,27 +123,28 @@ def amplification(found: xr.Dataset | xr.DataTree, *, sweep: int = 0, ax: Axes |
 
 
 def information(found: xr.Dataset | xr.DataTree, *, ax: Axes | None = None) -> Axes:
-    """Leverage of every reading over the drive angle, by channel and direction.
+    """Draw the leverage of every reading over the drive angle, by channel and direction.
 
-    The leverage of a reading is how many parameters are known by it: it is between 0 and 1, and all of them together
-    are as many as the record tells. Readings without contact tell of the load cell's zero.
+    The leverage of a reading is its diagonal element of the hat matrix, between 0 and 1: the number of parameters that
+    it determines. The sum over all readings is the number of parameters that the record determines. Readings without
+    contact determine the load cell's zero.
 
     Parameters
     ----------
     found : xr.Dataset or xr.DataTree
-        What `tactile_bayes.sensitivity` returned, or its group "information".
+        Result of `tactile_bayes.sensitivity`, or its group "information".
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
     Axes
-        Drive angles are in degrees. The legend has the sum of the leverage for each channel.
+        Drive angles are in degrees. The legend states the sum of the leverage for each channel.
 
     Raises
     ------
     ParameterError
-        If this is no such group.
+        If the argument does not hold that group.
 
     Examples
     --------
@@ -183,32 +184,34 @@ def noise_shares(
     sweep: int = 0,
     ax: Axes | None = None,
 ) -> Axes:
-    """Shares of the variance of a contact's error by whose noise they come from, stacked, over a sweep.
+    """Draw the shares of the variance of a contact's error by the source of noise, stacked, over a sweep.
 
-    What is missing of one is called "together": it comes from noises that act together, and is large where first order
-    does not hold. Shares are estimates: those below 0 are drawn as 0, and a stack may rise a little above 1.
+    The shares are first-order Sobol' indices (Sobol' 2001). The remainder to 1 is called "together": it comes from
+    interactions of several noises, and is large where first order does not hold. Shares are estimates: those below 0
+    are drawn as 0, and a stack may rise a little above 1.
 
     Parameters
     ----------
     found : xr.Dataset or xr.DataTree
-        What `tactile_bayes.sensitivity` returned, or its group "noise_shares".
+        Result of `tactile_bayes.sensitivity`, or its group "noise_shares".
     reconstruction : {"raw", "constrained"}
+        Method of Step 2.
     error : {"along", "across"}
-        Along the contour, or across it.
+        Error along the contour, or across it.
     sweep : int
         Number of the sweep.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
     Axes
-        Drive angles are in degrees. A place at which some of the noise leaves no answer is hatched.
+        Drive angles are in degrees. Angles at which Step 2 has no solution for some of the noise are hatched.
 
     Raises
     ------
     ParameterError
-        If this is no such group, or it has not what is chosen.
+        If the argument does not hold that group, or the group does not hold the choice.
 
     Examples
     --------
@@ -249,7 +252,7 @@ def noise_shares(
 
 
 def _of_sweep(found: xr.Dataset, sweep: int) -> xr.Dataset:
-    """Its samples in order of the drive angle.
+    """Return the samples of a sweep in the order of the drive angle.
 
     Raises
     ------
@@ -264,7 +267,7 @@ def _of_sweep(found: xr.Dataset, sweep: int) -> xr.Dataset:
 
 
 def _events(grown: xr.Dataset) -> tuple[float, float]:
-    """First contact and snap-off [degrees]."""
+    """Return the drive angles of first contact and snap-off [degrees]."""
     sense = 1.0 if grown["direction"].values[0] == "forward" else -1.0
     angle = grown["drive_angle"].values[0]
     first = angle - sense * grown["after_first_contact"].values[0]
@@ -283,14 +286,14 @@ def _mark_events(ax: Axes, first: float, last: float) -> None:
 
 
 def _joined(chosen: np.ndarray) -> np.ndarray:
-    """With each sample that comes after a chosen one, so that thick and thin lines meet."""
+    """Return the choice extended by each sample after a chosen one, so that thick and thin lines meet."""
     near = chosen.copy()
     near[1:] |= chosen[:-1]
     return near
 
 
 def _runs(chosen: np.ndarray, angle: Floats) -> list[tuple[float, float]]:
-    """Where samples are chosen, from the middle between two to the middle between two."""
+    """Return the intervals of chosen samples, bounded midway to the neighbours that are not chosen."""
     edges = np.concatenate([angle[:1], 0.5 * (angle[1:] + angle[:-1]), angle[-1:]])
     change = np.diff(np.concatenate([[0], chosen.astype(int), [0]]))
     begins, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1)

@@ -1,4 +1,4 @@
-"""How much the contour tightens the single contacts: both beside one another, and the ratio of their spreads."""
+"""Single contacts beside the contacts that the contour implies, and the ratio of their standard deviations."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _ON_MAP = 18
 _ALONG, _ACROSS = "#009E73", "#CC79A7"
 _IMPLIED = "#000000"
 _HIGHEST = 0.9
-"""Height of the map over that of each row below it, at most."""
+"""Largest height of the map over that of each row below it."""
 
 _PANEL = 0.25
-"""Height of such a row over the width of the figure."""
+"""Height of a row below the map over the width of the figure."""
 
 
 def tightening(
@@ -44,27 +44,27 @@ def tightening(
     truth: Contour | None = None,
     axes: Any = None,
 ) -> AxesArray:
-    """Single contacts beside the contacts that the contour implies: how much the whole record tightens each of them.
+    """Draw single contacts beside the contacts that the contour implies, which the whole record tightens.
 
-    A map with the ellipses of single contacts, three of them enlarged with the ellipses that the contour implies, and
-    over the drive angle how many times smaller the standard deviations along and across the contour have become. Below
-    1 they are larger: a contour posterior may know that the rig is not as stated, single contacts take it as it is.
+    The figure has a map with the ellipses of single contacts, three details with the ellipses that the contour implies,
+    and, over the drive angle, the ratio of the standard deviations along and across the contour. A ratio below 1 is
+    possible: a contour posterior may find that the rig is not as stated, while single contacts assume that it is.
 
     Parameters
     ----------
     implied : xr.DataTree
         From `implied_contacts`.
     single : xr.DataTree or xr.Dataset
-        Of the same record, from `infer_contacts`, or from `reconstruct` with standard deviations, of which those whose
-        status is "ok" are shown.
+        Contacts of the same record, from `infer_contacts`, or from `reconstruct` with standard deviations, of which
+        those with status "ok" are shown.
     probability : float
-        Of each ellipse.
+        Probability of each ellipse, in (0, 1).
     samples : sequence of int, optional
-        The three that are enlarged; by default evenly picked from the sweep with the most contacts.
+        The three samples that are enlarged; by default evenly picked from the sweep with the most contacts.
     truth : Contour, optional
         The true contour.
     axes : array_like of Axes, shape (5,), optional
-        For the map, the three details, and the ratios.
+        Axes for the map, the three details, and the ratios.
 
     Returns
     -------
@@ -73,8 +73,8 @@ def tightening(
     Raises
     ------
     ParameterError
-        If the two are not of one record, no contact or another number than three can be enlarged, or the probability
-        is not in (0, 1).
+        If the two are not of one record, there are not three contacts to be enlarged, or the probability is not in
+        (0, 1).
 
     Examples
     --------
@@ -129,7 +129,7 @@ def _refuse_another_record(
 
 
 def _certain(moments: xr.Dataset) -> Any:
-    """Which samples are in contact without doubt, and have standard deviations, shape (samples,)."""
+    """Return True for samples that are certainly in contact and have standard deviations, shape (samples,)."""
     known = moments["status"] == "ok" if "status" in moments else moments["contact_probability"] == 1.0
     return known.values & np.isfinite(moments["tangent_sd"].values) & np.isfinite(moments["normal_sd"].values)
 
@@ -147,7 +147,7 @@ def _panels(axes: Any) -> AxesArray:
 
 
 def _fit_map(ax: Axes) -> None:
-    """Give a low map no more height than it takes, and the figure as much less."""
+    """Reduce the height of a low map, and of the figure, to what the map needs."""
     left, right, bottom, top = limits_of(ax)
     figure: Any = ax.figure
     wide, high = figure.get_size_inches()
@@ -178,7 +178,7 @@ def _enlarged(shown: Any, implied: xr.DataTree, samples: Sequence[int] | None) -
 
 
 def _on_the_map(shown: Any, chosen: Any) -> list[int]:
-    """A dozen and a half of the contacts, from the middles of equal parts, with those that are enlarged."""
+    """Return eighteen contacts, from the middles of equal parts, and those that are enlarged."""
     every = np.flatnonzero(shown)
     some = every[((np.arange(_ON_MAP) + 0.5) / _ON_MAP * every.size).astype(int)]
     return [int(i) for i in np.union1d(some, chosen)]
@@ -187,7 +187,7 @@ def _on_the_map(shown: Any, chosen: Any) -> list[int]:
 def _draw_detail(
     ax: Axes, tight: xr.Dataset, loose: xr.Dataset, sample: int, radius: float, truth: Contour | None
 ) -> None:
-    """Around the implied contact; the axes hold what is left when it is taken off."""
+    """Draw one contact enlarged, with coordinates relative to the implied contact."""
     colour = PALETTE[str(loose["contact_phase"].values[sample])]
     x, y = (float(tight[f"contact_{axis}"][sample]) for axis in "xy")
     off = (float(loose["contact_x"][sample]) - x, float(loose["contact_y"][sample]) - y)

@@ -1,4 +1,4 @@
-"""What was touched: arcs of the contour between first contact and snap-off, and the gaps between them."""
+"""Touched arcs of the contour between first contact and snap-off, and the gaps between them."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ if TYPE_CHECKING:
 __all__ = ["touched"]
 
 _SAME_PLACE = 1e-7
-"""Contacts that are closer [L] are in one place: at a fold, rounding leaves a contact half of its digits."""
+"""Distance [L] below which contacts coincide: at a fold, rounding leaves a contact half of its digits."""
 
 _STYLES: tuple[Any, ...] = ("solid", (0, (3.0, 1.0)), (0, (1.0, 0.5)))
-"""Lines of the first bases, and of those after them, which have the same colours again."""
+"""Line styles: the first for as many bases as there are colours, the next for as many further bases, and so on."""
 
 _ARC_WIDTH = 3.0
-_LANE = np.sqrt(2.0) * _ARC_WIDTH
-"""Points by which the arcs of a base are drawn below those of the base before: side by side up to slopes of 45°."""
+_OFFSET = np.sqrt(2.0) * _ARC_WIDTH
+"""Distance [points] of the arcs of a base below those of the base before: side by side up to slopes of 45°."""
 
 
 def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
-    """Which arcs of the contour the sweeps touched, in a colour for each base, and which gaps remain between them.
+    """Draw the arcs of the contour that the sweeps touched, in a colour for each base, and the gaps between them.
 
-    An arc goes from first contact to snap-off. Arcs of the first base are on the contour, those of every further base
-    a line's width below; x is true everywhere. From the seventh base on, lines are broken. A gap is what no sweep
-    touched between the outermost contacts, and its width in x is written where there is room; if none remains,
-    "no gap" is written.
+    An arc extends from first contact to snap-off. Arcs of the first base lie on the contour, those of every further
+    base a line's width below; x is true everywhere. From the seventh base on, lines are dashed. A gap is a stretch
+    between the outermost contacts that no sweep touched; its width in x is written where there is room. If no gap
+    remains, "no gap" is written.
 
     Parameters
     ----------
     scan : Scan
         A scan, from one base or several.
     ax : Axes, optional
-        Where to draw.
+        Axes to draw in.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ParameterError
-        If `scan` is no scan.
+        If `scan` is not a scan.
 
     Examples
     --------
@@ -89,9 +89,9 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
     }
     for (x, y), sweep in zip(arcs, scan.sweeps, strict=True):
         (line,) = ax.plot(x, y, **lines[sweep.base], solid_capstyle="butt", zorder=2.0)
-        lowered = ScaledTranslation(0.0, -_LANE / 72.0 * list(lines).index(sweep.base), ax.figure.dpi_scale_trans)
-        line.set_transform(ax.transData + lowered)  # only now: the limits are those of the arc itself
-        if x[-1] - x[0] <= same:  # an edge, and nothing beside it
+        lowered = ScaledTranslation(0.0, -_OFFSET / 72.0 * list(lines).index(sweep.base), ax.figure.dpi_scale_trans)
+        line.set_transform(ax.transData + lowered)  # only now, so that the limits are those of the arc itself
+        if x[-1] - x[0] <= same:  # the sweep touched an edge alone
             line.set_marker("o")
     pivots = np.array(list(lines))
     x, y = (np.concatenate([*(arc[axis] for arc in arcs), pivots[:, axis]]) for axis in (0, 1))
@@ -115,7 +115,7 @@ def touched(scan: Scan, *, ax: Axes | None = None) -> Axes:
 
 
 def _arc(contour: Contour, sweep: SweepEvents) -> tuple[Floats, Floats]:
-    """Points of the contour from the left end of what a sweep touched to the right one, which are the events' own."""
+    """Return points of the arc that a sweep touched, from left to right; its ends are the events' contacts."""
     left, right = sorted((sweep.first_contact, sweep.snap_off), key=lambda event: event.contact_x)
     x, y = outline(contour, left.contact_x, right.contact_x)
     x[[0, -1]] = left.contact_x, right.contact_x
@@ -124,14 +124,14 @@ def _arc(contour: Contour, sweep: SweepEvents) -> tuple[Floats, Floats]:
 
 
 def _gaps(arcs: list[tuple[Floats, Floats]], same: float) -> list[tuple[float, float]]:
-    """Stretches in x, from left to right, that lie between arcs and in none."""
+    """Return the stretches in x between arcs, from left to right."""
     ends = sorted((float(x[0]), float(x[-1])) for x, _ in arcs)
     reached = np.maximum.accumulate([right for _, right in ends])
     return [(float(end), left) for end, (left, _) in zip(reached, ends[1:], strict=False) if left - end > same]
 
 
 def _keep_apart(ax: Axes, texts: list[Text]) -> None:
-    """Remove texts that would run into an earlier one, or out of the Axes, at the size the figure has."""
+    """Remove texts that would overlap an earlier one, or leave the Axes, at the figure's size."""
     ax.apply_aspect()
     kept: list[Bbox] = []
     for text in texts:

@@ -6,8 +6,8 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.contact_coordinates import contact_states, contact_states_and_slopes
 from tactile_bayes.mechanics.fitting import ContactFit, fit_contacts
-from tactile_bayes.mechanics.touching import touching, touching_and_slopes
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,
     EITHER_PHASE,
@@ -54,7 +54,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     if where.size:
         reading = samples.reading.take(where)
         fit = fit_contacts(reading, delta[where])
-        rod, slopes = touching_and_slopes(fit.coordinates, delta[where])
+        rod, slopes = contact_states_and_slopes(fit.coordinates, delta[where])
         found = np.isfinite(fit.misfit) & np.isfinite(rod.place).all(axis=0)
         by = slopes.place
         with np.errstate(over="ignore", invalid="ignore"):
@@ -105,6 +105,6 @@ def _aside(fit: ContactFit, delta: Floats) -> list[tuple[Floats, Floats]]:
     for k in range(4):
         step = scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
         if np.any(variances[:, k] > 1e-9):
-            more, less = (touching(fit.coordinates + sign * step, delta).place.T for sign in (1.0, -1.0))
+            more, less = (contact_states(fit.coordinates + sign * step, delta).place.T for sign in (1.0, -1.0))
             pairs.append((more, less))
     return pairs

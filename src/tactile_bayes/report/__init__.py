@@ -1,4 +1,4 @@
-"""The report of a run: one page that says what was found, whether it can be trusted, and how to make it again."""
+"""The report of a run: one page with its results, their diagnostics, and the way to reproduce them."""
 
 from tactile_bayes.report.writing import write_report
 

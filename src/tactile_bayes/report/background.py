@@ -1,4 +1,4 @@
-"""What stands behind a run: sweeps, rig, priors, settings, the record's own words, versions and hashes, as tables."""
+"""Background of a run as tables: sweeps, rig, priors, settings, attributes of the record, versions and hashes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["background_of"]
 
 
 def background_of(findings: Findings) -> dict[str, Table | None]:
-    """All of these tables, by the names that the template has for them."""
+    """Return all of these tables by their names in the template."""
     return {
         "sweeps": _sweeps(findings),
         "priors": _priors(findings),
@@ -31,7 +31,7 @@ def background_of(findings: Findings) -> dict[str, Table | None]:
 
 
 def _sweeps(findings: Findings) -> Table:
-    """Sweeps, with what their readings alone tell of first contact and snap-off."""
+    """Return the sweeps, with first contact and snap-off as the readings alone bound them."""
     record, zero = findings.record, findings.zero
     length = shown_as("contact_x", record["base_x"].attrs, np.r_[record.base_x.values, record.base_y.values])
     rows = []
@@ -57,7 +57,7 @@ def _between(angles: Any) -> str:
 
 
 def _priors(findings: Findings) -> Table:
-    """Priors, in words."""
+    """Return the priors as text."""
     family = str(findings.posterior.attrs["family"])
     stated = json.loads(findings.posterior.attrs["priors"])
     rows = [[name, meaning_of(name, family), words] for name, words in stated.items() if not is_direction(name)]
@@ -67,7 +67,7 @@ def _priors(findings: Findings) -> Table:
 
 
 def _settings(findings: Findings) -> Table:
-    """How it was sampled."""
+    """Return the settings of the sampler."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].attrs
     rows = [["seed", str(attrs["seed"])], ["sampler", str(attrs.get("sampler", ""))]]
     rows += [[name, "none" if value is None else f"{value}"] for name, value in json.loads(attrs["settings"]).items()]
@@ -77,7 +77,7 @@ def _settings(findings: Findings) -> Table:
 
 
 def _rig(findings: Findings) -> Table:
-    """Rod, load cell, friction, and what was not taken as stated."""
+    """Return rod, load cell, friction, and the nuisance parameters."""
     attrs = findings.posterior.attrs
     names = [name for name in attrs if str(name).startswith(("rod_", "load_cell_"))]
     rows = [[str(name), _plain(attrs[name])] for name in (*names, "units", "friction")]
@@ -87,7 +87,7 @@ def _rig(findings: Findings) -> Table:
 
 
 def _columns(findings: Findings) -> Table | None:
-    """Further columns of the record, which inference makes no use of."""
+    """Return further columns of the record, which inference does not use."""
     rows = [
         [str(name), *(str(values.attrs.get(key, "")) for key in ("units", "long_name"))]
         for name, values in findings.record.data_vars.items()
@@ -97,10 +97,10 @@ def _columns(findings: Findings) -> Table | None:
 
 
 def _statements(findings: Findings) -> Table | None:
-    """Attributes of the record that say nothing of rod and load cell."""
+    """Return attributes of the record that concern neither rod nor load cell."""
     said = json.loads(findings.posterior.attrs.get("record_attributes", "{}"))
     rows = [[name, _plain(value)] for name, value in said.items()]
-    return Table("What the record says of itself", ["entry", "value"], rows, 2) if rows else None
+    return Table("Attributes of the record", ["entry", "value"], rows, 2) if rows else None
 
 
 def _plain(value: Any) -> str:
@@ -108,7 +108,7 @@ def _plain(value: Any) -> str:
 
 
 def _versions(findings: Findings) -> Table:
-    """Software of the inference and of this report."""
+    """Return the software of the inference and of this report."""
     attrs = findings.posterior.attrs
     stated = json.loads(attrs.get("versions", "{}"))
     rows = [[name, of_name] for name, of_name in stated.items()]
@@ -119,7 +119,7 @@ def _versions(findings: Findings) -> Table:
 
 
 def _hashes(findings: Findings) -> Table:
-    """Digests of the files and of the record."""
+    """Return digests of the files and of the record."""
     attrs = findings.posterior.attrs
     rows = [["posterior.nc", findings.posterior_sha256], ["record, as stored in it", findings.record_sha256]]
     if attrs["data_sha256"] != findings.record_sha256:

@@ -1,4 +1,4 @@
-"""The contour as it was found: a map, and below it the band enlarged, with every place of it for the page's script."""
+"""Figures of the inferred contour: a map, and the band enlarged, with the grid points for the page's script."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ _TABLED = 21
 
 
 class ContourFigure(NamedTuple):
-    """What a page needs of it."""
+    """Drawings and data of the contour for a page."""
 
     map: Markup
     detail: Markup
     legend: Markup
     band: Mapping[str, Any]
-    """Places in both drawings, and what is said of them."""
+    """Grid points in both drawings, and the text for each."""
     rows: list[list[str]]
-    """x, lower, median, upper at some places, as numbers in the unit shown."""
+    """x, lower, median, upper at some grid points, as text in the unit shown."""
     unit: Shown
 
 
 def gap_ends(findings: Findings) -> tuple[float, float] | None:
-    """Between which x the gap lies, if there is one."""
+    """Return x of the gap's ends, in the record's unit of length, if there is a gap."""
     if findings.edges is None:
         return None
     left, right = (float(findings.edges[side].sel(bound="median")) for side in ("left", "right"))
@@ -44,7 +44,7 @@ def gap_ends(findings: Findings) -> tuple[float, float] | None:
 
 
 def contour_figure(findings: Findings) -> ContourFigure:
-    """Draw what was found of the contour."""
+    """Draw the inferred contour."""
     band, attrs = findings.band, findings.band["lower"].attrs
     x, lower, median, upper = (band[name].values for name in ("x", "lower", "median", "upper"))
     bases = np.array(bases_of(found_rig(findings.record, None, findings.posterior).record))  # as contacts have them
@@ -122,7 +122,7 @@ def _put_contacts(overview: Plot, findings: Findings, x: Floats) -> list[tuple[s
 
 
 def _rows(x: Floats, lower: Floats, median: Floats, upper: Floats, unit: Shown) -> list[list[str]]:
-    """Place, lower, median and upper of the band, with as many decimals as their spread is worth."""
+    """Return x, lower edge, median and upper edge of the band, with as many decimals as the band's width allows."""
     scale = 10.0**unit.power
     places = spread(x / scale, float(np.ptp(x)) / x.size / scale)
     return [

@@ -17,17 +17,17 @@ from tactile_bayes.report.wording import Shown
 __all__ = ["WIDTH", "Plot", "Scale", "dots", "element", "figure", "legend", "outline_path"]
 
 WIDTH = 640
-"""Of every drawing, in its own units, of which a letter has 13 in height."""
+"""Width of every drawing, in its own units, in which letters are 13 high."""
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 96, 24, 12, 46
-"""Room beside a plot's frame."""
+"""Margins beside a plot's frame."""
 
 _TALLEST, _LOWEST = 460.0, 140.0
-"""Height of a map's frame."""
+"""Largest and smallest height of a map's frame."""
 
 
 def element(name: str, *content: str, **attributes: object) -> Markup:
-    """An element of SVG; `class_` is its class, `_` in other names stands for a hyphen. Text is escaped.
+    """Return an element of SVG; `class_` is its class, `_` in other names stands for a hyphen. Text is escaped.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def element(name: str, *content: str, **attributes: object) -> Markup:
 
 
 def figure(identity: str, title: str, description: str, height: float, *content: Markup) -> Markup:
-    """A whole drawing, with a title and a description for those who cannot see it."""
+    """Return a whole drawing, with a title and a description for screen readers."""
     return element(
         "svg",
         element("title", title, id=f"{identity}-title"),
@@ -59,7 +59,7 @@ def figure(identity: str, title: str, description: str, height: float, *content:
 
 @dataclass(frozen=True)
 class Scale:
-    """A straight map from values to places in a drawing."""
+    """A linear map from values to positions in a drawing."""
 
     low: float
     high: float
@@ -71,11 +71,11 @@ class Scale:
         return np.asarray(self.start + share * (self.end - self.start))
 
     def at(self, value: float) -> float:
-        """The place of one value, to a tenth of the drawing's unit."""
+        """Return the position of one value, to a tenth of the drawing's unit."""
         return round(float(self(value)), 1)
 
     def ticks(self, power: int = 0, most: int = 6) -> list[float]:
-        """Round values within the scale, in multiples of 1, 2, 2.5 or 5 of a power of ten."""
+        """Return round values within the scale: multiples of 1, 2, 2.5 or 5 times a power of ten."""
         rough = (self.high - self.low) / 10.0**power / (most + 1)
         unit = 10.0 ** math.floor(math.log10(rough))
         step = next(unit * m for m in (1, 2, 2.5, 5, 10) if unit * m >= rough * (1 - 1e-9)) * 10.0**power
@@ -84,7 +84,7 @@ class Scale:
 
 
 def scale_of(values: ArrayLike, start: float, end: float, room: float = 0.04) -> Scale:
-    """A scale that holds all values that are numbers, with some room."""
+    """Return a scale that holds all finite values, with a margin."""
     known = np.asarray(values, dtype=float)
     known = known[np.isfinite(known)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
@@ -94,14 +94,14 @@ def scale_of(values: ArrayLike, start: float, end: float, room: float = 0.04) ->
 
 @dataclass(frozen=True)
 class Plot:
-    """A frame with two scales, into which things are put; `drawn` gives them with their axes.
+    """A frame with two scales and elements in it; `drawn` returns them with their axes.
 
     Parameters
     ----------
     x, y : Scale
     x_label, y_label : str
     x_power, y_power : int
-        Powers of ten that values are divided by where they are written.
+        Powers of ten by which values are divided in labels.
     """
 
     x: Scale
@@ -116,14 +116,14 @@ class Plot:
     def around(
         cls, x: ArrayLike, y: ArrayLike, labels: tuple[str, str], height: float, powers: tuple[int, int] = (0, 0)
     ) -> Plot:
-        """A plot of the full width, and of some height, that holds all of some points."""
+        """Return a plot of the full width and a given height that holds all points."""
         across = scale_of(x, _LEFT, WIDTH - _RIGHT, room=0.02)
         up = scale_of(y, height - _BOTTOM, _TOP, room=0.06)
         return cls(across, up, *labels, *powers)
 
     @classmethod
     def map_of(cls, x: ArrayLike, y: ArrayLike, unit: Shown) -> tuple[Plot, float]:
-        """A plot with equal scales and lengths in a unit that holds all of some points, and its height."""
+        """Return a plot with equal scales, in a unit of length, that holds all points, and its height."""
         across = scale_of(x, _LEFT, WIDTH - _RIGHT, room=0.03)
         per_unit = (across.end - across.start) / (across.high - across.low)
         up = scale_of(y, 0.0, 1.0, room=0.05)
@@ -139,7 +139,7 @@ class Plot:
         return cls(across, Scale(low, high, height - _BOTTOM, _TOP), *labels, unit.power, unit.power), height
 
     def put(self, *content: Markup) -> None:
-        """Put elements over all that is there."""
+        """Put elements over all present ones."""
         self.content.extend(content)
 
     def put_pivots(self, places: Floats) -> None:
@@ -148,11 +148,11 @@ class Plot:
             self.put(element("circle", cx=self.x.at(x), cy=self.y.at(y), r=5, class_="pivot"))
 
     def path(self, x: ArrayLike, y: ArrayLike, class_: str) -> None:
-        """A line through points, interrupted where they are no numbers."""
+        """Put a line through points, interrupted at points that are not finite."""
         self.put(element("path", d=outline_path(self.x(x), self.y(y)), class_=class_))
 
     def area(self, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, class_: str) -> None:
-        """What lies between two edges, in a piece for each run of points at which both are numbers."""
+        """Fill the area between two edges, in a piece for each run of points at which both are finite."""
         across, low, high = self.x(x), self.y(lower), self.y(upper)
         known = np.isfinite(across) & np.isfinite(low) & np.isfinite(high)
         pieces = np.split(np.arange(known.size), np.flatnonzero(np.diff(known)) + 1)
@@ -164,14 +164,14 @@ class Plot:
         self.put(element("path", d="".join(outlines), class_=class_))
 
     def stretch(self, low: float, high: float, class_: str) -> None:
-        """A stretch in x, from bottom to top."""
+        """Shade a stretch in x, from bottom to top."""
         ends = np.clip(self.x([low, high]), self.x.start, self.x.end)
         top, bottom = self.y.end, self.y.start
         width = f"{abs(ends[1] - ends[0]):.1f}"
         self.put(element("rect", x=f"{ends.min():.1f}", y=top, width=width, height=bottom - top, class_=class_))
 
     def drawn(self, clip: str) -> tuple[Markup, ...]:
-        """Axes, and within them what was put there; `clip` is an id of its own for the frame."""
+        """Return the axes with the elements within them; `clip` is a unique id for the frame."""
         left, right, top, bottom = self.x.start, self.x.end, self.y.end, self.y.start
         frame = {"x": left, "y": top, "width": right - left, "height": round(bottom - top, 1)}
         parts = [element("clipPath", element("rect", **frame), id=clip)]
@@ -191,7 +191,7 @@ class Plot:
 
 
 def outline_path(x: Floats, y: Floats) -> str:
-    """Points in a drawing as the data of a path, which is interrupted where they are no numbers."""
+    """Return points in a drawing as path data, interrupted at points that are not finite."""
     out, pen = [], "M"
     for across, down in zip(np.round(x, 1), np.round(y, 1), strict=True):
         if not (math.isfinite(across) and math.isfinite(down)):
@@ -203,7 +203,7 @@ def outline_path(x: Floats, y: Floats) -> str:
 
 
 def dots(x: Sequence[float] | Floats, y: Sequence[float] | Floats, half: float, class_: str, *, square: bool) -> Markup:
-    """Many marks of one kind as one path: squares, or discs."""
+    """Return many marks of one kind, squares or discs, as one path."""
     data = []
     for across, down in zip(x, y, strict=True):
         if not (math.isfinite(across) and math.isfinite(down)):
@@ -217,9 +217,9 @@ def dots(x: Sequence[float] | Floats, y: Sequence[float] | Floats, half: float, 
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> Markup:
-    """What marks and lines mean, as a list of HTML that wraps: pairs of a class and a text.
+    """Return a legend as a list of HTML that wraps, from pairs of a class and a text.
 
-    What stands behind a blank in a class is one of the whole entry.
+    The first word of a class applies to the mark, the rest to the whole entry.
     """
     items = []
     for class_, text in entries:

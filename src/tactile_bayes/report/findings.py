@@ -1,4 +1,4 @@
-"""What a folder of a run holds, and what follows from it: everything that a report states."""
+"""The findings of a run: its results and what follows from them, for a report."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 __all__ = ["FINDING_STEPS", "Findings", "findings_of"]
 
 FINDING_STEPS = 4
-"""Of which `findings_of` tells: the posterior is read, the contacts and the check are there, and all the rest."""
+"""Number of steps that `findings_of` reports: posterior, contacts, check, and all the rest."""
 
 _GROUPS = ("posterior", "sample_stats", "posterior_predictive", "events", "observed_data", "constant_data", "prior")
 _SAID = ("family", "units", "friction", "nuisances", "priors", "settings", "seed", "message", "data_sha256")
@@ -34,38 +34,39 @@ _SAID = ("family", "units", "friction", "nuisances", "priors", "settings", "seed
 _COMPARISON = ("probability", "log_evidence", "p_value", "fits", "sampled")
 
 _USUAL = 0.95
-"""Probability of intervals where a posterior does not state what was asked for."""
+"""Probability of intervals if a posterior does not state one."""
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What a report states.
+    """Content of a report.
 
     Attributes
     ----------
     posterior : xr.DataTree
-        As it was stored.
+        The posterior as stored.
     record : xr.Dataset
         The record in it.
     contacts : xr.Dataset or None
-        Contact points; None where a load channel is missing.
+        Contact points; None if a load channel is missing.
     band, interval : xr.Dataset
-        Of the contour, and of the readings that the posterior predicts.
+        Band of the contour, and posterior predictive intervals of the readings.
     edges : xr.Dataset or None
-        The gap; None where there are sweeps in one direction only.
+        The gap; None if there are sweeps in one direction only.
     numbers : xr.Dataset
-        Of the parameters, from `tactile_bayes.uncertainty.summary.summary`.
+        Parameters, from `tactile_bayes.uncertainty.summary.summary`.
     verdicts : tuple of str
+        Messages of `verdicts`.
     check : xr.Dataset or None
-        Of the record; None where there are too few draws for one.
+        Check of the record; None if there are too few draws.
     zero : xr.Dataset
-        The unloaded stretches.
+        Unloaded stretches, from `zero_load`.
     comparison : xr.Dataset or None
-        Of families.
+        Comparison of families.
     posterior_sha256, record_sha256 : str
-        Of the file, and of the record in it (`record_hash`).
+        Digests of the file, and of the record in it (`record_hash`).
     probability : float
-        Of bands and intervals.
+        Probability of bands and intervals.
     """
 
     posterior: xr.DataTree
@@ -85,31 +86,31 @@ class Findings:
 
     @property
     def is_rejected(self) -> bool:
-        """Whether the record does not look like what the posterior predicts, so that its contour is not to be used."""
+        """True if the record fails its check, so that the contour must not be used."""
         return self.check is not None and not self.check.attrs["passed"]
 
 
 def findings_of(
     run: Path, compare: Path | None = None, progress: Callable[[int], object] = lambda done: None
 ) -> Findings:
-    """Read a run, and work out what a report states of it.
+    """Read a run, and compute the content of its report.
 
-    All of it follows from posterior.nc, in which the record lies, too; the tables that `infer` writes beside it are
-    the same numbers.
+    Everything follows from posterior.nc, which also holds the record; the tables that `infer` writes beside it hold the
+    same numbers.
 
     Parameters
     ----------
     run : Path
         Folder that `tactile_bayes.runs.contour.analyse` has written.
     compare : Path, optional
-        Folder of a comparison of families; by default `run`, if there is one in it that states its record.
+        Folder of a comparison of families; by default `run`, if it holds a comparison that states its record.
     progress : callable
-        Is given the number of steps that are done, of `FINDING_STEPS`.
+        Called with the number of steps done, of `FINDING_STEPS`.
 
     Raises
     ------
     InferenceError
-        If one of them is something else.
+        If the folders hold no such results.
     """
     path = posterior_in(run)
     content = path.read_bytes()
@@ -150,7 +151,7 @@ def findings_of(
 
 
 def _contour_posterior(path: Path) -> xr.DataTree:
-    """A result of `infer_contour`, and nothing else."""
+    """Read a result of `infer_contour`, and refuse anything else."""
     posterior = read_result(path)
     lacks = [name for name in _GROUPS if name not in posterior.children]
     lacks += [name for name in _SAID if name not in posterior.attrs]

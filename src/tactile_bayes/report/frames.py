@@ -1,4 +1,4 @@
-"""The moving rod: what the likeliest contour makes of the rod at every sample of a record."""
+"""The moving rod: its shapes along the most probable contour at the samples of a record."""
 
 from __future__ import annotations
 
@@ -24,39 +24,40 @@ from tactile_bayes.sweep import ManyUnits, to_lab_frame
 __all__ = ["Motion", "motion_of"]
 
 _MOST = 900
-"""Samples that are shown: of a longer record every second, or third, and so on."""
+"""Largest number of samples shown; of a longer record every second, or third, and so on."""
 
 _POINTS = 33
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Rods along the likeliest contour, at samples of a record, sweep after sweep; units are the record's.
+    """Rods along the most probable contour, at samples of a record, sweep after sweep; in the record's units.
 
     Attributes
     ----------
     contour : Contour
-        The likeliest of the posterior's draws.
+        The contour of the draw with the highest posterior density.
     samples : ndarray of int, shape (n,)
-        Which samples of the record.
+        Numbers of the samples in the record.
     sweep : ndarray of int, shape (n,)
+        Their sweeps.
     rod_x, rod_y : ndarray, shape (n, points)
         The rod, from pivot to tip.
     contact_x, contact_y : ndarray, shape (n,)
-        On the object; NaN out of contact.
+        Contact point on the object; NaN out of contact.
     phase : ndarray of str, shape (n,)
         "tip", "tangential", "none".
     drive_angle : ndarray, shape (n,)
         Slope of the rod at the pivot [rad].
     cell_angle : ndarray, shape (n,)
-        Drive angle as read, without the encoder's offset and backlash [rad]: by it a load cell is turned that turns
-        with the drive. A suspension that gives way lies between it and the rod.
+        Drive angle as read, corrected for the encoder's offset and backlash [rad]: the angle of a load cell that turns
+        with the drive. It differs from `drive_angle` by the deflection of a compliant suspension.
     loads : ndarray, shape (n, 3)
-        Holding moment and support reaction, along the axes of the world, free of noise and of the cell's errors.
+        Holding moment and support reaction in the laboratory frame, free of noise and of the cell's errors.
     pivots : ndarray, shape (pivots, 2)
-        Where that draw has them.
+        Pivots of that draw.
     every : int
-        One of how many samples is shown.
+        Every how many samples one is shown.
     """
 
     contour: Contour
@@ -75,14 +76,14 @@ class Motion:
 
 
 def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
-    """Rods of the likeliest draw, with the rig as that draw has it: rigidity, encoder, friction, suspension, pivots.
+    """Return the rods of the most probable draw, with that draw's rigidity, encoder, friction, suspension and pivots.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`.
     most : int
-        Samples at most, evenly picked from every sweep.
+        Largest number of samples, evenly picked from every sweep.
 
     Returns
     -------
@@ -104,36 +105,36 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     order = np.argsort(numbers, kind="stable")
     by_sweep = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
     samples = np.concatenate([rows[::every] for rows in by_sweep])
-    lanes = np.empty(numbers.size, dtype=np.intp)
-    for lane, stroke in enumerate(likelihood.strokes):
-        lanes[stroke.samples] = lane
-    lane = lanes[samples]
-    mirrored = paths.seen.mirrored[lane]
+    batch_indices = np.empty(numbers.size, dtype=np.intp)
+    for index, segment in enumerate(likelihood.strokes):
+        batch_indices[segment.samples] = index
+    batch_index = batch_indices[samples]
+    mirrored = paths.sweep_frame.mirrored[batch_index]
     misread = cell.misread(record.direction.values) + likelihood.misread(rig)[0]
     angle = (record.drive_angle.values - misread)[samples]
-    seen_angle = np.where(mirrored, np.pi - angle, angle)
-    states = paths.states(lane, seen_angle)
+    angle_in_sweep_frame = np.where(mirrored, np.pi - angle, angle)
+    states = paths.states(batch_index, angle_in_sweep_frame)
     rod, stiffer = rod_of(record), float(np.ravel(rig.rigidity_scale)[0])
     units = ManyUnits(rod.length_unit, stiffer * rod.moment_unit, stiffer * rod.force_unit)
-    world = to_lab_frame(paths.seen, lane, states, units)
+    in_lab_frame = to_lab_frame(paths.sweep_frame, batch_index, states, units)
     loaded = states.wrench.phase != NONE
-    slope = np.where(loaded, states.wrench.drive_angle, seen_angle)
+    slope = np.where(loaded, states.wrench.drive_angle, angle_in_sweep_frame)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
     x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0)
     sign = np.where(mirrored, -1.0, 1.0)
-    loads = np.stack([world[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
+    loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
     return Motion(
         contour=contour.take(np.array(0)),
         samples=samples,
         sweep=numbers[samples],
-        rod_x=paths.seen.base_x[lane][:, None] + sign[:, None] * x * rod.length_unit,
-        rod_y=paths.seen.base_y[lane][:, None] + y * rod.length_unit,
-        contact_x=np.where(loaded, world["contact_x"], np.nan),
-        contact_y=np.where(loaded, world["contact_y"], np.nan),
+        rod_x=paths.sweep_frame.base_x[batch_index][:, None] + sign[:, None] * x * rod.length_unit,
+        rod_y=paths.sweep_frame.base_y[batch_index][:, None] + y * rod.length_unit,
+        contact_x=np.where(loaded, in_lab_frame["contact_x"], np.nan),
+        contact_y=np.where(loaded, in_lab_frame["contact_y"], np.nan),
         phase=np.array(PHASE_NAMES)[states.wrench.phase],
         drive_angle=np.where(mirrored, np.pi - slope, slope),
         cell_angle=angle,
         loads=np.where(loaded[:, None], loads, 0.0),
-        pivots=np.unique(np.stack([paths.seen.base_x, paths.seen.base_y], axis=-1), axis=0),
+        pivots=np.unique(np.stack([paths.sweep_frame.base_x, paths.sweep_frame.base_y], axis=-1), axis=0),
         every=every,
     )

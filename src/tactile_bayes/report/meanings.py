@@ -1,4 +1,4 @@
-"""What parameters mean, in words."""
+"""Meanings of parameters, as text."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ _MEANINGS = {
     "x_c": "x of the lowest point",
     "r": "radius",
     "b": "semi-axis in y",
-    "w": "where it is as high as it is wide",
+    "w": "half-width at which the height equals it",
     "n": "exponent",
-    "amplitude": "by how much the logarithm of the radius goes up and down",
-    "length_scale": "slope angle in which it does so",
-    "noise_scale": "noise over that stated",
+    "amplitude": "standard deviation of the logarithm of the radius along the contour",
+    "length_scale": "correlation length of that logarithm in slope angle",
+    "noise_scale": "noise over stated noise",
     "moment_noise": "noise of the holding moment",
     "force_noise": "noise of the forces",
-    "rigidity_scale": "flexural rigidity over that stated",
-    "drive_angle_offset": "what the encoder reads too much",
-    "lever_x": "where the cell takes its moment, from the pivot along x",
-    "lever_y": "where the cell takes its moment, from the pivot along y",
-    "backlash": "what the encoder reads more in forward motion than in backward motion",
+    "rigidity_scale": "flexural rigidity over stated flexural rigidity",
+    "drive_angle_offset": "encoder offset",
+    "lever_x": "x of the cell's reference point of the moment, from the pivot",
+    "lever_y": "y of the cell's reference point of the moment, from the pivot",
+    "backlash": "encoder reading in forward motion less that in backward motion",
     "friction": "Coulomb's coefficient",
-    "suspension_compliance": "turn of the pivot per holding moment",
-    "gap width": "of the arc that no sweep touches",
+    "suspension_compliance": "rotation of the pivot per holding moment",
+    "gap width": "width of the arc that no sweep touches",
 }
 _A = {"parabola": "half the curvature of the lowest point", "ellipse": "semi-axis in x"}
 _R = {"shape-free": "mean radius of curvature (geometric)"}
@@ -44,7 +44,7 @@ _CHANNELS = {"moment": "the holding moment", "force_x": "force x", "force_y": "f
 
 
 def meaning_of(name: str, family: str) -> str:
-    """What a parameter of a contour, of its rig, or of the noise is.
+    """Return the meaning of a parameter of a contour, of its rig, or of the noise.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def meaning_of(name: str, family: str) -> str:
     if match := _CALIBRATION.fullmatch(name):
         return f"{_WHATS[match['what']]} of {_CHANNELS[match['channel']]}"
     if match := _BASE.fullmatch(name):
-        return f"by how much pivot {match['pivot']} is off in {match['axis']}"
+        return f"error of pivot {match['pivot']} in {match['axis']}"
     if is_direction(name):
         return "a direction of the random function"
     flanks = family.partition("/")
@@ -65,5 +65,5 @@ def meaning_of(name: str, family: str) -> str:
 
 
 def is_direction(name: str) -> bool:
-    """Whether a parameter is one of many of a random function, and says nothing by itself."""
+    """Return True for a parameter that is one weight of a random function, and has no meaning by itself."""
     return name.startswith("z_")

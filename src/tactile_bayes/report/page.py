@@ -1,4 +1,4 @@
-"""What a report says, section by section, as the template takes it."""
+"""The variables of the report's template, section by section."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tactile_bayes.report.frames import motion_of
 from tactile_bayes.report.meanings import FORMULAS, is_direction, meaning_of
 from tactile_bayes.report.readings_figure import readings_figure
 from tactile_bayes.report.reproduction import command_of, hindrances, python_lines
-from tactile_bayes.report.trust import check_table, check_words, contacts_words, convergence
+from tactile_bayes.report.trust import check_messages, check_table, contacts_messages, convergence
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as, spread
 
 __all__ = ["page_of"]
 
 _WELL = "All is well"
-"""How verdicts begin that have found nothing."""
+"""Beginning of the first verdict if nothing is wrong."""
 
 
 def page_of(findings: Findings, name: str) -> dict[str, Any]:
-    """The values of the template's variables; `name` is that of the run."""
+    """Return the values of the template's variables; `name` is that of the run."""
     attrs = findings.posterior.attrs
     motion = motion_of(findings.posterior)
     contour, readings = contour_figure(findings), readings_figure(findings, motion)
@@ -46,15 +46,15 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "band_table": Table(
             f"The band at some places{contour.unit.bracketed}", ["x", "lower", "median", "upper"], contour.rows, 0
         ),
-        "gap": _gap_words(findings),
+        "gap": _gap_messages(findings),
         "shapes": _shapes(findings.comparison),
         "parameters": _parameters(findings, mute=True),
         "is_well": _is_well(findings),
         "verdicts": findings.verdicts,
         "convergence": convergence(findings),
-        "check_words": check_words(findings),
+        "check_messages": check_messages(findings),
         "check": check_table(findings),
-        "contacts": contacts_words(findings),
+        "contacts": contacts_messages(findings),
         "readings": readings,
         "frame": {key: values[first] for key, values in readings.data["said"].items()},
         "moving": [
@@ -76,7 +76,7 @@ def _is_well(findings: Findings) -> bool:
 
 
 def _answer(findings: Findings) -> str:
-    """How wide the band is, and what that is worth."""
+    """Return a sentence on the width of the band, and how far to trust it."""
     band = findings.band
     width = band["upper"].values - band["lower"].values
     unit = shown_as("contact_x", band["x"].attrs, band["x"].values)
@@ -100,7 +100,7 @@ def _answer(findings: Findings) -> str:
     return f"{reach} the contour is known to within a {share} band {widths}"
 
 
-def _gap_words(findings: Findings) -> list[str]:
+def _gap_messages(findings: Findings) -> list[str]:
     edges = findings.edges
     if edges is None:
         return ["There are sweeps in one direction only, so there is no gap between two."]

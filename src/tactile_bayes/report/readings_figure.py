@@ -1,4 +1,4 @@
-"""What was measured, and the rod at every sample of it: drawings, and frames for the page's script."""
+"""Figures of the readings and of the rod at every sample: drawings, and frames for the page's script."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tactile_bayes.report.findings import Findings
 from tactile_bayes.report.frames import Motion
 from tactile_bayes.report.wording import Shown, percent, shown_as
 
-__all__ = ["ReadingsFigure", "channel_words", "readings_figure"]
+__all__ = ["ReadingsFigure", "channel_names", "readings_figure"]
 
 _WORDS = {"holding_moment": "holding moment", "force_x": "force x", "force_y": "force y"}
 _TURNING = {"force_x": "force along the rod", "force_y": "force across the rod"}
@@ -33,11 +33,11 @@ _ARROW = 110.0
 """Length of the largest force."""
 
 _MOST_DOTS = 1500
-"""Samples drawn of each channel; of a longer record every second, or third, and so on."""
+"""Largest number of samples drawn of each channel; of a longer record every second, or third, and so on."""
 
 
 class ReadingsFigure(NamedTuple):
-    """What a page needs of it."""
+    """Drawings and data of the readings for a page."""
 
     rods: Markup
     readings: Markup
@@ -46,23 +46,23 @@ class ReadingsFigure(NamedTuple):
     channels: list[tuple[str, str, str]]
     """Name, label and unit of every channel."""
     data: Mapping[str, Any]
-    """Frames."""
+    """Frames of the moving rod."""
     rows: list[list[str]]
-    """Sample, sweep, angle, then readings."""
+    """Sample, sweep, drive angle [degrees], then readings."""
     shown: dict[str, Shown]
     drawn_every: int
 
 
-def channel_words(record: xr.Dataset) -> dict[str, str]:
-    """What channels are called, in the frame of the load cell."""
+def channel_names(record: xr.Dataset) -> dict[str, str]:
+    """Return the names of the channels in the frame of the load cell."""
     return _WORDS | (_TURNING if frame_of(record) == "turning" else {})
 
 
 def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
-    """Draw the readings over the drive angle, and the rod, as it is where the first sweep loads it the most."""
+    """Draw the readings over the drive angle, and the rod at the largest load of the first sweep."""
     record, present = findings.record, present_channels(findings.record)
-    words = channel_words(record)
-    # A load that was not measured is still one of the rod, in the unit that fits it.
+    words = channel_names(record)
+    # The rod has all loads, also those that were not measured, each in a suitable unit.
     bent = _in_frame(findings, motion)
     shown = {
         name: shown_as(name, record[name].attrs, record[name].values if name in present else bent[:, i])
@@ -87,7 +87,7 @@ def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
     senses = [sense for sense in ("forward", "backward") if sense in record.direction.values]
     entries = [(f"key-{sense}", f"reading, {sense} sweep") for sense in senses]
     entries += [
-        ("key-unloaded", "unloaded for certain (pale)"),
+        ("key-unloaded", "certainly unloaded (pale)"),
         ("key-predicted", f"{percent(findings.probability)} of what the posterior predicts"),
         ("key-event", "first contact and snap-off, medians"),
     ]
@@ -96,7 +96,7 @@ def readings_figure(findings: Findings, motion: Motion) -> ReadingsFigure:
         Markup("").join(drawings),
         legend(
             [
-                ("key-object", "object, as the likeliest contour has it"),
+                ("key-object", "object, by the most probable contour"),
                 ("key-rod", "rod"),
                 ("key-tip", "tip contact"),
                 ("key-tangential", "tangential contact"),
@@ -121,7 +121,7 @@ def _sweep_name(record: xr.Dataset, number: int) -> str:
 
 
 def _in_frame(findings: Findings, motion: Motion) -> Floats:
-    """Loads of the rod along the axes that the load cell has, shape (n, 3)."""
+    """Return the loads of the rod along the axes of the load cell, shape (n, 3)."""
     if frame_of(findings.record) == "fixed":
         return motion.loads
     moment, force_x, force_y = motion.loads.T
@@ -129,7 +129,7 @@ def _in_frame(findings: Findings, motion: Motion) -> Floats:
 
 
 def _rods(findings: Findings, motion: Motion, first: int) -> tuple[Markup, dict[str, Any]]:
-    """The map of the rod in one frame, and what moves it, in the drawing's own units."""
+    """Return the map of the rod in one frame, and all frames, in the drawing's own units."""
     attrs = findings.record["base_x"].attrs
     x, y = motion.rod_x, motion.rod_y
     unit = shown_as("contact_x", attrs, np.concatenate([x.ravel(), y.ravel()]))
@@ -160,15 +160,15 @@ def _rods(findings: Findings, motion: Motion, first: int) -> tuple[Markup, dict[
     size = {"markerUnits": "userSpaceOnUse", "markerWidth": 8, "markerHeight": 8, "refX": 7, "refY": 4}
     marker = element("marker", head, id="head", class_="arrow-head", **size, orient="auto", viewBox="0 0 8 8")
     description = (
-        "The rod from its pivot to its tip, as the likeliest contour bends it at one sample of the record, with the "
-        "contact point, the forces and the holding moment. The slider below chooses the sample; its numbers are in the "
-        "table beside it."
+        "The rod from its pivot to its tip, as the most probable contour bends it at one sample of the record, with "
+        "the contact point, the forces and the holding moment. The slider below chooses the sample; its numbers are in "
+        "the table beside it."
     )
     return figure("rod-map", "The rod", description, height, element("defs", marker), *plot.drawn("rod-clip")), frames
 
 
 def _rod(frames: Mapping[str, Any], first: int) -> tuple[Markup, ...]:
-    """What moves, in one frame; the script draws the others the same way."""
+    """Return the moving elements of one frame; the script draws the others in the same way."""
     rod, contact = frames["rod"][first], frames["contact"][first]
     force, phase = frames["force"][first], frames["phase"][first]
     points = " ".join(f"{a:g},{b:g}" for a, b in zip(rod[::2], rod[1::2], strict=True))
@@ -189,8 +189,8 @@ def _rod(frames: Mapping[str, Any], first: int) -> tuple[Markup, ...]:
 
 
 def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tuple[dict[str, Plot], list[Markup], int]:
-    """A plot of each channel that was measured, with a rule at one sample, and one of how many readings is drawn."""
-    record, interval, words = findings.record, findings.interval, channel_words(findings.record)
+    """Return plots of the measured channels with a rule at one sample, their drawings, and the thinning of readings."""
+    record, interval, words = findings.record, findings.interval, channel_names(findings.record)
     angle, sweep = np.degrees(record.drive_angle.values), record.sweep.values
     unloaded, direction = findings.zero.unloaded.values, record.direction.values
     every = max(1, -(-angle.size // _MOST_DOTS))
@@ -238,7 +238,7 @@ def _readings(findings: Findings, shown: Mapping[str, Shown], here: int) -> tupl
 def _said(
     findings: Findings, motion: Motion, shown: Mapping[str, Shown], bent: Floats
 ) -> tuple[dict[str, Any], list[list[str]]]:
-    """What the table beside the rod says in every frame, and a table of all readings."""
+    """Return the entries of the table beside the rod in every frame, and a table of all readings."""
     record, interval, present = findings.record, findings.interval, present_channels(findings.record)
     angles = [f"{angle:.2f}".replace("-", "−") for angle in np.degrees(record.drive_angle.values[motion.samples])]
     length = shown_as("contact_x", record["base_x"].attrs, np.concatenate([motion.rod_x.ravel(), motion.rod_y.ravel()]))

@@ -1,4 +1,4 @@
-"""How a run is made again: its command, and lines of Python that need nothing but the posterior's file."""
+"""Reproduction of a run: its command, and lines of Python that need only the posterior's file."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ __all__ = ["command_of", "hindrances", "python_lines"]
 
 
 def command_of(attrs: Mapping[Any, Any]) -> str:
-    """The command that asked for the run, as a shell takes it; "" if the posterior does not state it."""
+    """Return the shell command that made the run; "" if the posterior does not state it."""
     return shlex.join(json.loads(attrs["command"])) if "command" in attrs else ""
 
 
 def python_lines(attrs: Mapping[Any, Any]) -> str:
-    """Lines that infer the posterior again from the record in its file, and compare the draws.
+    """Return lines of Python that infer the posterior again from the record in its file, and compare the draws.
 
     Examples
     --------
@@ -74,14 +74,14 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
 
 
 def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
-    """Why those lines may not give the same draws, in sentences."""
+    """Return reasons why those lines may not give the same draws."""
     attrs = posterior.attrs
     settings = json.loads(attrs["settings"])
     found = []
     if settings.get("max_seconds") is not None:
         found.append("The run could end by the clock, after max_seconds: then the number of its steps is not repeated.")
     if "interrupted" in attrs["message"]:
-        found.append("The run was interrupted: one that is not goes on for longer.")
+        found.append("The run was interrupted: without an interrupt it makes more steps.")
     usual = default_priors(record, attrs["family"], LoadCell.from_record(record), json.loads(attrs["nuisances"]))
     words = {name: prior_in_words(prior) for name, prior in usual.items()}
     own = [name for name, said in json.loads(attrs["priors"]).items() if words.get(name) != said]
@@ -93,7 +93,7 @@ def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
 
 
 def _seed(words: str) -> str:
-    """The seed from the words that an attribute has for it."""
+    """Return Python code for the seed, from the text of the attribute."""
     if words.isdigit():
         return words
     entropy, _, key = words.partition(", spawn key ")

@@ -1,4 +1,4 @@
-"""Whether a run can be trusted: convergence, the check of the record, and single samples, in words and numbers."""
+"""Trust in a run: convergence, the check of the record, and the fit of single samples, in sentences and tables."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tactile_bayes.diagnostics.record_check import DISCREPANCIES
 from tactile_bayes.reconstruction import AXIAL_ALARM
 from tactile_bayes.record import CHANNELS, present_channels
 from tactile_bayes.report.findings import Findings
-from tactile_bayes.report.readings_figure import channel_words
+from tactile_bayes.report.readings_figure import channel_names
 from tactile_bayes.report.wording import Table, chance, fixed, percent, sentence, shown_as
 
-__all__ = ["check_table", "check_words", "contacts_words", "convergence"]
+__all__ = ["check_messages", "check_table", "contacts_messages", "convergence"]
 
 
 def convergence(findings: Findings) -> list[str]:
-    """How the ensembles ended, and how they fared."""
+    """Return sentences on the end of the run and on its ensembles."""
     attrs, stats = findings.posterior.attrs, findings.posterior["sample_stats"].to_dataset()
     said = [sentence(f"{attrs['message']}.")]
     draws = stats.sizes["chain"] * stats.sizes["draw"]
@@ -30,8 +30,8 @@ def convergence(findings: Findings) -> list[str]:
     return said
 
 
-def check_words(findings: Findings) -> list[str]:
-    """Whether the record looks like what the posterior predicts, in sentences."""
+def check_messages(findings: Findings) -> list[str]:
+    """Return sentences on the check of the record."""
     check = findings.check
     if check is None:
         return ["There are too few draws for a check of the record."]
@@ -42,7 +42,7 @@ def check_words(findings: Findings) -> list[str]:
         "as far off."
     ]
     outside, record = [], findings.record
-    words = channel_words(record)
+    words = channel_names(record)
     for name in present_channels(record):
         values = record[name].values
         lower, upper = (findings.interval[f"{name}_{edge}"].values for edge in ("lower", "upper"))
@@ -57,12 +57,12 @@ def check_words(findings: Findings) -> list[str]:
 
 
 def check_table(findings: Findings) -> Table | None:
-    """Misfit by channel; None where there are too few draws to tell."""
+    """Return the misfit by channel; None if there are too few draws."""
     check = findings.check
     if check is None:
         return None
     record, rows = findings.record, []
-    words = channel_words(record)
+    words = channel_names(record)
     for name in check["channel"].values:
         of_channel = check.sel(channel=name)
         unit = shown_as(name, record[name].attrs, [float(of_channel["worst_residual"])])
@@ -79,11 +79,11 @@ def check_table(findings: Findings) -> Table | None:
     return Table("Misfit by channel: shares of predicted records that are at least as discrepant", heads, rows)
 
 
-def contacts_words(findings: Findings) -> list[str]:
-    """What became of single samples, and whether their four numbers agree with a rod."""
+def contacts_messages(findings: Findings) -> list[str]:
+    """Return sentences on the statuses of single samples, and on the agreement of their four numbers with a rod."""
     contacts = findings.contacts
     if contacts is None:
-        words = channel_words(findings.record)
+        words = channel_names(findings.record)
         missing = [words[name] for name in CHANNELS if name not in present_channels(findings.record)]
         were = "was" if len(missing) == 1 else "were"
         return [f"Contact points take all three channels, and {' and '.join(missing)} {were} not measured."]
@@ -104,7 +104,7 @@ def contacts_words(findings: Findings) -> list[str]:
     if np.isfinite(score):
         known = "found" if "friction" in json.loads(findings.posterior.attrs["nuisances"]) else "stated"
         said.append(
-            "In tangential contact D = fAx cos φ₀ + fAy sin φ₀ − m₀²/2 is zero, but for the friction that was "
+            "In tangential contact D = fAx cos φ₀ + fAy sin φ₀ − m₀²/2 is zero, except for the friction that was "
             f"{known}: its mean is off that by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."
         )
     return said

@@ -1,4 +1,4 @@
-"""Numbers, units and tables as a page writes them."""
+"""Numbers, units and tables as text on a page."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Shown", "Table", "chance", "fixed", "percent", "sentence", "shown_as
 
 
 class Table(NamedTuple):
-    """A table: what it shows, its heads, its rows, and how many of the columns hold words rather than numbers."""
+    """A table: caption, heads, rows, and the number of leading columns with text instead of numbers."""
 
     caption: str
     heads: list[str]
@@ -23,13 +23,13 @@ class Table(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """A unit in which values are written: a power of ten of that in which they are, and its name."""
+    """A unit in which values are written: its power of ten relative to the values' own unit, and its name."""
 
     power: int
     name: str
 
     def text(self, value: float, digits: int = 4) -> str:
-        """The value without its unit, to some figures, never with an exponent unless it is far off; – for none."""
+        """Return the value without its unit, to some digits, without an exponent unless extreme; – if not finite."""
         shown = value / 10.0**self.power
         if not math.isfinite(shown):
             return "–"
@@ -39,17 +39,17 @@ class Shown(NamedTuple):
         return number(round(shown, decimals), digits=15)
 
     def full(self, value: float, digits: int = 4) -> str:
-        """The value with its unit, which no line break parts from it."""
+        """Return the value with its unit, joined by a no-break space."""
         return f"{self.text(value, digits)}\u00a0{self.name}".rstrip()
 
     @property
     def bracketed(self) -> str:
-        """The unit as it stands behind a label; nothing where there is none."""
+        """The unit in brackets, as it follows a label; "" without a unit."""
         return f" [{self.name}]" if self.name else ""
 
 
 def shown_as(column: str, attrs: Mapping[Any, Any], values: Any) -> Shown:
-    r"""The unit that fits values of a column of a record: mm, mN m, or that of the rod.
+    r"""Return the unit that suits values of a column of a record: mm, mN m, or that of the rod.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def shown_as(column: str, attrs: Mapping[Any, Any], values: Any) -> Shown:
 
 
 def spread(values: Iterable[float], width: float) -> list[str]:
-    """Numbers with as many decimals as show an interval of this width to two figures."""
+    """Return numbers with as many decimals as show an interval of this width to two digits."""
     if not (math.isfinite(width) and width > 0.0):
         return [number(value) if math.isfinite(value) else "–" for value in values]
     decimals = 1 - math.floor(math.log10(width))
@@ -73,12 +73,12 @@ def spread(values: Iterable[float], width: float) -> list[str]:
 
 
 def sentence(words: str) -> str:
-    """Words with a capital at their beginning."""
+    """Return text with a capital first letter."""
     return words[0].upper() + words[1:]
 
 
 def fixed(value: float, form: str) -> str:
-    """A number in a form, with a true minus, which zero has none of; – for none.
+    """Return a number in a format, with a true minus sign, except for zero; – if not finite.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def fixed(value: float, form: str) -> str:
 
 
 def chance(value: float) -> str:
-    """A probability to three decimals, of which nothing but none and all are rounded to.
+    """Return a probability to three decimals; only exact 0 and 1 are written so.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def chance(value: float) -> str:
 
 
 def percent(value: float) -> str:
-    """A share in per cent, with all the figures it has, but rounding.
+    """Return a share in per cent, to six significant digits.
 
     Examples
     --------

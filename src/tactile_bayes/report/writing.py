@@ -1,4 +1,4 @@
-"""The page, put together and written: template, style and script in one file that loads nothing."""
+"""Writing of the page: template, style and script in one file that loads nothing."""
 
 from __future__ import annotations
 
@@ -27,45 +27,45 @@ def write_report(
     compare: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Path:
-    """Write the report of a run: one HTML page that needs no network and nothing beside it.
+    """Write the report of a run: one HTML page that needs no network and no other file.
 
-    It says what was found, whether it can be trusted, what was measured, and how to make it again. A slider moves the
-    rod of the likeliest contour through the samples of the record.
+    It states the results, how far to trust them, the readings, and how to reproduce the run. A slider moves the rod
+    along the most probable contour through the samples of the record.
 
     Parameters
     ----------
     run : path-like
         Folder that `tactile-bayes infer` has written, of which posterior.nc is read.
     out : path-like, optional
-        Where to; by default report.html in that folder. A file that is there is replaced.
+        File for the page; by default report.html in that folder. An existing file is replaced.
     compare : path-like, optional
         Folder of `tactile-bayes compare` for the same record, whose probabilities of shapes the report then states; by
         default `run`, if it holds a comparison that states its record.
     progress : callable, optional
-        Is given the number of steps that are done, and of how many.
+        Called with the number of steps done and their total.
 
     Returns
     -------
     Path
-        Of the page.
+        The page.
 
     Raises
     ------
     InferenceError
-        If there is no posterior of a contour in the folder, or no comparison where one is named.
+        If the folder holds no posterior of a contour, or a named folder no comparison of its record.
     OSError
         If the page cannot be written.
     """
     folder = Path(run)
     path = folder / "report.html" if out is None else Path(out)
-    told = progress or (lambda done, count: None)
+    report = progress or (lambda done, count: None)
     findings = findings_of(
-        folder, None if compare is None else Path(compare), lambda done: told(done, FINDING_STEPS + 1)
+        folder, None if compare is None else Path(compare), lambda done: report(done, FINDING_STEPS + 1)
     )
     text = _rendered(page_of(findings, folder.resolve().name))
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    told(FINDING_STEPS + 1, FINDING_STEPS + 1)
+    report(FINDING_STEPS + 1, FINDING_STEPS + 1)
     return path
 
 
@@ -96,12 +96,12 @@ def _resource(name: str) -> str:
 
 
 def _policy(style: str, script: str) -> str:
-    """What the page may do: run this script, apply this style, and load nothing."""
+    """Return the content security policy: run this script, apply this style, and load nothing."""
     digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in (script, style))
     run, look = (f"'sha256-{digest}'" for digest in digests)
     return f"default-src 'none'; script-src {run}; style-src {look}; base-uri 'none'; form-action 'none'"
 
 
 def _as_json(data: Any) -> str:
-    """JSON that no text in it can break out of."""
+    """Return JSON in which no text can end the script element."""
     return json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).translate(_ESCAPES)

@@ -1,1 +1,1 @@
-"""Runs: everything that a command makes, in one folder of files."""
+"""Runs: the results of a command, in one folder of files."""

@@ -17,25 +17,25 @@ __all__ = ["calibrate_into"]
 
 
 def calibrate_into(out: str | os.PathLike[str], **options: Any) -> Run[xr.Dataset]:
-    """Calibrate, and write what comes out to a folder.
+    """Calibrate, and write the result to a folder.
 
     Parameters
     ----------
     out : path-like
-        Folder for replicates.json, which a run that was stopped goes on from, calibration.nc, verdict.txt, ranks.png
-        and coverage.png; made if it is not there. Files of these names in it are replaced.
+        Folder for replicates.json (the checkpoint from which a stopped run resumes), calibration.nc, verdict.txt,
+        ranks.png and coverage.png; created if missing. Files of these names in it are replaced.
     options
-        As `calibrate` takes them.
+        Options of `calibrate`.
 
     Returns
     -------
     Run
-        Of what `calibrate` returns.
+        The result of `calibrate`, and the files.
 
     Raises
     ------
     ParameterError, CalibrationError, TaskError
-        As `calibrate`.
+        As in `calibrate`.
     """
     found = calibrate(out=out, **options)
     folder = Folder(out)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from tactile_bayes import plotting
 from tactile_bayes.comparison.families import compare_families
-from tactile_bayes.diagnostics.suspicions import suspicions
+from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.load_cell import LoadCell
@@ -31,29 +31,29 @@ def compare_into(
     progress: Callable[[str, Progress], object] = lambda name, progress: None,
     **options: Any,
 ) -> Run[xr.Dataset]:
-    """Compare families of contours, and write what comes out to a folder.
+    """Compare families of contours, and write the result to a folder.
 
     Parameters
     ----------
     measured : xr.Dataset
         A record.
     out : path-like
-        Folder for comparison.nc, comparison.csv and families.png; made if it is not there, once sampling goes on. Files
+        Folder for comparison.nc, comparison.csv and families.png; created if missing, once sampling has begun. Files
         of these names in it are replaced.
     load_cell, progress, options
-        As `compare_families` takes them.
+        Options of `compare_families`.
 
     Returns
     -------
     Run
-        Of what `compare_families` returns.
+        The result of `compare_families`, and the files.
 
     Raises
     ------
     RecordError, ParameterError, InferenceError
-        As `compare_families`; where no contour is found, with what speaks for a wrong unit or sign.
+        As in `compare_families`; if no contour is found, with the messages of `check_units_and_signs`.
     OSError
-        If the folder cannot be made.
+        If the folder cannot be created.
     """
     path = Path(out)
     above = next(place for place in (path, *path.absolute().parents) if place.exists())
@@ -61,18 +61,18 @@ def compare_into(
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path))
 
     def note(name: str, done: Progress) -> None:
-        path.mkdir(parents=True, exist_ok=True)  # now: all options are checked, and hours of sampling lie ahead
+        path.mkdir(parents=True, exist_ok=True)  # now: all options are checked, and sampling may take hours
         progress(name, done)
 
     try:
         comparison = compare_families(measured, load_cell=load_cell, progress=note, **options)
     except InferenceError as error:
-        raise type(error)(" ".join((str(error), *suspicions(measured, load_cell)))) from error
+        raise type(error)(" ".join((str(error), *check_units_and_signs(measured, load_cell)))) from error
     return Run(comparison, write_comparison(comparison, path))
 
 
 def write_comparison(comparison: xr.Dataset, out: str | os.PathLike[str]) -> dict[str, Path]:
-    """Write a comparison to a folder; the files by what they hold."""
+    """Write a comparison to a folder, and return the files by content."""
     folder = Folder(out)
     folder.write_netcdf("comparison", "comparison.nc", comparison)
     folder.write_table("table", "comparison.csv", _by_family(comparison))
@@ -81,7 +81,7 @@ def write_comparison(comparison: xr.Dataset, out: str | os.PathLike[str]) -> dic
 
 
 def _by_family(comparison: xr.Dataset) -> xr.Dataset:
-    """What there is one number for each family of; yes is 1, no is 0."""
+    """Return the variables with one number for each family; True is 1, False is 0."""
     columns = {}
     for name, values in comparison.data_vars.items():
         if values.dims == ("family",):

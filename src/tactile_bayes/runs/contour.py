@@ -1,4 +1,4 @@
-"""A run: everything that is made of one record, in one folder."""
+"""The analysis of one record, in one folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tactile_bayes import plotting
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
-from tactile_bayes.diagnostics.suspicions import suspicions
+from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.diagnostics.verdicts import verdicts
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import contours_of, infer_contour
@@ -40,24 +40,26 @@ __all__ = ["ContourRun", "analyse"]
 
 @dataclass(frozen=True)
 class ContourRun:
-    """What `analyse` made.
+    """Result of `analyse`.
 
     Attributes
     ----------
     posterior : xr.DataTree
+        From `infer_contour`.
     contacts : xr.Dataset or None
-        Most likely contact points (raw Step 2 for Student's t with 2 degrees of freedom and fewer); None where a load
+        Most probable contact points (raw Step 2 for Student's t with 2 degrees of freedom and fewer); None if a load
         channel is missing.
     band : xr.Dataset or None
+        From `contour_band`.
     summary : xr.Dataset
         From `summary`.
     verdicts : tuple of str
         What is wrong, the most serious first, or that all is well; see `tactile_bayes.verdicts`. Last, what is left
         out, and why.
     files : mapping of str to Path
-        By what they hold.
+        Files by content.
     left_out : mapping of str to Exception
-        What could not be made of the posterior, and how it failed. What these are is None, or among no files.
+        Errors by the part that failed after sampling. Such a part is None, or has no file.
     """
 
     posterior: xr.DataTree
@@ -70,7 +72,7 @@ class ContourRun:
 
 
 class _Folder(Folder):
-    """A folder in which what fails is left out, and all else is made."""
+    """A folder of results from which parts that fail are left out."""
 
     def __init__(self, out: str | os.PathLike[str]) -> None:
         super().__init__(out)
@@ -78,7 +80,7 @@ class _Folder(Folder):
 
     @contextmanager
     def attempt(self, what: str, name: str) -> Iterator[None]:
-        """Whatever goes wrong inside is noted under this name, and no file of a former run stays in its place."""
+        """Note an error of the block under this name, and remove the file of a former run."""
         try:
             yield
         except Exception as error:
@@ -86,8 +88,8 @@ class _Folder(Folder):
             (self.path / name).unlink(missing_ok=True)
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """A sentence for each that is left out."""
+    def messages(self) -> tuple[str, ...]:
+        """A message for each part that is left out."""
         return tuple(
             f"Left out: {what}. {error}"
             if isinstance(error, TactileBayesError)
@@ -109,10 +111,10 @@ def analyse(
     command: Sequence[str] = (),
     **options: Any,
 ) -> ContourRun:
-    """Contact points, contour posterior, band and figures of a record, written to a folder.
+    """Write contact points, contour posterior, band and figures of a record to a folder.
 
-    The posterior is written as soon as it is drawn, and again with what it predicts. Whatever fails from then on is
-    left out and named, and all else is made.
+    The posterior is written as soon as it is sampled, and again with its predictions. A part that fails afterwards is
+    left out and named, and all others are made.
 
     Parameters
     ----------
@@ -120,18 +122,18 @@ def analyse(
         A record.
     out : path-like
         Folder for posterior.nc, contacts.csv, band.csv, summary.txt (which begins with the verdicts), summary.csv and
-        the figures; made if it is not there. Files of these names in it are replaced, and a report.html, which would
-        be of the posterior that was there, is removed.
+        the figures; created if missing. Files of these names in it are replaced, and a report.html, which would belong
+        to the former posterior, is removed.
     load_cell, rod, seed, options
-        As `infer_contour` takes them.
+        Options of `infer_contour`.
     probability : float
-        Of the band and of the intervals in the summary.
+        Probability of the band and of the intervals in the summary, in (0, 1).
     truth : Contour, optional
-        Drawn into the figures.
+        The true contour, to be drawn into the figures.
     record_file : path-like, optional
-        The file that the record was read from, whose name and SHA-256 the posterior then states.
+        File that the record was read from; the posterior then states its name and SHA-256.
     command : sequence of str
-        The words of the command that asked for this run, likewise.
+        Words of the command that started this run; the posterior then states them.
 
     Returns
     -------
@@ -140,7 +142,7 @@ def analyse(
     Raises
     ------
     RecordError, ParameterError, InferenceError
-        As `infer_contour`; where no contour is found, with what speaks for a wrong unit or sign.
+        As in `infer_contour`; if no contour is found, with the messages of `check_units_and_signs`.
     """
     check_probability("probability", probability)
     measured = with_rod(validate(measured), rod)
@@ -149,7 +151,7 @@ def analyse(
 
     def keep(posterior: xr.DataTree) -> None:
         posterior.attrs |= origin
-        (folder.path / "report.html").unlink(missing_ok=True)  # before, so that it is never beside another posterior
+        (folder.path / "report.html").unlink(missing_ok=True)  # first, so that it is never beside another posterior
         folder.files["posterior"] = folder.path / "posterior.nc"
         write_result(posterior, folder.files["posterior"])
         drawn.append(posterior)
@@ -158,7 +160,7 @@ def analyse(
         keep(infer_contour(measured, load_cell=load_cell, seed=seed, keep=keep, **options))
     except Exception as error:
         if not drawn and isinstance(error, InferenceError):
-            raise type(error)(" ".join((str(error), *suspicions(measured, load_cell)))) from error
+            raise type(error)(" ".join((str(error), *check_units_and_signs(measured, load_cell)))) from error
         if not drawn:
             raise
         folder.left_out["predictions"] = error
@@ -180,7 +182,7 @@ def analyse(
 
     def write_summary() -> None:
         table = numbers.to_dataframe().to_string()
-        lines = (*found, *folder.words, "", table, "", result.attrs["message"])
+        lines = (*found, *folder.messages, "", table, "", result.attrs["message"])
         folder.write_lines("verdicts", "summary.txt", lines)
         folder.write_table("summary", "summary.csv", numbers)
 
@@ -189,13 +191,13 @@ def analyse(
     _draw(_Figures(measured, result, contacts, band, edges, truth), folder)
     if len(folder.left_out) > before:
         write_summary()
-    return ContourRun(result, contacts, band, numbers, (*found, *folder.words), folder.files, folder.left_out)
+    return ContourRun(result, contacts, band, numbers, (*found, *folder.messages), folder.files, folder.left_out)
 
 
 def _origin(
     measured: xr.Dataset, probability: float, record_file: str | os.PathLike[str] | None, command: Sequence[str]
 ) -> dict[str, Any]:
-    """Attributes that say what a run was made from, and how it was asked for."""
+    """Return attributes that state the record of a run, and the command that started it."""
     said = {
         str(name): value.item() if isinstance(value, np.generic) else value
         for name, value in measured.attrs.items()
@@ -234,14 +236,14 @@ class _Figures:
 
     @cached_property
     def names(self) -> list[str]:
-        """Parameters that say something by themselves."""
+        """Parameters that have a meaning by themselves."""
         mute = family_named(self.result.attrs["family"]).roughness
         return [str(name) for name in self.draws.data_vars if name not in mute]
 
     @cached_property
     def directions(self) -> list[Literal["forward", "backward"]]:
-        strokes = self.result["events"].stroke.values if "events" in self.result.children else []
-        return [direction for direction in ("forward", "backward") if direction in strokes]
+        swept = self.result["events"].stroke.values if "events" in self.result.children else []
+        return [direction for direction in ("forward", "backward") if direction in swept]
 
     @cached_property
     def base(self) -> tuple[float, float]:
@@ -249,8 +251,8 @@ class _Figures:
 
     @cached_property
     def fitted(self) -> Scan:
-        """A scan of the likeliest contour."""
-        best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # medians by parameter may be out of reach
+        """A scan of the most probable contour."""
+        best = self.result["sample_stats"]["lp"].argmax(("chain", "draw"))  # the medians may be out of reach
         draw, attrs = self.draws.isel(best), self.result.attrs
         return scan(
             contours_of(draw, attrs["family"]).take(np.array(0)),

@@ -31,14 +31,14 @@ def measure_demo(out: str | os.PathLike[str], *, seed: int = 1) -> Path:
     Parameters
     ----------
     out : path-like
-        Folder, made if it is not there.
+        Folder, created if missing.
     seed : int
-        Of the load cell's noise.
+        Seed of the load cell's noise.
 
     Returns
     -------
     Path
-        The record.
+        The file of the record.
     """
     measured = LOAD_CELL.measure(scan(CONTOUR, rod=ROD).record, seed=seed)
     path = Path(out) / "record.csv"

@@ -14,32 +14,32 @@ from tactile_bayes.planning.design import design
 from tactile_bayes.runs.folder import Folder, Run
 from tactile_bayes.runs.outermost import outermost
 
-__all__ = ["design_in_words", "design_into"]
+__all__ = ["design_into", "design_messages"]
 
 
 def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, **options: Any) -> Run[xr.Dataset]:
-    """Choose the next record, and write what comes out to a folder.
+    """Choose the next record, and write the result to a folder.
 
     Parameters
     ----------
     out : path-like
-        Folder for design.nc, candidates.csv, words.txt and design.png; made if it is not there. Files of these names in
-        it are replaced.
+        Folder for design.nc, candidates.csv, words.txt and design.png; created if missing. Files of these names in it
+        are replaced.
     args, options
-        As `design` takes them.
+        Arguments and options of `design`.
     nested : bool
-        Likewise; what was found of each candidate is then kept in a folder "nested" within, and a run that was stopped
-        goes on.
+        Option of `design`; if True, results of each candidate are kept in a subfolder "nested", from which a stopped
+        run resumes.
 
     Returns
     -------
     Run
-        Of what `design` returns.
+        The result of `design`, and the files.
 
     Raises
     ------
     ParameterError, InferenceError, ReachError, StudyError, TaskError
-        As `design`.
+        As in `design`.
     """
     found = design(*args, nested=nested, out=Path(out) / "nested" if nested else None, **options)
     folder = Folder(out)
@@ -48,13 +48,13 @@ def design_into(out: str | os.PathLike[str], *args: Any, nested: bool = False, *
     rows = np.stack([found[name].values for name in columns], axis=1)
     lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
     folder.write_lines("candidates", "candidates.csv", lines)
-    folder.write_lines("words", "words.txt", design_in_words(found))
+    folder.write_lines("words", "words.txt", design_messages(found))
     folder.draw("figure", "design.png", plotting.design, found)
     return Run(found, folder.files)
 
 
-def design_in_words(found: xr.Dataset) -> tuple[str, ...]:
-    """Which candidate is the best, and how much better."""
+def design_messages(found: xr.Dataset) -> tuple[str, ...]:
+    """Return sentences on the best candidate and its advantage."""
     best = found.isel(candidate=int(found.best))
     si = found.base_x.attrs.get("units") == "m"
 

@@ -1,4 +1,4 @@
-"""The folder of a run: how results are written to it, and how they are found in it."""
+"""The folder of a run: writing and finding results."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ __all__ = ["Folder", "Run", "panels", "posterior_in"]
 Result = TypeVar("Result")
 
 _OTHERS = {"comparison.nc": "a comparison of shapes", "design.nc": "a design", "manifest.json": "a data set"}
-"""What else a folder may hold, by a file in it."""
+"""Other contents of a folder, by a file that shows them."""
 
 
 @dataclass(frozen=True)
 class Run(Generic[Result]):
-    """What a command made.
+    """Result of a command.
 
     Attributes
     ----------
     result : object
-        From the function of the library that the command is for.
+        Result of the library function behind the command.
     files : mapping of str to Path
-        By what they hold.
+        Files by content.
     """
 
     result: Result
@@ -41,13 +41,13 @@ class Run(Generic[Result]):
 
 
 class Folder:
-    """A folder of results, made if it is not there; each file is written whole, and replaces one of its name.
+    """A folder of results, created if missing; each file is written whole, and replaces one of its name.
 
     Attributes
     ----------
     path : Path
     files : dict of str to Path
-        What has been written, by what it holds.
+        Files written so far, by content.
     """
 
     def __init__(self, out: str | os.PathLike[str]) -> None:
@@ -57,7 +57,7 @@ class Folder:
 
     @contextmanager
     def file(self, what: str, name: str) -> Iterator[Path]:
-        """Give a temporary path to write to; the file is there, and listed, when the block has succeeded."""
+        """Yield a temporary path to write to; the file exists, and is listed, once the block has succeeded."""
         with write_atomically(self.path / name) as temporary:
             yield temporary
         self.files[what] = self.path / name
@@ -89,7 +89,7 @@ class Folder:
 
 
 def panels(rows: int, columns: int, width: float, height: float, **options: Any) -> Any:
-    """Axes of a new figure that pyplot does not know; shape (rows, columns)."""
+    """Return Axes of a new figure outside pyplot, shape (rows, columns); width and height are in inches."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -97,12 +97,12 @@ def panels(rows: int, columns: int, width: float, height: float, **options: Any)
 
 
 def posterior_in(run: Path) -> Path:
-    """The posterior in the folder of a run, which is not opened.
+    """Return the path of the posterior in the folder of a run, without opening it.
 
     Raises
     ------
     InferenceError
-        If there is none.
+        If the folder holds no posterior.
 
     Examples
     --------

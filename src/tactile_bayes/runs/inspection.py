@@ -26,14 +26,14 @@ def write_inspection(
         From `inspect_record`.
     out : path-like
         Folder for inspection.txt, sweeps.csv, channels.csv, samples.csv (a line for every sample, with 1 where
-        something looks wrong) and inspection.png; made if it is not there. Files of these names in it are replaced.
+        something looks wrong) and inspection.png; created if missing. Files of these names in it are replaced.
     text : sequence of str
-        Lines that follow what looks wrong in inspection.txt.
+        Lines that follow the messages in inspection.txt.
 
     Returns
     -------
     mapping of str to Path
-        By what they hold.
+        Files by content.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def write_inspection(
     ['channels.csv', 'inspection.png', 'inspection.txt', 'samples.csv', 'sweeps.csv']
     """
     folder = Folder(out)
-    folder.write_lines("words", "inspection.txt", (*inspection.words, *text))
+    folder.write_lines("words", "inspection.txt", (*inspection.messages, *text))
     sweeps = inspection.sweeps
     sides = {
         f"{event}_{side}": sweeps[f"{event}_drive_angle"].sel(side=side, drop=True)

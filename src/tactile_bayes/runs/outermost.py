@@ -1,4 +1,4 @@
-"""Whether a choice is the outermost of those that were tried."""
+"""Extremes of a choice among the values that were tried."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["outermost"]
 
 
 def outermost(choices: Iterable[tuple[NDArray[np.float64], float, str, str]]) -> str:
-    """In which ways nothing beyond the best was tried, in words; "" if in none.
+    """Return the extremes at which the best choice lies, as text; "" if it lies inside all ranges.
 
     Parameters
     ----------
     choices : iterable of tuple
-        Values that were tried, the best of them, and words for the least and for the most.
+        The values that were tried, the best of them, and words for the smallest and for the largest.
 
     Examples
     --------

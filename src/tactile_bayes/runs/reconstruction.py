@@ -24,25 +24,26 @@ from tactile_bayes.runs.folder import Folder, Run, panels
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_in_words"]
+__all__ = ["ReconstructionRun", "reconstruct_into", "reconstruction_messages"]
 
 _CONTRADICTION = 1e-4
-"""Probability of the misfit below which it is told first."""
+"""Probability of the misfit below which it is reported first."""
 
 
 @dataclass(frozen=True)
 class ReconstructionRun(Run[xr.Dataset]):
-    """What `reconstruct_into` made.
+    """Result of `reconstruct_into`.
 
     Attributes
     ----------
     result : xr.Dataset
         From `reconstruct`.
     files : mapping of str to Path
-        By what they hold.
+        Files by content.
     load_cell : LoadCell or None
+        The load cell that was assumed.
     source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
-        What the load cell is known from; see `known_cell`.
+        Source of the load cell; see `known_cell`.
     """
 
     load_cell: LoadCell | None
@@ -57,19 +58,20 @@ def reconstruct_into(
     load_cell: LoadCell | None = None,
     friction: float = 0.0,
 ) -> ReconstructionRun:
-    """Contact points of a record, and a map of them, written to a folder.
+    """Write contact points of a record, and a map of them, to a folder.
 
     Parameters
     ----------
     measured : xr.Dataset
         A record with all three load channels.
     out : path-like
-        Folder for contacts.csv, and contacts.png where there are at least two contact points; made if it is not there.
-        Files of these names in it are replaced, and a contacts.png is removed where none is drawn.
+        Folder for contacts.csv, and for contacts.png if there are at least two contact points; created if missing.
+        Files of these names in it are replaced, and an old contacts.png is removed if none is drawn.
     method : {"raw", "constrained"}, optional
-        As `reconstruct` takes it; by default "constrained", or "raw" where the noise of a channel is not known.
+        Method of `reconstruct`; by default "constrained", or "raw" if the noise of a channel is not known.
     load_cell : LoadCell, optional
-        By default the data sheet of the record, or what `LoadCell.from_zero_load` finds.
+        The sensor, in the record's units; by default the data sheet of the record, or the estimate of
+        `LoadCell.from_zero_load`.
     friction : float
         Coulomb's coefficient μ.
 
@@ -80,7 +82,7 @@ def reconstruct_into(
     Raises
     ------
     RecordError, ParameterError
-        As `reconstruct`.
+        As in `reconstruct`.
 
     Examples
     --------
@@ -98,7 +100,7 @@ def reconstruct_into(
         method = "constrained" if cell is not None and cell.has_variances else "raw"
     contacts = reconstruct(measured, method=method, load_cell=cell, friction=friction)
     folder = Folder(out)
-    (folder.path / "contacts.png").unlink(missing_ok=True)  # which is of other contacts
+    (folder.path / "contacts.png").unlink(missing_ok=True)  # it shows other contacts
     folder.write_table("contacts", "contacts.csv", contacts)
     shown = contacts.contact_x.values[contacts.status.values == "ok"]
     if shown.size > 1 and np.ptp(shown) > 0.0:
@@ -106,8 +108,8 @@ def reconstruct_into(
     return ReconstructionRun(contacts, folder.files, cell, source)
 
 
-def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
-    """What became of the samples, and whether their loads agree, in sentences; what is wrong comes first.
+def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
+    """Return messages on the samples' statuses and the agreement of their loads; what is wrong comes first.
 
     Parameters
     ----------
@@ -122,13 +124,13 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
     --------
     >>> from tactile_bayes import scan
     >>> from tactile_bayes.contours import paper_profile
-    >>> reconstruction_in_words(reconstruct(scan(paper_profile("II", q=0.5)).record))
+    >>> reconstruction_messages(reconstruct(scan(paper_profile("II", q=0.5)).record))
     ('266 contact points by the raw method; samples: 266 ok, 64 no contact.',)
     """
     counts = Counter(contacts.status.values.tolist())
     fates = ", ".join(f"{count} {fate}" for fate, count in counts.most_common())
     found = int(np.count_nonzero(np.isfinite(contacts.contact_x.values)))
-    told = [
+    sentences = [
         f"{found} contact point{'s' * (found != 1)} by the {contacts.attrs['method']} method; samples: {fates}.",
     ]
     against = doubtful_sides(contacts.attrs)
@@ -137,14 +139,14 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
         total, chance = (float(contacts.attrs[name]) for name in ("misfit_sum", "misfit_probability"))
         words = f"Misfit {total:.0f} in {samples} samples"
         if math.isnan(chance):
-            told.append(f"{words}; they share an unknown bias, so that no probability is told.")
+            sentences.append(f"{words}; they share an unknown bias, so that no probability can be stated.")
         elif chance < _CONTRADICTION:
             against.append(
                 f"The loads of single samples contradict one another, {words[0].lower()}{words[1:]} (noise explains it "
                 f"with probability {chance:.1g}): {CHECK_RIG}."
             )
         else:
-            told.append(f"{words}, which noise explains with probability {chance:.2g}.")
+            sentences.append(f"{words}, which noise explains with probability {chance:.2g}.")
         score = float(contacts.attrs["axial_score"])
         if score < -AXIAL_ALARM:
             against.append(
@@ -157,10 +159,10 @@ def reconstruction_in_words(contacts: xr.Dataset) -> tuple[str, ...]:
                 "zero of the drive angle, the axes of the forces, and the rod."
             )
         elif math.isfinite(score):
-            told.append(
+            sentences.append(
                 f"In tangential contact the force along the rod agrees with the moment ({score:+.1f} standard errors)."
             )
-    return (*against, *told)
+    return (*against, *sentences)
 
 
 def _map(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64]) -> Axes:

@@ -24,38 +24,38 @@ from tactile_bayes.tasks import TaskProgress
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Material", "SensitivityRun", "rod_in_words", "sensitivity_into", "steps_of"]
+__all__ = ["Material", "SensitivityRun", "rod_message", "sensitivity_into", "steps_of"]
 
 
 _OF_PLAN = tuple(field.name for field in fields(Plan))
 _LENGTHS = np.array([0.7, 0.85, 1.0, 1.2, 1.4])
 _DIAMETERS = np.array([0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0])
-"""Of the rods that are tried, over those of the rod as it is."""
+"""Lengths and diameters of the rods that are tried, over those of the present rod."""
 
 
 class Material(NamedTuple):
-    """Of which a rod is made."""
+    """Material of a rod."""
 
     youngs_modulus: float
-    """In Pa."""
+    """Young's modulus [Pa]."""
     elastic_strain: float
-    """That it takes without staying bent."""
+    """Largest elastic bending strain."""
 
 
 @dataclass(frozen=True)
 class SensitivityRun(Run[xr.DataTree]):
-    """What `sensitivity_into` made.
+    """Result of `sensitivity_into`.
 
     Attributes
     ----------
     result : xr.DataTree
         From `sensitivity`.
     files : mapping of str to Path
-        By what they hold.
+        Files by content.
     rods : xr.Dataset or None
-        From `required_rod`, where a material was given.
+        From `required_rod`, if a material was given.
     study : xr.Dataset or None
-        From `error_map`, where one was asked for.
+        From `error_map`, if a study was requested.
     """
 
     rods: xr.Dataset | None
@@ -70,23 +70,24 @@ def sensitivity_into(
     progress: Callable[[int], object] | None = None,
     **options: Any,
 ) -> SensitivityRun:
-    """Analyse what errors of the sensor do, and write what comes out to a folder.
+    """Analyse the effects of the sensor's errors, and write the results to a folder.
 
     Parameters
     ----------
     out : path-like
         Folder for sensitivity.nc, words.txt, amplification.png, information.png, noise_shares.png and
-        required_noise.png; made if it is not there. Files of these names in it are replaced. With a material there are
-        rods.nc and required_rod.png, too. A study is in its folder study: cells.json, which a run that was stopped goes
-        on from, study.nc and study.png.
+        required_noise.png; created if missing. Files of these names in it are replaced. A material adds rods.nc and
+        required_rod.png. A study is written to a subfolder study: cells.json (the checkpoint from which a stopped run
+        resumes), study.nc and study.png.
     material : Material, optional
-        Of which the rod that the load cell wants is sought, among lengths and diameters around its own.
+        Material of the rod; if given, the rod that suits the load cell is sought among lengths and diameters around
+        the present ones.
     study : mapping, optional
-        What `error_map` takes beside `out`: its answer is made as well, after the rest has been written.
+        Arguments of `error_map` except `out`; if given, the study is made after the rest has been written.
     progress : callable, optional
-        Is given the number of steps that are done, of `steps_of(material)`; a study has a progress of its own.
+        Called with the number of steps done, of `steps_of(material)`; a study has a progress of its own.
     options
-        As `sensitivity` takes them.
+        Options of `sensitivity`.
 
     Returns
     -------
@@ -95,9 +96,9 @@ def sensitivity_into(
     Raises
     ------
     ParameterError, ReachError
-        As `sensitivity` and `error_map`.
+        As in `sensitivity` and `error_map`.
     StudyError, TaskError
-        As `error_map`.
+        As in `error_map`.
 
     Examples
     --------
@@ -109,8 +110,8 @@ def sensitivity_into(
     """
     if material is not None and (options.get("rod") is None or options.get("load_cell") is None):
         raise ParameterError("a rod is sought for a load cell in N and N m: state the rod in SI, and the noise")
-    told = progress or (lambda done: None)
-    found = sensitivity(**options, progress=lambda part: told(part.done))
+    report = progress or (lambda done: None)
+    found = sensitivity(**options, progress=lambda part: report(part.done))
     folder = Folder(out)
     folder.write_netcdf("sensitivity", "sensitivity.nc", found)
     folder.write_lines("words", "words.txt", [found.attrs["words"]])
@@ -119,10 +120,10 @@ def sensitivity_into(
         folder.draw(part, f"{part}.png", draw, found)
     rods, studied = None, None
     if material is not None:
-        rods = _rods(material, options, lambda rod: told(len(PARTS) + rod.done))
+        rods = _rods(material, options, lambda rod: report(len(PARTS) + rod.done))
         folder.write_netcdf("rods", "rods.nc", rods)
         folder.draw("required_rod", "required_rod.png", plotting.required_rod, rods)
-        folder.write_lines("words", "words.txt", [found.attrs["words"], rod_in_words(rods)])
+        folder.write_lines("words", "words.txt", [found.attrs["words"], rod_message(rods)])
     if study is not None:
         studied = error_map(out=folder.path / "study", **study)
         inside = Folder(folder.path / "study")
@@ -133,8 +134,8 @@ def sensitivity_into(
     return SensitivityRun(found, folder.files, rods, studied)
 
 
-def rod_in_words(rods: xr.Dataset) -> str:
-    """Which rod the load cell wants, of those that were tried."""
+def rod_message(rods: xr.Dataset) -> str:
+    """Return a message on the rod that suits the load cell best, of those that were tried."""
     count, status = rods.status.size, Counter(rods.status.values.ravel().tolist())
     others = ", ".join(f"{number} {what}" for what, number in status.most_common() if what != "ok")
     left_out = f" ({others})" if others else ""
@@ -153,7 +154,7 @@ def rod_in_words(rods: xr.Dataset) -> str:
 
 
 def steps_of(material: Material | None) -> int:
-    """How many steps an analysis without a study takes."""
+    """Return the number of steps of an analysis without a study."""
     return len(PARTS) + (0 if material is None else _LENGTHS.size * _DIAMETERS.size)
 
 
@@ -172,14 +173,14 @@ def _rods(material: Material, options: Mapping[str, Any], progress: Callable[[Ta
 
 
 def _draw_noise_shares(found: xr.DataTree) -> Axes:
-    """Of both methods."""
+    """Draw the noise shares of both methods of Step 2."""
     above, below = panels(2, 1, 7.0, 7.4)[:, 0]
     plotting.noise_shares(found, reconstruction="raw", ax=above)
     return plotting.noise_shares(found, reconstruction="constrained", ax=below)
 
 
 def _draw_study(studied: xr.Dataset) -> Axes:
-    """Of contacts and of bands."""
+    """Draw the errors of contacts and the widths of bands."""
     above, below = panels(2, 1, 7.0, 7.4)[:, 0]
     plotting.error_map(studied, quantity="across", ax=above)
     return plotting.error_map(studied, quantity="touched", ax=below)

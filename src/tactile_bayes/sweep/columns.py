@@ -37,11 +37,11 @@ class ManyUnits(NamedTuple):
     moment_unit: Any
     force_unit: Any
 
-    def of(self, lane: NDArray[np.intp]) -> ManyUnits:
-        return ManyUnits(*(value[lane] if isinstance(value, np.ndarray) else value for value in self))
+    def of(self, index: NDArray[np.intp]) -> ManyUnits:
+        return ManyUnits(*(value[index] if isinstance(value, np.ndarray) else value for value in self))
 
 
-def sweep_samples(paths: Paths, units: ManyUnits, lane: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
+def sweep_samples(paths: Paths, units: ManyUnits, index: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
     """What the base feels at the drive angles that paths were traced with, and the contacts.
 
     Parameters
@@ -58,8 +58,8 @@ def sweep_samples(paths: Paths, units: ManyUnits, lane: NDArray[np.intp]) -> dic
     dict of str to ndarray, shape (*lane.shape, k)
         `SAMPLE_COLUMNS`, and "contact_phase" as numbers (`NONE`, `TIP`, `TANGENTIAL`).
     """
-    states, each = paths.sampled_states(lane), lane[..., None]
-    found = to_lab_frame(paths.seen, each, states, units.of(each))
+    states, each = paths.sampled_states(index), index[..., None]
+    found = to_lab_frame(paths.sweep_frame, each, states, units.of(each))
     for name in LOADS:
         np.copyto(found[name], 0.0, where=states.wrench.phase == NONE)
     return {name: found[name] for name in (*SAMPLE_COLUMNS, "contact_phase")}
@@ -67,15 +67,15 @@ def sweep_samples(paths: Paths, units: ManyUnits, lane: NDArray[np.intp]) -> dic
 
 def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:
     """`EVENT_COLUMNS` of every "first_contact" and "snap_off", in the laboratory frame; NaN where there is none."""
-    lanes = np.arange(paths.seen.lanes)
+    index = np.arange(paths.sweep_frame.size)
     events = {}
     for name, angle, parameter in (
         ("first_contact", paths.first_angle, paths.first_parameter),
         ("snap_off", paths.snap_angle, paths.snap_parameter),
     ):
-        states = paths.states_at(lanes, parameter)
-        found = to_lab_frame(paths.seen, lanes, states, units.of(lanes))
-        turned = np.where(paths.seen.mirrored, np.pi - angle, angle)
+        states = paths.states_at(index, parameter)
+        found = to_lab_frame(paths.sweep_frame, index, states, units.of(index))
+        turned = np.where(paths.sweep_frame.mirrored, np.pi - angle, angle)
         events[name] = {**{column: found[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
     return events
 

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from tactile_bayes.mechanics.elastica import Wrench
-from tactile_bayes.mechanics.fates import SnapOff
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction
@@ -79,11 +79,11 @@ class SweepEvents:
 def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod: Rod) -> SweepEvents:
     to_tip = paths.change_to_tip[0]
     parameters = np.concatenate([paths.first_parameter, paths.change_parameter[0, 1:], paths.snap_parameter])
-    lane = np.zeros(parameters.size, dtype=np.intp)
-    states = paths.states_at(lane, parameters)
+    index = np.zeros(parameters.size, dtype=np.intp)
+    states = paths.states_at(index, parameters)
     # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
     wrench = _at_rest_first(states, bool(to_tip[0]))
-    columns = to_lab_frame(paths.seen, lane, states._replace(wrench=wrench), rod)
+    columns = to_lab_frame(paths.sweep_frame, index, states._replace(wrench=wrench), rod)
     words = ["tip" if tip else "tangential" for tip in to_tip]
     kinds = [
         words[0],

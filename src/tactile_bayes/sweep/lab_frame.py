@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.paths import States
 
 __all__ = ["RodUnits", "to_lab_frame"]
@@ -25,12 +25,12 @@ class RodUnits(Protocol):
     def force_unit(self) -> Any: ...
 
 
-def to_lab_frame(seen: SeenContour, lane: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
+def to_lab_frame(sweep_frame: SweepFrame, index: Index, states: States, rod: RodUnits) -> dict[str, NDArray[Any]]:
     """States on lanes in the laboratory's signs and units; the contact point is the object's, not the centreline's.
 
     Parameters
     ----------
-    seen : SeenContour
+    seen : SweepFrame
     lane : ndarray, broadcastable to shape (...)
     states : States
         Of shape (...).
@@ -42,10 +42,12 @@ def to_lab_frame(seen: SeenContour, lane: Index, states: States, rod: RodUnits) 
     dict of str to ndarray, shape (...)
         By the names of a record's columns; phases as numbers.
     """
-    mirrored = seen.mirrored[lane]
+    mirrored = sweep_frame.mirrored[index]
     sign = np.where(mirrored, -1.0, 1.0)
     wrench = states.wrench
-    length, standoff = (v[lane] if isinstance(v, np.ndarray) else v for v in (seen.length, seen.standoff))
+    length, standoff = (
+        v[index] if isinstance(v, np.ndarray) else v for v in (sweep_frame.length, sweep_frame.standoff)
+    )
     x, y = states.x, states.y
     if np.any(standoff):
         x = x - standoff / length * np.sin(states.slope_angle)
@@ -61,8 +63,8 @@ def to_lab_frame(seen: SeenContour, lane: Index, states: States, rod: RodUnits) 
         "force_y": wrench.force_y * rod.force_unit,
         "contact_arclength": wrench.contact_arclength * rod.length_unit,
         "contact_phase": wrench.phase,
-        "contact_x": seen.base_x[lane] + sign * x * rod.length_unit,
-        "contact_y": seen.base_y[lane] + y * rod.length_unit,
+        "contact_x": sweep_frame.base_x[index] + sign * x * rod.length_unit,
+        "contact_y": sweep_frame.base_y[index] + y * rod.length_unit,
         "tip_angle": turned(wrench.tip_angle),
         "slope_angle": sign * states.slope_angle,
     }

@@ -8,14 +8,14 @@ import numpy as np
 
 from tactile_bayes.checks import check_choice, check_kind, check_number
 from tactile_bayes.contours.base import Contour
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
-from tactile_bayes.mechanics.fates import CLEARANCE, Reach
 from tactile_bayes.mechanics.paths import Paths, trace
+from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 from tactile_bayes.mechanics.rod import Rod
 
-__all__ = ["Direction", "friction_angle_of", "seen_from", "sweep_paths"]
+__all__ = ["Direction", "friction_angle_of", "sweep_paths", "to_sweep_frame"]
 
 Direction = Literal["forward", "backward"]
 
@@ -33,7 +33,7 @@ def sweep_paths(
     Parameters and errors are those of `scan`.
     """
     rod = Rod() if rod is None else rod
-    seen = seen_from(contour, base, direction, rod)
+    sweep_frame = to_sweep_frame(contour, base, direction, rod)
     friction_angle = friction_angle_of(friction)
     height = np.asarray(contour.height(base[0])) - 0.5 * rod.diameter
     if np.any(height <= base[1]):
@@ -41,36 +41,36 @@ def sweep_paths(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = trace(seen, friction_angle=friction_angle)
+    paths = trace(sweep_frame, friction_angle=friction_angle)
     sweep = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
-    match Reach(int(paths.reach[0])):
-        case Reach.TOO_FAR:
+    match Reachability(int(paths.reach[0])):
+        case Reachability.TOO_FAR:
             raise ReachError(
                 f"the contour is out of reach: its nearest point is {paths.distance[0] * rod.length:.6g} from the "
                 f"pivot at ({base[0]:g}, {base[1]:g}), and the rod is {rod.length:g} long"
             )
-        case Reach.CUTS_PIVOT:
+        case Reachability.CUTS_PIVOT:
             raise ContourError(
                 f"the contour cuts the base: the pivot at ({base[0]:g}, {base[1]:g}) is not below it; raise the "
                 "contour or lower the pivot"
             )
-        case Reach.TOO_CLOSE:
+        case Reachability.TOO_CLOSE:
             raise ContourError(
                 f"the contour comes within {paths.distance[0] * rod.length:.6g} of the pivot at ({base[0]:g}, "
                 f"{base[1]:g}); a path can be followed from {CLEARANCE * rod.length:g} on ({CLEARANCE:.0%} of the "
                 "rod's length): move one of them away"
             )
-        case Reach.ENDS:
+        case Reachability.ENDS:
             raise ContourError(
                 f"{sweep} the rod would first touch beyond {_end(contour, direction == 'forward')}, "
                 "and nothing is known of the object there: extend the contour, or move the pivot"
             )
-        case Reach.RUNS_OUT:
+        case Reachability.RUNS_OUT:
             raise ContourError(
                 f"{sweep} the rod would still touch at {_end(contour, direction == 'backward')}, and "
                 "nothing is known of the object beyond: extend the contour, or move the pivot"
             )
-        case Reach.GRAZES:
+        case Reachability.GRAZES:
             raise ReachError(
                 f"{sweep} the rod touches the contour so slightly that rounding hides where contact ends: bring "
                 "contour and pivot closer together (are contour, pivot and rod in one unit?)"
@@ -84,7 +84,7 @@ def _end(contour: Contour, at_right: bool) -> str:
     return f"the contour's {side} end at ({float(locus.x):.6g}, {float(locus.y):.6g}), {contour.end_name(side)}"
 
 
-def seen_from(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SeenContour:
+def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direction, rod: Rod) -> SweepFrame:
     """One contour as one rod sees it from one pivot.
 
     Raises
@@ -100,7 +100,7 @@ def seen_from(contour: Contour, base: tuple[float, float], direction: Direction,
             f"one contour is wanted here, not an array of shape {contour.shape}: scan_many takes those of shape (n,)"
         )
     x, y = (np.full(1, float(b)) for b in base)
-    return SeenContour(
+    return SweepFrame(
         contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, np.array([direction == "backward"])
     )
 

@@ -23,7 +23,7 @@ from tactile_bayes.mechanics.rod import LARGEST_STRAIN, Rod
 from tactile_bayes.record import COLUMNS, make_record
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
-from tactile_bayes.sweep.path import Direction, friction_angle_of, seen_from, sweep_paths
+from tactile_bayes.sweep.path import Direction, friction_angle_of, sweep_paths, to_sweep_frame
 
 __all__ = ["Scan", "equilibria", "scan"]
 
@@ -125,13 +125,13 @@ def equilibria(
     if len(pivots) > 1:
         raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
     units = Rod() if rod is None else rod
-    seen = seen_from(contour, pivots[0], direction, units)
-    lane = np.zeros(alpha.size, dtype=np.intp)
-    parameter = (-1.0 if seen.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
-    locus = seen.locate(lane, parameter)
+    sweep_frame = to_sweep_frame(contour, pivots[0], direction, units)
+    index = np.zeros(alpha.size, dtype=np.intp)
+    parameter = (-1.0 if sweep_frame.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
+    locus = sweep_frame.locate(index, parameter)
     wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle_of(friction))
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
-    columns = to_lab_frame(seen, lane, states, units)
+    columns = to_lab_frame(sweep_frame, index, states, units)
     reached = wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
     data = {}
@@ -284,9 +284,9 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
 def _sweep(
     paths: Paths, angles: Floats, number: int, direction: Direction, base: tuple[float, float], rod: Rod
 ) -> dict[str, NDArray[np.generic]]:
-    lane = np.zeros(angles.size, dtype=np.intp)
-    states = paths.states(lane, np.pi - angles if paths.seen.mirrored[0] else angles)
-    columns = to_lab_frame(paths.seen, lane, states, rod)
+    index = np.zeros(angles.size, dtype=np.intp)
+    states = paths.states(index, np.pi - angles if paths.sweep_frame.mirrored[0] else angles)
+    columns = to_lab_frame(paths.sweep_frame, index, states, rod)
     loaded = states.wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[states.wrench.phase]
     sweep: dict[str, NDArray[np.generic]] = {

@@ -9,11 +9,11 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.contours.base import Contour
-from tactile_bayes.contours.seen import SeenContour
+from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.mechanics.fates import Reach
 from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
+from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import COLUMNS
 from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
@@ -102,9 +102,9 @@ def scan_many(
             "degrees are converted by np.radians"
         )
     backward = np.full(count, direction == "backward")
-    seen = SeenContour(contours.broadcast_to((count,)), x, y, rod.length, 0.5 * rod.diameter, backward)
+    sweep_frame = SweepFrame(contours.broadcast_to((count,)), x, y, rod.length, 0.5 * rod.diameter, backward)
     seen_angles = np.pi - angles if direction == "backward" else angles
-    paths = trace(seen, friction_angle=friction_angle_of(friction), drive_angles=seen_angles, polished=False)
+    paths = trace(sweep_frame, friction_angle=friction_angle_of(friction), drive_angles=seen_angles, polished=False)
     units = ManyUnits(rod.length_unit, rod.moment_unit, rod.force_unit)
     system = "dimensionless" if rod.is_dimensionless else "SI"
 
@@ -118,7 +118,7 @@ def scan_many(
     variables: dict[str, Any] = {"drive_angle": labelled(both, angles, "drive_angle")}
     variables |= {name: labelled(both, values, name) for name, values in samples.items()}
     variables["contact_phase"] = labelled(both, phase, "contact_phase")
-    fates = np.array([fate.words for fate in Reach])
+    fates = np.array([one.message for one in Reachability])
     variables["status"] = ("contour", fates[paths.reach])
     with np.errstate(invalid="ignore"):
         variables["clear"] = ("contour", paths.is_clear())

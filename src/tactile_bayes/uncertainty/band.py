@@ -17,36 +17,36 @@ from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.blocks import blocks
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
-__all__ = ["contour_band", "contour_heights", "contours_drawn", "length_unit", "places"]
+__all__ = ["contour_band", "contour_heights", "contours_drawn", "grid_points", "length_unit"]
 
 _DRAWS = 4000
 
-_OF_A_HEIGHT = 12
-"""Numbers that a contour of any shape looks up for one of its heights."""
+_NUMBERS_PER_HEIGHT = 12
+"""Numbers that a shape-free contour reads for one of its heights."""
 
 
 def contour_band(
     posterior: xr.DataTree, x: ArrayLike, probability: float = 0.95, simultaneous: bool = False
 ) -> xr.Dataset:
-    """Band in which the contour lies with a given probability, and its median.
+    """Return the band in which the contour lies with a given probability, and the median contour height.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`.
     x : array_like, shape (n,)
-        Where, in the record's unit of length.
+        Grid points of the band, in the record's unit of length.
     probability : float
-        In (0, 1).
+        Probability of the band, in (0, 1).
     simultaneous : bool
-        Whether the probability holds at every x by itself (False), or for the whole stretch at once: the pointwise
-        band is then widened about the median, everywhere by the same factor, until it contains that share of contours.
+        If False, the probability holds at every x by itself. If True, it holds for all x at once: the pointwise band
+        is widened about the median, everywhere by the same factor, until it contains that share of contours.
 
     Returns
     -------
     xr.Dataset
-        Over "x": lower, upper, median [length]; share_reaching, the share of contours that extend to x, and status in
-        words: "ok", or why the band is NaN.
+        Over "x": lower, upper, median [length]; share_reaching, the share of contours that extend to x; status, "ok"
+        or the reason why the band is NaN.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def contour_band(
 
     See Also
     --------
-    normal_band : the same across the contour, which is what a steep flank wants.
+    normal_band : the same band measured across the contour, for steep flanks.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def contour_band(
     >>> contour_band(tree, [0.0, 1.0])["median"].values
     array([0.3, 0.8])
     """
-    at = places(x)
+    at = grid_points(x)
     heights = contour_heights(posterior, at)
     share = np.isfinite(heights).mean(axis=0)
     lower, median, upper = quantile_band(heights, probability, simultaneous)
@@ -90,7 +90,7 @@ def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Fl
     contours = contours_drawn(posterior, most)
     heights = np.empty((contours.shape[0], x.size))
     with np.errstate(over="ignore"):  # far out, where no contour is
-        for block in blocks(len(heights), _OF_A_HEIGHT * x.size):
+        for block in blocks(len(heights), _NUMBERS_PER_HEIGHT * x.size):
             heights[block] = contours.take(block[:, None]).height(x)
     return heights
 
@@ -103,13 +103,13 @@ def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
     return contours_of(picked, posterior.attrs["family"])
 
 
-def places(x: ArrayLike) -> Floats:
-    """Values of x as a list of numbers.
+def grid_points(x: ArrayLike) -> Floats:
+    """Return the values of x as an array of shape (n,).
 
     Raises
     ------
     ParameterError
-        If they are not, or not finite.
+        If x is not a list of finite numbers.
     """
     numbers = as_numbers(x)
     if numbers is None or numbers.ndim > 1 or not np.all(np.isfinite(numbers)):

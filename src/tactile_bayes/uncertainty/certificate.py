@@ -1,4 +1,4 @@
-"""What convexity alone says of a contour between two contacts: the triangle of chord and tangents."""
+"""The certificate of convexity: the triangle of chord and tangents that holds a contour between two contacts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ __all__ = ["Triangle", "triangle"]
 
 
 class Triangle(NamedTuple):
-    """Where a convex contour can be between two of its points, if its tangents there are known.
+    """Region of a convex contour between two of its points with known tangents, for each of n contours.
 
-    It lies below the chord, and above both tangents.
+    The contour lies below the chord and above both tangents.
     """
 
     left: Locus
@@ -23,12 +23,12 @@ class Triangle(NamedTuple):
     apex_x: Floats
     apex_y: Floats
     height: Floats
-    """Distance of the apex from the chord: how far the contour can be from it."""
+    """Distance of the apex from the chord, the largest distance that the contour can have from it; shape (n,)."""
     width: Floats
-    """The same measured upright: the largest extent in y."""
+    """Largest extent of the triangle in y; shape (n,)."""
 
     def between(self, x: Floats) -> tuple[Floats, Floats]:
-        """Lowest and highest y that the contour can have at x, shape (triangles, x); NaN outside of the ends."""
+        """Return the lowest and highest y of the contour at x, each of shape (triangles, x); NaN beyond the ends."""
         left, right = self.left, self.right
         after, before = x - left.x[:, None], x - right.x[:, None]
         inside = (after >= 0.0) & (before <= 0.0) & np.isfinite(self.height)[:, None]
@@ -41,7 +41,7 @@ class Triangle(NamedTuple):
 
 
 def triangle(left: Locus, right: Locus) -> Triangle:
-    """The triangle between two contacts of each of n contours; NaN where the left one is not on the left.
+    """Return the triangle between two contacts of each of n contours; NaN where the left one is not on the left.
 
     With the chord of length ℓ and its angles A and B to the tangents, the height is ℓ sin A sin B / sin(A + B).
 
@@ -65,7 +65,7 @@ def triangle(left: Locus, right: Locus) -> Triangle:
     """
     across, up = right.x - left.x, right.y - left.y
     length, chord = np.hypot(across, up), np.arctan2(up, across)
-    # Of a contour that is all but straight between the ends, rounding may bend it the wrong way.
+    # Rounding may bend a nearly straight contour the wrong way.
     at_left = np.maximum(chord - left.slope_angle, 0.0)
     at_right = np.maximum(right.slope_angle - chord, 0.0)
     bent = at_left + at_right > 0.0

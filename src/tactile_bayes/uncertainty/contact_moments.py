@@ -16,11 +16,11 @@ __all__ = ["LEAST_DRAWS", "contact_moments"]
 
 _DRAWS = ("chain", "draw")
 LEAST_DRAWS = 10
-"""Draws in contact, of which there must be as many for a standard deviation."""
+"""Smallest number of draws in contact from which a standard deviation is computed."""
 
 
 def contact_moments(posterior: xr.DataTree | xr.Dataset) -> xr.Dataset:
-    """Means, standard deviations and correlations of contacts, in the variables of `reconstruct`.
+    """Return means, standard deviations and correlations of contacts, in the variables of `reconstruct`.
 
     Parameters
     ----------
@@ -30,15 +30,15 @@ def contact_moments(posterior: xr.DataTree | xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xr.Dataset
-        Over "sample", of the draws in contact: means contact_x, contact_y, slope_angle and contact_arclength with
-        their standard deviations (`contact_x_sd`, …), contact_xy_correlation, tangent_sd and normal_sd, along the
-        contour and across it, contact_phase, the likelier one, and contact_probability, the share of draws that are in
-        contact. NaN where fewer than 10 are.
+        Over "sample", from the draws in contact: means contact_x, contact_y, contact_arclength [length] and slope_angle
+        [rad] with their standard deviations (`contact_x_sd`, …); contact_xy_correlation; tangent_sd and normal_sd,
+        along the contour and across it [length]; contact_phase, the more probable phase; contact_probability, the
+        share of draws in contact. NaN where fewer than 10 draws are in contact.
 
     Raises
     ------
     InferenceError
-        If this is no result of `infer_contacts` or `implied_contacts`.
+        If the argument is not a result of `infer_contacts` or `implied_contacts`.
 
     Examples
     --------
@@ -57,12 +57,12 @@ def contact_moments(posterior: xr.DataTree | xr.Dataset) -> xr.Dataset:
     for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength"):
         attrs = draws[name].attrs
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # a sample that no draw touches
+            warnings.simplefilter("ignore", RuntimeWarning)  # a sample without a draw in contact
             mean, spread = draws[name].mean(_DRAWS), draws[name].std(_DRAWS)
-        words = attrs.get("long_name", name.replace("_", " "))
+        long_name = attrs.get("long_name", name.replace("_", " "))
         variables[name] = mean.where(enough).assign_attrs(attrs)
         variables[f"{name}_sd"] = spread.where(enough).assign_attrs(
-            {**attrs, "long_name": f"standard deviation of the {words}"}
+            {**attrs, "long_name": f"standard deviation of the {long_name}"}
         )
     x, y = (draws[name] - variables[name] for name in ("contact_x", "contact_y"))
     covariance = np.empty((number.size, 2, 2))
@@ -72,8 +72,8 @@ def contact_moments(posterior: xr.DataTree | xr.Dataset) -> xr.Dataset:
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = covariance[:, 0, 1] / np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
     unit = {"units": draws["contact_x"].attrs.get("units", "1")}
-    lying = (draws["tangential"].sum(_DRAWS) > 0.5 * number).values
-    phase = np.where(enough, np.where(lying, TANGENTIAL, TIP), NONE)
+    is_tangential = (draws["tangential"].sum(_DRAWS) > 0.5 * number).values
+    phase = np.where(enough, np.where(is_tangential, TANGENTIAL, TIP), NONE)
     variables["contact_xy_correlation"] = (
         "sample",
         correlation,

@@ -20,17 +20,18 @@ _BLOCK = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class ContactRegion:
-    """Where the density of contact points is highest: the smallest region of its probability.
+    """Highest-density region of a contact point: the smallest region of its probability.
 
-    The density is that of the draws, smoothed by a normal kernel of their own proportions. The draws in the region are
-    the share of all that its probability says, each judged by the others.
+    The density is a kernel density estimate from the draws, with a normal kernel of the draws' covariance and the
+    bandwidth n^(−1/6) of Scott's rule in two dimensions. The share of draws in
+    the region is its probability; the density at a draw leaves that draw out.
     """
 
     probability: float
     draws: Floats
     """Contact points, shape (n, 2), in the record's unit of length."""
     level: float
-    """Density on the boundary, in the region's own measure."""
+    """Density on the boundary, in arbitrary units; see `density`."""
     _of_draws: Floats
     _white: Floats
     _to_white: Floats
@@ -41,26 +42,26 @@ class ContactRegion:
         return f"ContactRegion(probability={self.probability:g}, {len(self.draws)} draws)"
 
     def density(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Density at places, in the region's own measure: to be compared with `level`."""
+        """Return the density at points, in the units of `level`; the shape is that of x and y, broadcast."""
         x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         at = (np.stack([x.ravel(), y.ravel()], axis=-1) - self._centre) @ self._to_white.T
         return _kernel_sums(at, self._white, self._bandwidth).reshape(x.shape) / len(self._white)
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
-        """Whether places are in the region; NaN is not."""
+        """Return True for points in the region, False for others and for NaN; shape as of x and y, broadcast."""
         return np.asarray(self.density(x, y) >= self.level)
 
     def least_probability(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Probability of the smallest of all such regions that holds places; NaN of NaN.
+        """Return the probability of the smallest highest-density region that holds each point; NaN for NaN.
 
-        Where posteriors are right, those of the true contacts are uniform between 0 and 1.
+        For correct posteriors, the probabilities of the true contacts are uniform between 0 and 1.
         """
         density = self.density(x, y)
         denser = self._of_draws.size - np.searchsorted(self._of_draws, density, side="left")
         return np.where(np.isnan(density), np.nan, denser / self._of_draws.size)
 
     def grid(self, points: int = 80) -> tuple[Floats, Floats, Floats]:
-        """x, y and density on a grid that holds the region, shapes (points,), (points,) and (points, points)."""
+        """Return x, y and density on a grid over the region, shapes (points,), (points,) and (points, points)."""
         margin = 3.0 * self._bandwidth * self.draws.std(axis=0)
         low, high = self.draws.min(axis=0) - margin, self.draws.max(axis=0) + margin
         x, y = (np.linspace(low[i], high[i], points) for i in (0, 1))
@@ -68,29 +69,29 @@ class ContactRegion:
 
 
 def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability: float = 0.9) -> ContactRegion:
-    """The region in the plane in which a contact point lies with a given probability.
+    """Return the region of the plane in which a contact point lies with a given probability.
 
     Parameters
     ----------
     posterior : xr.DataTree
-        From `infer_contacts`.
+        From `infer_contacts` or `implied_contacts`.
     sample : int
-        Which contact, by the coordinate "sample".
+        Label of the contact in the coordinate "sample".
     probability : float
-        In (0, 1).
+        Probability of the region, in (0, 1).
 
     Returns
     -------
     ContactRegion
-        Says of places whether it contains them, and the probability of the smallest region that does
-        (`least_probability`); `grid` is for drawing.
+        The region, in the record's unit of length. `contains` tests points, `least_probability` returns the
+        probability of the smallest region that holds a point, and `grid` serves for drawing.
 
     Raises
     ------
     ParameterError
         If the probability is not in (0, 1), or there is no such sample.
     InferenceError
-        If this is no result of `infer_contacts`, or the sample has no contact.
+        If the argument is not a result of `infer_contacts` or `implied_contacts`, or the sample has no contact.
 
     Examples
     --------
@@ -121,7 +122,7 @@ def contact_region(posterior: xr.DataTree | xr.Dataset, sample: int, probability
 
 
 def _kernel_sums(at: Floats, centres: Floats, bandwidth: float) -> Floats:
-    """Sum of the kernels around centres (n, 2) at places (m, 2); a kernel is one at its centre."""
+    """Return the sum of the kernels around centres (n, 2) at points (m, 2); a kernel is 1 at its centre."""
     sums = np.empty(len(at))
     step = max(1, _BLOCK // len(centres))
     squares = (centres * centres).sum(axis=1)

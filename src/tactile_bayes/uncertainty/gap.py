@@ -17,14 +17,14 @@ from tactile_bayes.uncertainty.quantiles import central_levels
 
 __all__ = ["gap"]
 
-_PLACES = 101
-"""Values of x across the gap."""
+_GRID_POINTS = 101
+"""Number of grid points of x across the gap."""
 
 
 def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr.DataTree | None = None) -> xr.Dataset:
-    """Where the gap begins and ends, how far convexity alone confines the contour there, and how far the posterior.
+    """Return the ends of the gap, the region to which convexity confines the contour there, and the posterior's band.
 
-    No prior enters the certificate but through the ends: between them a convex contour lies in the triangle of their
+    The prior enters the certificate only through the ends: between them a convex contour lies in the triangle of their
     chord and their tangents. Each contour of the posterior has a triangle of its own, which gives intervals.
 
     Parameters
@@ -32,10 +32,9 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
     posterior : xr.DataTree
         From `infer_contour`, of a record with sweeps in both directions.
     probability : float
-        Of the central intervals and of the band.
+        Probability of the central intervals and of the band, in (0, 1).
     without_events : xr.DataTree, optional
-        What `infer_contour` makes of the same record if it is not told where contact began and ended; its band is then
-        there for comparison.
+        Result of `infer_contour` with ``events=False`` for the same record; its band is added for comparison.
 
     Returns
     -------
@@ -51,13 +50,13 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
           extent in y [length], all of the contours that leave a gap.
 
         Over "x", evenly from the median of left to that of right: band_lower, band_median, band_upper, as
-        `contour_band` gives them; triangle_lower and triangle_upper, between which the triangles are with that
+        `contour_band` gives them; triangle_lower and triangle_upper, between which the triangles lie with that
         probability, at each x; and band_without_events_lower, _median, _upper if asked for [length].
 
-        Numbers: band_width, the largest upper − lower of the band, and band_width_without_events, to be compared with
-        triangle_width [length]; share_open, the share of contours that leave a gap; status, in words: "ok", or why
-        something is NaN. Attribute gaps: how many gaps there are. Draws
-        whose contour is not touched in every sweep do not count.
+        Scalars: band_width, the largest upper − lower of the band, and band_width_without_events, to be compared with
+        triangle_width [length]; share_open, the share of contours that leave a gap; status, "ok" or the reason why
+        something is NaN. The attribute gaps is the number of gaps. Draws whose contour is not touched in every sweep
+        do not count.
 
     Raises
     ------
@@ -68,10 +67,10 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
 
     Notes
     -----
-    With several pivots a gap is what no sweep has touched, arcs from first contact to snap-off being merged; its ends
-    may then be first contacts, and several gaps may remain. The widest is described: medians decide which arcs lie on
-    its left and which on its right, and each contour's gap is between the rightmost end of the former and the leftmost
-    of the latter. If none remains, it is where the arcs overlap least.
+    With several pivots a gap is an arc that no sweep has touched, after the arcs from first contact to snap-off are
+    merged; its ends may then be first contacts, and several gaps may remain. The widest is described: medians decide
+    which arcs lie on its left and which on its right, and each contour's gap lies between the rightmost end of the
+    former and the leftmost end of the latter. If no gap remains, the smallest overlap is described.
 
     Where a contour's own arcs reach beyond the gap's ends, its height is known by contact: there, triangle_lower and
     triangle_upper count it as a triangle of no width. The band is therefore between them, up to the noise of the draws.
@@ -111,7 +110,7 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         return np.quantile(values, levels, axis=0)
 
     is_open = right_x > left_x
-    some = is_open if is_open.any() else np.full_like(is_open, True)  # NaN of all, if none leaves a gap
+    some = is_open if is_open.any() else np.full_like(is_open, True)  # all are NaN if none leaves a gap
     variables: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {
         "left": (("bound",), bounds(left_x), length),
         "right": (("bound",), bounds(right_x), length),
@@ -129,23 +128,23 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
         "snap_off_drive_angle": (("bound", "stroke"), bounds(_rows(events["snap_off_drive_angle"])[touched]), angle),
     }
     begin, end = (float(np.median(x)) for x in (left_x, right_x))
-    x = np.linspace(begin, end, _PLACES)
-    heights = np.broadcast_to(contours.take(np.arange(left_x.size)[:, None]).height(x), (left_x.size, _PLACES))
+    x = np.linspace(begin, end, _GRID_POINTS)
+    heights = np.broadcast_to(contours.take(np.arange(left_x.size)[:, None]).height(x), (left_x.size, _GRID_POINTS))
     lower, upper = (np.where(np.isnan(edge), heights, edge) for edge in certificate.between(x))
     known = end > begin
-    blank = 0.0 if known else np.nan
+    if_open = 0.0 if known else np.nan
     variables |= {
-        "triangle_lower": (("x",), np.quantile(lower, levels[0], axis=0) + blank, length),
-        "triangle_upper": (("x",), np.quantile(upper, levels[2], axis=0) + blank, length),
+        "triangle_lower": (("x",), np.quantile(lower, levels[0], axis=0) + if_open, length),
+        "triangle_upper": (("x",), np.quantile(upper, levels[2], axis=0) + if_open, length),
     }
     cut_short = False
     trees = {"band": posterior} | ({} if without_events is None else {"band_without_events": without_events})
     for name, tree in trees.items():
         band = contour_band(tree, x, probability)
         for edge in ("lower", "median", "upper"):
-            variables[f"{name}_{edge}"] = (("x",), band[edge].values + blank, length)
+            variables[f"{name}_{edge}"] = (("x",), band[edge].values + if_open, length)
         width = float(np.max(band["upper"].values - band["lower"].values))
-        variables[name.replace("band", "band_width")] = ((), width + blank, length)
+        variables[name.replace("band", "band_width")] = ((), width + if_open, length)
         cut_short |= bool(np.isnan(width))
     share = float(is_open.mean())
     return xr.Dataset(
@@ -160,8 +159,9 @@ def gap(posterior: xr.DataTree, probability: float = 0.95, *, without_events: xr
 
 
 def _ends(ends: Floats) -> tuple[Floats, Floats, int]:
-    """Left and right end of the gap of each contour, and how many gaps there are, from x of the first contact and of
-    the snap-off, shape (2, contours, strokes).
+    """Return the left and right ends of each contour's gap, and the number of gaps.
+
+    `ends` holds x of the first contact and of the snap-off, shape (2, contours, sweep segments).
     """
     low, high = ends.min(axis=0), ends.max(axis=0)
     typical_low, typical_high = np.median(low, axis=0), np.median(high, axis=0)
@@ -174,7 +174,7 @@ def _ends(ends: Floats) -> tuple[Floats, Floats, int]:
 
 
 def _rows(values: xr.DataArray) -> Floats:
-    """Values of all draws, shape (draws, strokes)."""
+    """Return the values of all draws, shape (draws, sweep segments)."""
     return np.asarray(values.values, dtype=float).reshape(-1, values.sizes["stroke"])
 
 

@@ -1,4 +1,4 @@
-"""The contacts that a posterior of the contour implies: where each of its contours is touched, at every drive angle."""
+"""The contacts that a posterior of the contour implies, for each of its draws and every sample."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.nuisances import Nuisances
 from tactile_bayes.inference.result import contour_draws, posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
-from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
 from tactile_bayes.sweep import to_lab_frame
 
 __all__ = ["contacts_of", "implied_contacts"]
 
 _BLOCK = 200
-"""Contours whose paths are followed at a time."""
+"""Number of contours whose paths are traced at a time."""
 
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 _KEPT = (
@@ -44,25 +44,25 @@ _KEPT = (
 )
 """Attributes of the posterior that hold for the contacts, too."""
 
-_TURNED_BY = ("drive_angle_offset", "backlash", "suspension_compliance")
-"""What makes the slope of the rod at the pivot another one than was read, draw by draw."""
+_ANGLE_NUISANCES = ("drive_angle_offset", "backlash", "suspension_compliance")
+"""Nuisance parameters by which the rod's slope at the pivot differs from the reading, draw by draw."""
 
 _DIMS = ("chain", "draw", "sample")
 
 
 def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree:
-    """Contact point and slope angle at every sample, as the posterior of the whole contour has them, jointly.
+    """Return the joint posterior of contact point and slope angle at every sample, given the whole record.
 
-    Each draw is one contour, and its contacts at all samples are where the rod touches that contour: they belong
-    together, unlike those of `infer_contacts`, which asks each sample alone. It is the same posterior seen from the
-    contacts, and says how much the rest of the record, and the family, tighten each of them.
+    Each draw is one contour with its contacts at all samples, so that the contacts of a draw belong together, unlike
+    those of `infer_contacts`, which uses each sample alone. The difference between the two shows how much the rest of
+    the record, and the family, tighten each contact.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`; it holds the record.
     draws : int
-        Of each chain, evenly picked; all if there are fewer. By default those of the group `events`.
+        Number of draws of each chain, evenly picked; all if there are fewer. By default those of the group `events`.
 
     Returns
     -------
@@ -77,15 +77,14 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     Raises
     ------
     InferenceError
-        If this is no result of `infer_contour`, or its record is not the one that it was inferred from.
+        If the argument is not a result of `infer_contour`, or its record is not the one that it was inferred from.
     ParameterError
         If `draws` is not a whole number from 1 up.
 
     Notes
     -----
-    Before the first contact and after the snap-off of a contour there is no contact. Near these events only some of the
-    contours are touched, and the draws there are those of the contact given that there is one: contact_probability
-    says how many they are.
+    A contour has no contact before its first contact and after its snap-off. Near these events only some of the
+    contours are touched, and the draws there are conditional on contact: contact_probability is their share.
 
     Examples
     --------
@@ -102,16 +101,16 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     record = _checked_record(posterior)
     every = posterior_draws(posterior)
     count = every.sizes["draw"]
-    # The rule by which `infer_contour` picks those of which it keeps events and predictions.
+    # `infer_contour` picks the draws of which it keeps events and predictions by the same rule.
     picked = every.isel(draw=np.unique(np.linspace(0, count - 1, min(count, draws)).astype(int)))
     variables = _implied(posterior, record, picked)
     tangential, has = variables["tangential"], np.isfinite(variables["tangential"])
-    share, lying = has.mean(axis=(0, 1)), np.nansum(tangential, axis=(0, 1))
+    share, tangential_count = has.mean(axis=(0, 1)), np.nansum(tangential, axis=(0, 1))
     stats = {
         "contact_probability": ("sample", share, {"units": "1"}),
         "tangential_probability": (
             "sample",
-            np.divide(lying, has.sum(axis=(0, 1)), out=np.full(lying.size, np.nan), where=share > 0.0),
+            np.divide(tangential_count, has.sum(axis=(0, 1)), out=np.full(share.size, np.nan), where=share > 0.0),
             {"units": "1"},
         ),
     }
@@ -140,7 +139,7 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
 
 
 def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
-    """The record that a contour was inferred from, with the rod and the load cell that were taken."""
+    """Return the record that a contour was inferred from, with the rod and the load cell that were assumed."""
     contour_draws(posterior)
     record = validate(record_of(posterior))
     if record_hash(record) != posterior.attrs["data_sha256"]:
@@ -152,11 +151,11 @@ def _checked_record(posterior: xr.DataTree) -> xr.Dataset:
 
 
 def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> dict[str, Floats]:
-    """Variables of the contacts by name, each of shape (chains, draws, samples)."""
+    """Return the variables of the contacts by name, each of shape (chains, draws, samples)."""
     friction, rod = posterior.attrs["friction"], rod_of(record)
     inferred = json.loads(posterior.attrs.get("nuisances", "[]"))
     nuisances = Nuisances(tuple(inferred), {}, rod, friction)
-    # `infer_contour` holds a cell whose noise it infers for one of noise 1.
+    # `infer_contour` gives a cell whose noise it infers a noise of 1.
     unknown: dict[str, Any] = {name: 1.0 for name in ("force_noise", "moment_noise") if name in picked}
     cell = replace(LoadCell.from_record(record) or LoadCell(), **unknown)
     likelihood = RecordLikelihood(record, cell, friction)
@@ -170,7 +169,7 @@ def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> 
         parts.append(contacts_of(likelihood, contours.take(block), rig, angle))
     shape = (picked.sizes["chain"], picked.sizes["draw"], -1)
     names = [*PLACE, "tangential"]
-    if any(name in inferred for name in _TURNED_BY):
+    if any(name in inferred for name in _ANGLE_NUISANCES):
         names.insert(-1, "drive_angle")
     return {name: np.concatenate([part[name] for part in parts]).reshape(shape) for name in names}
 
@@ -178,27 +177,27 @@ def _implied(posterior: xr.DataTree, record: xr.Dataset, picked: xr.Dataset) -> 
 def contacts_of(
     likelihood: RecordLikelihood, contours: Contour, rig: Rig, angle: Floats, *, exact: bool = True
 ) -> dict[str, Floats]:
-    """Contacts of contours, shape (contours, samples), in the world's signs and the record's units.
+    """Return contacts of contours, shape (contours, samples), in the laboratory frame and the record's units.
 
-    Drive angles are those of the samples, shape (samples,), as read but for what the data sheet says; NaN where nothing
-    is asked. Where contact begins and ends need not be exact: 1e-6 rad cost a quarter of that.
+    Drive angles, shape (samples,), are readings corrected by the data sheet; NaN where no contact is sought. With
+    ``exact=False`` the events are found to 1e-6 rad, at a quarter of the cost.
     """
-    count, strokes = contours.shape[0], likelihood.strokes
+    count, segments = contours.shape[0], likelihood.strokes
     read = angle - np.broadcast_to(likelihood.misread(rig), (count, angle.size))
-    shape = (len(strokes), max(stroke.samples.size for stroke in strokes))
+    shape = (len(segments), max(segment.samples.size for segment in segments))
     samples = np.zeros(shape, dtype=np.intp)
-    seen = np.full((shape[0], count, shape[1]), np.nan)
-    for which, angles, stroke in zip(samples, seen, strokes, strict=True):
-        which[: stroke.samples.size] = stroke.samples
-        of_stroke = read[:, stroke.samples]
-        angles[:, : stroke.samples.size] = np.pi - of_stroke if stroke.backward else of_stroke
-    paths = likelihood.paths(contours, rig, exact=exact, drive_angles=seen.reshape(-1, shape[1]))
-    lane, rank, states = paths.loaded_states()
-    columns = to_lab_frame(paths.seen, lane, states, likelihood.rod)
+    in_sweep_frame = np.full((shape[0], count, shape[1]), np.nan)
+    for which, angles, segment in zip(samples, in_sweep_frame, segments, strict=True):
+        which[: segment.samples.size] = segment.samples
+        of_segment = read[:, segment.samples]
+        angles[:, : segment.samples.size] = np.pi - of_segment if segment.backward else of_segment
+    paths = likelihood.paths(contours, rig, exact=exact, drive_angles=in_sweep_frame.reshape(-1, shape[1]))
+    batch_index, rank, states = paths.loaded_states()
+    columns = to_lab_frame(paths.sweep_frame, batch_index, states, likelihood.rod)
     columns["tangential"] = (states.wrench.phase == TANGENTIAL).astype(float)
     out = {name: np.full(read.shape, np.nan) for name in (*PLACE, "drive_angle", "tangential")}
     for name, values in out.items():
-        values[lane % count, samples[lane // count, rank]] = columns[name]
+        values[batch_index % count, samples[batch_index // count, rank]] = columns[name]
     return out
 
 

@@ -10,22 +10,22 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.roots import falling_root
-from tactile_bayes.uncertainty.band import contours_drawn, length_unit, places
+from tactile_bayes.uncertainty.band import contours_drawn, grid_points, length_unit
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 __all__ = ["normal_band", "normal_offsets"]
 
 _BLOCK = 100_000
-"""Normals of contours that are searched at once."""
+"""Number of normals that are searched at once."""
 
 _FARTHEST = 2.0**60
-"""Where the search on an endless contour is given up."""
+"""Distance in the contour's parameter at which the search on an endless contour stops."""
 
 _SLOWEST = float(np.finfo(float).tiny)
-"""Rate that stands for none: a root at a vertex where the contour's parameter stands still is then left as it is."""
+"""Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is."""
 
 _MISSED = 1e-9
-"""Distance from a normal, as a share of all lengths in play, beyond which a point is not on it."""
+"""Distance of a point from a normal, relative to the lengths involved, beyond which the normal misses the contour."""
 
 
 def normal_band(
@@ -36,35 +36,37 @@ def normal_band(
     *,
     reference: Contour | None = None,
 ) -> xr.Dataset:
-    """Band in which the contour lies with a given probability, measured along the normals of a reference contour.
+    """Return the band in which the contour lies with a given probability, measured along normals of a reference.
 
-    On a steep flank this says how well the contour is known where a band in y says how steep it is.
+    On a steep flank the width of a band in y is dominated by the slope; the width along the normal is not.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`.
     x : array_like, shape (n,)
-        Where the normals start on the reference, in the record's unit of length.
+        Positions on the reference at which the normals start, in the record's unit of length.
     probability : float
-        In (0, 1).
+        Probability of the band, in (0, 1).
     simultaneous : bool
-        As in `contour_band`: whether the probability holds at every normal by itself, or for all of them at once.
+        As in `contour_band`: if False, the probability holds at every normal by itself; if True, at all of them at
+        once.
     reference : Contour, optional
-        By default the most central draw: the one whose heights at these x are nearest to their medians, summed up. A
-        pointwise median need not be convex, and the likeliest draw may lie on the rim of a narrow ridge.
+        By default the most central draw: the one with the smallest sum of distances between its heights at these x and
+        their medians. A pointwise median need not be convex, and the most probable draw may lie at the edge of a
+        narrow ridge.
 
     Returns
     -------
     xr.Dataset
         Over "x": y and slope_angle of the reference; lower, median and upper, the signed distances of contours from it
-        [length], positive into the object; both edges as points, lower_x, lower_y, upper_x, upper_y; share_reaching,
-        the share of contours that the normal meets, and status in words: "ok", or why the band is NaN.
+        [length], positive into the object; both edges as points, lower_x, lower_y, upper_x, upper_y [length];
+        share_reaching, the share of contours that the normal meets; status, "ok" or the reason why the band is NaN.
 
     Raises
     ------
     ParameterError
-        If the probability is not in (0, 1), x is not a list of finite numbers, or the reference is no single contour.
+        If the probability is not in (0, 1), x is not a list of finite numbers, or the reference is not one contour.
 
     Examples
     --------
@@ -74,7 +76,7 @@ def normal_band(
     >>> normal_band(tree, [0.0, 0.3, 0.55], 0.5)["upper"].values.round(12)  # circles about one centre
     array([0.05, 0.05, 0.05])
     """
-    at = places(x)
+    at = grid_points(x)
     contours = contours_drawn(posterior)
     if reference is None:
         reference = _most_central(contours, at)
@@ -114,9 +116,9 @@ def normal_band(
 
 
 def normal_offsets(contours: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
-    """Signed distances of n contours from k points along the normals there; shape (n, k).
+    """Return the signed distances of n contours from k points along the normals there; shape (n, k).
 
-    They are positive on the left of the slope's direction. NaN where a normal does not meet a contour, or a point is.
+    They are positive to the left of the slope's direction, and NaN where a normal misses a contour or a point is NaN.
     """
     count = contours.shape[0]
     contours = contours.broadcast_to((count,))
@@ -126,16 +128,16 @@ def normal_offsets(contours: Contour, x: Floats, y: Floats, slope_angle: Floats)
     for begin in range(0, count, step):
         row = np.arange(begin, min(begin + step, count))
         many = contours.take(np.repeat(row, given.size))
-        place = [np.tile(values[given], row.size) for values in (x, y, slope_angle)]
-        offsets[row[:, None], given] = _offsets(many, *place).reshape(row.size, given.size)
+        feet = [np.tile(values[given], row.size) for values in (x, y, slope_angle)]
+        offsets[row[:, None], given] = _offsets(many, *feet).reshape(row.size, given.size)
     return offsets
 
 
 def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats:
-    """Signed distance of each contour from its own point along the normal there.
+    """Return the signed distance of each contour from its own point along the normal there.
 
-    Where the contour turns away from the normal's foot by less than a right angle, the way along the foot's tangent
-    grows along the contour: it has one root at most, where the normal enters the object.
+    While the contour's tangent turns by less than a right angle from that at the normal's foot, the coordinate along
+    the foot's tangent grows along the contour: it has at most one root, where the normal enters the object.
     """
     sin, cos = np.sin(slope_angle), np.cos(slope_angle)
     every = np.arange(x.size)
@@ -166,11 +168,11 @@ def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats
 
 
 def _most_central(contours: Contour, x: Floats) -> Contour:
-    """The contour whose heights are nearest to the pointwise medians, of those that reach the most places."""
+    """Return the contour with heights nearest to the pointwise medians, among those defined at the most grid points."""
     every = np.arange(contours.shape[0])[:, None]
     heights = np.broadcast_to(contours.take(every).height(x), (every.size, x.size))
     reaching = np.isfinite(heights)
-    seen = reaching.any(axis=0)
-    away = np.nansum(np.abs(heights[:, seen] - np.nanmedian(heights[:, seen], axis=0)), axis=1)
+    some = reaching.any(axis=0)
+    away = np.nansum(np.abs(heights[:, some] - np.nanmedian(heights[:, some], axis=0)), axis=1)
     best = np.lexsort((away, -np.count_nonzero(reaching, axis=1)))[0]
     return contours.take(np.asarray(best))

@@ -1,4 +1,4 @@
-"""What the posterior expects a record to look like."""
+"""Posterior predictive intervals of a record."""
 
 from __future__ import annotations
 
@@ -12,27 +12,30 @@ __all__ = ["predictive_interval"]
 
 
 def predictive_interval(posterior: xr.DataTree, probability: float = 0.95) -> xr.Dataset:
-    """Central interval of every sample of the record, noise included, as `plotting.predictive` draws it.
+    """Return the central posterior predictive interval of every sample of the record, noise included.
 
-    Far more samples outside than 1 − probability, or a run of them, say that the model does not describe the record.
+    If far more than a share 1 − probability of the samples lie outside, or a run of neighbours does, the model does not
+    describe the record. `plotting.predictive` draws the intervals.
 
     Parameters
     ----------
     posterior : xr.DataTree
         From `infer_contour`.
     probability : float
-        In (0, 1).
+        Probability of each interval, in (0, 1).
 
     Returns
     -------
     xr.Dataset
-        Over "sample", for every channel that was measured: its name with _lower and with _upper; in the units and the
-        frame of the record.
+        Over "sample", for every measured channel, such as force_x: force_x_lower and force_x_upper, in the units and
+        the frame of the record.
 
     Raises
     ------
     ParameterError
         If the probability is not in (0, 1).
+    InferenceError
+        If the argument is not a result of `infer_contour`.
 
     Examples
     --------

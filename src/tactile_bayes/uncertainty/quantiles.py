@@ -1,4 +1,4 @@
-"""Intervals and bands: quantiles of what posterior draws say."""
+"""Intervals and bands: quantiles of posterior draws."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tactile_bayes.checks import check_probability, check_switch
 __all__ = ["central_levels", "quantile_band"]
 
 _ROUNDING = 1e-9
-"""Where a band is narrower than this share of its widest place, its draws differ by rounding."""
+"""Share of its largest width below which a band is so narrow that its draws differ only by rounding."""
 
 
 def central_levels(probability: float) -> tuple[float, float, float]:
-    """Levels of the quantiles that are the central interval's lower end, the median, and its upper end.
+    """Return the quantile levels of the central interval's lower end, the median, and its upper end.
 
     Raises
     ------
@@ -31,21 +31,21 @@ def central_levels(probability: float) -> tuple[float, float, float]:
 
 
 def quantile_band(values: Floats, probability: float, simultaneous: bool = False) -> Floats:
-    """Lower edge, median and upper edge of draws along a line.
+    """Return lower edge, median and upper edge of draws on a grid.
 
     Parameters
     ----------
-    values : ndarray, shape (draws, places)
-        NaN where a draw has none.
+    values : ndarray, shape (draws, grid points)
+        NaN where a draw has no value.
     probability : float
-        In (0, 1).
+        Probability of the band, in (0, 1).
     simultaneous : bool
-        Whether the band is to hold that share of draws as a whole: the pointwise one is then widened about the median,
-        everywhere by the same factor.
+        If True, the band contains that share of draws at all grid points at once: the pointwise band is widened about
+        the median, everywhere by the same factor.
 
     Returns
     -------
-    ndarray, shape (3, places)
+    ndarray, shape (3, grid points)
         NaN where some draw has no value.
 
     Raises

@@ -24,7 +24,7 @@ def summary(posterior: xr.DataTree, probability: float = 0.95, edges: xr.Dataset
     posterior : xr.DataTree
         From `infer_contour`.
     probability : float
-        Of the central interval.
+        Probability of the central intervals, in (0, 1).
     edges : xr.Dataset, optional
         The gap, from `gap_if_any` with this probability.
 
@@ -59,14 +59,20 @@ def gap_if_any(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
 
 
 def reach(posterior: xr.DataTree) -> NDArray[np.float64]:
-    """Return values of x from one end of what the rod touched to the other, where a run has its band; shape (201,).
+    """Return grid points of x over the touched stretch, on which a run computes its band; shape (201,).
 
-    Draws without an event do not count.
+    The stretch reaches from the 5 % quantile to the 95 % quantile of the events' x. Draws without an event do not
+    count.
+
+    Raises
+    ------
+    InferenceError
+        If the rod touches none of the posterior's contours.
     """
     events = _events(posterior)
     x = np.concatenate([events[f"{when}_contact_x"].values.ravel() for when in ("first", "snap_off")])
     if not np.isfinite(x).any():
-        raise InferenceError("the rod touches none of the posterior's contours: there is no stretch of it to tell of")
+        raise InferenceError("the rod touches none of the posterior's contours: there is no touched stretch for a band")
     lo, hi = np.nanquantile(x, [0.05, 0.95])
     return np.linspace(lo, hi, 201)
 

@@ -72,7 +72,7 @@ def put(record, name, where, value):
 
 
 def words(record, **options):
-    return tb.inspect_record(record, **options).words
+    return tb.inspect_record(record, **options).messages
 
 
 # --- A good record --------------------------------------------------------------------------------------------------
@@ -80,7 +80,7 @@ def words(record, **options):
 
 def test_nothing_is_said_of_a_good_record(record):
     found = tb.inspect_record(record)
-    assert found.words == NOTHING
+    assert found.messages == NOTHING
     assert not found.is_suspect
     assert found.load_cell_source == "unloaded samples"
     assert found.channels.noise.values == pytest.approx([0.25e-3, 3e-3, 3e-3], rel=0.3)
@@ -119,7 +119,7 @@ def test_nothing_is_said_of_a_scan_nor_of_a_record_with_missing_channels(ideal, 
     assert tb.inspect_record(ideal).load_cell_source == "nothing"
     none = np.full(record.sizes["sample"], np.nan)
     found = tb.inspect_record(changed(record, force_x=none, force_y=none))
-    assert found.words == NOTHING
+    assert found.messages == NOTHING
     assert found.statuses == {}
     assert set(found.samples.status.values) == {""}
 
@@ -138,17 +138,17 @@ def test_false_alarms_are_as_rare_as_stated():
 # --- What is wrong ----------------------------------------------------------------------------------------------------
 
 
-def remedy_in(said):
+def correction_in(said):
     (sentence,) = [sentence for sentence in said if "fit no contact" in sentence]
     return sentence.split("nearly all would if ")[1]
 
 
-def remedy(record):
-    return remedy_in(words(record))
+def correction(record):
+    return correction_in(words(record))
 
 
 def test_a_wrong_sign_is_named(turned):
-    assert remedy_in(turned[0].words) == "force_x had the other sign."
+    assert correction_in(turned[0].messages) == "force_x had the other sign."
 
 
 def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
@@ -164,17 +164,17 @@ def test_a_wrong_sign_is_named_whatever_the_load_cell_does_beside():
     measured = cell.measure(tb.scan(CONTOUR, rod=ROD, drive_step=0.5 * COARSE).record, seed=1)
     assert (np.abs(measured.force_y.values) == 0.12).any()
     stated = measured.assign_attrs(load_cell_gain_force_x_force_x=0.2, load_cell_gain_force_x_force_y=-0.01)
-    assert remedy(stated) == "force_x had the other sign."
+    assert correction(stated) == "force_x had the other sign."
 
 
 @pytest.mark.slow
 def test_a_wrong_frame_an_exchange_and_a_sign_that_is_suspected_are_named(record):
     exchanged = changed(record, force_x=record.force_y, force_y=record.force_x)
-    assert remedy(exchanged) == "force_x and force_y were exchanged."
+    assert correction(exchanged) == "force_x and force_y were exchanged."
     as_fixed = tb.in_frame(record, "turning").assign_attrs(load_cell_frame="fixed")
-    assert remedy(as_fixed) == "the load cell turned with the drive (--load-cell-frame turning)."
+    assert correction(as_fixed) == "the load cell turned with the drive (--load-cell-frame turning)."
     upside_down = changed(record, force_y=-record.force_y)
-    assert remedy(upside_down) == "force_y had the other sign."
+    assert correction(upside_down) == "force_y had the other sign."
     assert words(upside_down)[0].startswith("force_y is negative in contact")
 
 
@@ -222,7 +222,7 @@ def test_a_world_in_which_all_fits_but_lies_below_the_pivot_is_told(coarse):
 def test_friction_is_named():
     dragged = tb.scan(CONTOUR, rod=ROD, friction=0.3, drive_step=COARSE).record
     measured = LOAD_CELL.measure(dragged, seed=1)
-    assert remedy(measured).startswith("there were friction of about 0.3")
+    assert correction(measured).startswith("there were friction of about 0.3")
     assert words(measured, friction=0.3) == NOTHING
 
 
@@ -233,16 +233,16 @@ def test_wrong_units_come_first(coarse):
 
 def test_a_wrong_rod_is_told_with_what_to_check(coarse):
     stiffer = coarse.assign_attrs(rod_flexural_rigidity=1.2 * ROD.flexural_rigidity)
-    remedies = f"{CHECK_RIG}."
-    assert words(stiffer)[0].endswith(f"fit no contact of such a rod: {remedies}")
+    advice = f"{CHECK_RIG}."
+    assert words(stiffer)[0].endswith(f"fit no contact of such a rod: {advice}")
 
 
 def test_readings_that_stand_out_in_contact_and_out_of_it(record):
     found = tb.inspect_record(put(record, "force_x", [5, 100], [0.05, 0.3]))
     assert np.flatnonzero(found.samples.outlier.sel(channel="force_x")).tolist() == [5, 100]
     assert not found.samples.outlier.sel(channel=["holding_moment", "force_y"]).values.any()
-    assert found.words[0].startswith("2 readings of force_x stand out from their neighbours (samples 5 and 100)")
-    assert "state noise with outliers, load_cell_degrees_of_freedom: 4, in the header" in found.words[0]
+    assert found.messages[0].startswith("2 readings of force_x stand out from their neighbours (samples 5 and 100)")
+    assert "state noise with outliers, load_cell_degrees_of_freedom: 4, in the header" in found.messages[0]
     of_outliers = tb.LoadCell(force_noise=3e-3, moment_noise=0.25e-3, degrees_of_freedom=5.0)
     (sentence,) = words(put(record, "force_x", [5, 100], [0.05, 0.3]), load_cell=of_outliers)
     assert sentence.endswith("a knock? The noise with outliers that is stated allows for some; else remove the row.")
@@ -251,15 +251,15 @@ def test_readings_that_stand_out_in_contact_and_out_of_it(record):
 def test_readings_that_are_stuck(record):
     found = tb.inspect_record(put(record, "force_y", slice(60, 72), record.force_y[60]))
     assert np.flatnonzero(found.samples.stuck.sel(channel="force_y")).tolist() == list(range(60, 72))
-    assert "12 readings of force_y are the same as before or after" in found.words[0]
-    assert "(samples 60 to 71)" in found.words[0]
+    assert "12 readings of force_y are the same as before or after" in found.messages[0]
+    assert "(samples 60 to 71)" in found.messages[0]
 
 
 def test_samples_that_are_stored_twice(record):
     again = record.isel(sample=np.sort(np.append(np.arange(record.sizes["sample"]), 30)))
     found = tb.inspect_record(again)
     assert np.flatnonzero(found.samples.repeated).tolist() == [31]
-    assert found.words[0].startswith("1 sample has all the readings of the one before (sample 31): stored twice?")
+    assert found.messages[0].startswith("1 sample has all the readings of the one before (sample 31): stored twice?")
 
 
 @pytest.mark.parametrize("stated", [False, True])
@@ -269,8 +269,8 @@ def test_readings_that_are_cut_off(ideal, stated):
     flagged = found.samples.cut_off.sel(channel="force_y").values
     assert np.abs(measured.force_y.values[flagged]).min() == 0.5
     assert np.count_nonzero(flagged) == (np.abs(measured.force_y.values) == 0.5).sum()
-    assert "of force_y are cut off at 500 mN, the end of a range" in found.words[0]
-    assert ("state its end in the header" in found.words[0]) is not stated
+    assert "of force_y are cut off at 500 mN, the end of a range" in found.messages[0]
+    assert ("state its end in the header" in found.messages[0]) is not stated
 
 
 def test_a_channel_that_never_changes(record):
@@ -325,14 +325,14 @@ def test_noise_without_a_standard_deviation_is_not_compared(record):
         record, load_cell=tb.LoadCell(force_noise=3e-3, moment_noise=2.5e-4, degrees_of_freedom=2.0)
     )
     assert np.isnan(found.channels.stated_noise.values).all()
-    assert found.words == NOTHING
+    assert found.messages == NOTHING
 
 
 def test_a_drive_that_loses_steps_and_a_sweep_that_is_cut(record):
     lost = record.isel(sample=np.r_[0:50, 53 : record.sizes["sample"]])
     found = tb.inspect_record(lost)
     assert np.flatnonzero(found.samples.uneven_step).tolist() == [50]
-    assert found.words == (
+    assert found.messages == (
         "1 step of the drive differs from the others (sample 50): were samples lost, or did the drive slip?",
     )
     assert words(record.isel(sample=slice(30, 140))) == (
@@ -341,7 +341,7 @@ def test_a_drive_that_loses_steps_and_a_sweep_that_is_cut(record):
     )
 
 
-def test_progress_counts_remedies_only_where_they_are_tried(coarse, turned):
+def test_progress_counts_corrections_only_where_they_are_tried(coarse, turned):
     steps = []
     tb.inspect_record(coarse, progress=lambda done, count: steps.append((done, count)))
     assert steps == [(1, 3), (2, 3), (3, 3)]

@@ -1,4 +1,4 @@
-"""The inspection of a record before anything is inferred from it: what is in it, and what looks wrong."""
+"""Inspection of a record before anything is inferred from it: its contents, and what looks wrong."""
 
 from tactile_bayes.diagnostics.inspection.inspection import Inspection, inspect_record
 from tactile_bayes.diagnostics.inspection.known_cell import CellSource, known_cell

@@ -1,4 +1,4 @@
-"""The fit of single samples: whether any contact gives their loads, and what would have to be otherwise."""
+"""The fit of single samples by contacts, and the correction of a record that would make them fit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from tactile_bayes.diagnostics.inspection.remedies import Remedy, as_it_is, remedies_for
+from tactile_bayes.diagnostics.inspection.corrections import Correction, as_it_is, corrections_for
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.reconstruction import reconstruct
@@ -18,29 +18,29 @@ from tactile_bayes.record import CHANNELS, frame_of
 __all__ = ["Fit", "fit_of"]
 
 _FEWEST = 10
-"""Loaded samples below which nothing is told."""
+"""Number of loaded samples below which the fit is not judged."""
 
-_REMEDIED = 1 / 3
-"""Share of the misfits that may remain for a remedy to be named."""
+_CORRECTED = 1 / 3
+"""Share of the misfits that may remain for a correction to be named."""
 
 _CHANGE = 0.1
-"""Share of the samples that a further change must mend: what is mirrored twice fits as well as what never was."""
+"""Share of the samples that a further change must correct: loads that are mirrored twice fit as well as before."""
 
 _TRIED = 40
-"""Loaded samples, at most, on which remedies are tried: where nothing fits, each takes long."""
+"""Largest number of loaded samples on which corrections are tried: where nothing fits, each takes long."""
 
 
 class Fit(NamedTuple):
-    """How many samples no contact explains."""
+    """Shares of samples that no contact above the pivot explains."""
 
     share: float
-    """Of the loaded samples, those whose status is "does not fit"; NaN of too few."""
+    """Share of the loaded samples whose status is "does not fit"; NaN if there are too few."""
     below: float
-    """Of the loaded samples, those whose contact would lie below the pivot, where no object is."""
+    """Share of the loaded samples whose contact would lie below the pivot, where no object is."""
     loaded: int
-    """Those that carry a load, and are not cut off."""
-    remedy: str
-    """What would make most of them fit above the pivot, in words; "" if nothing that was tried does."""
+    """Number of samples that carry a load and are not cut off."""
+    correction: str
+    """Text of the correction with which most of them fit above the pivot; "" if none of those tried does."""
 
 
 def fit_of(
@@ -51,19 +51,19 @@ def fit_of(
     friction: float = 0.0,
     progress: Callable[[int, int], object] = lambda done, count: None,
 ) -> Fit:
-    """The shares of samples that fit no contact above the pivot, and the remedy where one is more than `most`.
+    """Return the shares of samples that fit no contact above the pivot, and a correction where one exceeds `most`.
 
     Parameters
     ----------
     record : xr.Dataset
         A valid record with all load channels.
     cell : LoadCell
-        With noise of finite variance on each channel.
+        The sensor, with noise of finite variance on each channel.
     most : float
-        Share above which remedies are tried: other signs, another frame, forces that are exchanged, friction, a drive
-        angle that is counted from elsewhere or the other way round.
+        Share above which corrections are tried: other signs, another frame, exchanged forces, friction, another zero or
+        sense of the drive angle.
     progress : callable
-        Is given the number of remedies that were tried, and of how many.
+        Called with the number of corrections that were tried, and their total.
     """
     contacts = _contacts(record, cell, friction)
     share, below, loaded = _shares(contacts)
@@ -76,18 +76,20 @@ def fit_of(
     loads = loads.isel(sample=slice(None, None, -(-loaded // _TRIED)))
     alone = _of_any_samples(cell, record.sizes["sample"])
 
-    def share_if(remedy: Remedy) -> float:
-        return sum(_shares(_contacts(_read_by(alone, remedy.mended(loads)), alone, remedy.friction))[:2])
+    def share_if(correction: Correction) -> float:
+        return sum(_shares(_contacts(_read_by(alone, correction.apply(loads)), alone, correction.friction))[:2])
 
-    remedies = remedies_for(frame_of(loads), friction)
-    progress(0, len(remedies))
-    part = share_if(Remedy("", as_it_is, friction))
+    corrections = corrections_for(frame_of(loads), friction)
+    progress(0, len(corrections))
+    part = share_if(Correction("", as_it_is, friction))
     left = []
-    for remedy in remedies:
-        left.append(share_if(remedy))
-        progress(len(left), len(remedies))
-    best = int(np.argmin([over + _CHANGE * remedy.changes for over, remedy in zip(left, remedies, strict=True)]))
-    return Fit(share, below, loaded, remedies[best].words if left[best] <= _REMEDIED * part else "")
+    for correction in corrections:
+        left.append(share_if(correction))
+        progress(len(left), len(corrections))
+    best = int(
+        np.argmin([over + _CHANGE * correction.changes for over, correction in zip(left, corrections, strict=True)])
+    )
+    return Fit(share, below, loaded, corrections[best].text if left[best] <= _CORRECTED * part else "")
 
 
 def _contacts(record: xr.Dataset, cell: LoadCell, friction: float) -> xr.Dataset:
@@ -95,7 +97,7 @@ def _contacts(record: xr.Dataset, cell: LoadCell, friction: float) -> xr.Dataset
 
 
 def _shares(contacts: xr.Dataset) -> tuple[float, float, int]:
-    """Of the loaded samples those that fit no contact, and those that fit one below the pivot; and their number."""
+    """Return the shares of loaded samples that fit no contact, and that fit one below the pivot; and their number."""
     status = contacts.status.values
     is_loaded = (status != "no contact") & (status != "cut off")
     is_unfit = status == "does not fit"
@@ -105,7 +107,7 @@ def _shares(contacts: xr.Dataset) -> tuple[float, float, int]:
 
 
 def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
-    """The cell for some samples of a record: drift, which counts samples, is as unknown as a bias of its size."""
+    """Return the cell for a selection of samples: an unknown bias of the same size stands for drift."""
     one, two, three = np.sqrt(np.mean(wandering_deviation(cell, samples) ** 2, axis=0)).tolist()
     return replace(
         cell,
@@ -120,7 +122,7 @@ def _of_any_samples(cell: LoadCell, samples: int) -> LoadCell:
 
 
 def _read_by(cell: LoadCell, loads: xr.Dataset) -> xr.Dataset:
-    """What a cell without noise would read of loads: so that its noise is of the right size beside them."""
+    """Return the loads as a noise-free cell would read them, so that the cell's noise is in proportion to them."""
     read = cell.expected(np.stack([loads[name].values for name in CHANNELS], axis=-1))
     return loads.assign(
         {name: (loads[name].dims, read[:, index], loads[name].attrs) for index, name in enumerate(CHANNELS)}

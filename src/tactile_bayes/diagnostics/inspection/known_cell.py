@@ -1,4 +1,4 @@
-"""The load cell of a record: given, stated, or known from what it reads without load."""
+"""The load cell of a record: given, stated in its data sheet, or estimated from its unloaded samples."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ CellSource = Literal["given", "data sheet", "unloaded samples", "nothing", "too 
 
 
 def known_cell(measured: xr.Dataset, given: LoadCell | None = None) -> tuple[LoadCell | None, CellSource]:
-    """The load cell that is given, or the data sheet of the record, or what its unloaded samples tell; and which.
+    """Return the given load cell, or the record's data sheet, or an estimate from unloaded samples, and its source.
 
     Parameters
     ----------
     measured : xr.Dataset
         A record.
     given : LoadCell, optional
-        In the record's units.
+        The sensor, in the record's units.
 
     Returns
     -------
     load_cell : LoadCell or None
-        None of a record without noise, and of one with fewer than 3 unloaded samples.
+        None for a record without noise, and for one with fewer than 3 unloaded samples.
     source : {"given", "data sheet", "unloaded samples", "nothing", "too few unloaded samples"}
-        "nothing" is of unloaded samples without noise, as an ideal record has them.
+        "nothing" means unloaded samples without noise, as in an ideal record.
 
     Examples
     --------

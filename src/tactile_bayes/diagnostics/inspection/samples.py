@@ -1,4 +1,4 @@
-"""Samples that look wrong by themselves, whatever the contour: knocks, readings that are stuck, cut off, or twice."""
+"""Samples that look wrong whatever the contour: outliers, stuck, cut-off and repeated readings, uneven steps."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from tactile_bayes.diagnostics.inspection.stretches import centred
 __all__ = ["outliers", "repeat_chance", "repeated", "runs_of_equals", "stuck", "uneven_steps"]
 
 _FEWEST = 8
-"""Unloaded samples below which their scatter says nothing of single ones."""
+"""Number of unloaded samples below which their scatter does not identify outliers."""
 
 _EFFICIENCY = 0.37
-"""Of the median deviation beside the standard deviation, in normal noise."""
+"""Efficiency of the median absolute deviation relative to the standard deviation, in normal noise."""
 
 _SHORTEST = 3
-"""Fewest equal readings in a row that are told."""
+"""Smallest number of equal readings in a row that is reported."""
 
 _JUMP = 2.0
-"""How many times the range of its four neighbours a loaded reading must be out of it."""
+"""Distance of a loaded outlier from the range of its four neighbours, over that range."""
 
 _WIDER = 0.5
-"""Share of the usual step by which another must differ."""
+"""Difference of an uneven step from the usual step, over the usual step."""
 
 _USUAL = 0.2
-"""Share of steps that may be uneven: with more of them, the drive is meant to move so."""
+"""Largest share of uneven steps: with more of them, the drive is meant to move so."""
 
 
 def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step: float, *, false_alarm: float) -> Flags:
-    """Readings far from the others: of their unloaded stretch, or in contact of both neighbours on either side.
+    """Flag readings far from their unloaded stretch, or, in contact, from both neighbours on either side.
 
     Parameters
     ----------
@@ -40,15 +40,15 @@ def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step:
     sweeps, stretches : list of ndarray
         Rows of each sweep, and of each of its unloaded stretches.
     step : float
-        Step of the reading, 0 if it has none; the median deviation may miss half of it, which is added.
+        Resolution of the reading, 0 if unlimited; the median deviation may miss half of it, which is added.
     false_alarm : float
-        Probability that one of all samples is flagged in white normal noise.
+        Probability that any sample is flagged in white normal noise.
 
     Notes
     -----
-    Unloaded readings are compared with their median by their median deviation, by Student's t of as many degrees of
-    freedom as that is worth. A loaded reading must be outside of its four neighbours by twice their range besides: no
-    slope, kink or snap-off makes that.
+    The deviation of an unloaded reading from the median, over the median absolute deviation, is compared with a
+    quantile of Student's t with the effective degrees of freedom of that estimate. A loaded reading must, in addition,
+    lie outside of its four neighbours by twice their range: no slope, kink or snap-off does that.
     """
     flags = np.zeros(reading.size, dtype=bool)
     residual, spread = centred(reading, stretches)
@@ -75,7 +75,7 @@ def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step:
 
 
 def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: float) -> float:
-    """How often two unloaded readings are the same, as far as the steps of the reading make them so."""
+    """Return the probability that two unloaded readings are equal because of the limited resolution."""
     by_steps = min(1.0, step / (2.0 * math.sqrt(math.pi) * noise)) if noise > 0.0 else 1.0
     values = np.concatenate([reading[rows][np.append(True, np.diff(reading[rows]) != 0.0)] for rows in stretches])
     if values.size < 2:
@@ -86,13 +86,13 @@ def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: f
 
 
 def runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
-    """Readings of a sweep that are the same one after the other, two and more."""
+    """Return runs of two and more equal consecutive readings of a sweep, as rows."""
     parts = np.split(rows, np.flatnonzero(np.diff(reading[rows]) != 0.0) + 1)
     return [part for part in parts if part.size > 1]
 
 
 def stuck(reading: Floats, sweeps: list[Index], chance: float, *, false_alarm: float) -> Flags:
-    """Readings that stay the same for longer than steps of the reading explain."""
+    """Flag readings that stay equal for longer than the limited resolution explains."""
     flags = np.zeros(reading.size, dtype=bool)
     for rows in sweeps:
         for run in runs_of_equals(reading, rows):
@@ -102,7 +102,7 @@ def stuck(reading: Floats, sweeps: list[Index], chance: float, *, false_alarm: f
 
 
 def repeated(readings: Floats, sweeps: list[Index], chances: Floats, *, false_alarm: float) -> Flags:
-    """Samples of which all readings, shape (n_samples, n_channels), are those of the sample before."""
+    """Flag samples of which all readings, shape (n_samples, n_channels), equal those of the sample before."""
     flags = np.zeros(len(readings), dtype=bool)
     if len(readings) * float(np.prod(chances)) >= false_alarm:
         return flags
@@ -113,7 +113,7 @@ def repeated(readings: Floats, sweeps: list[Index], chances: Floats, *, false_al
 
 
 def uneven_steps(angle: Floats, rows: Index, sense: int) -> Flags:
-    """Whether the step up to each sample of a sweep differs from the others; all even where many do."""
+    """Flag samples of a sweep whose preceding step differs from the usual one; none if many steps do."""
     flags = np.zeros(rows.size, dtype=bool)
     step = sense * np.diff(angle[rows])
     if step.size < _FEWEST:

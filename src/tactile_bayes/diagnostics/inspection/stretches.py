@@ -12,26 +12,26 @@ from tactile_bayes.arrays import Floats, Index
 __all__ = ["Autocorrelation", "autocorrelation", "centred", "rows_of_sweeps", "unloaded_stretches"]
 
 _CUT = 4.0
-"""Robust standard deviations at which residuals are cut off, lest one outlier rules."""
+"""Robust standard deviations at which residuals are clipped, so that no single outlier dominates."""
 
 
 class Autocorrelation(NamedTuple):
-    """How alike neighbouring residuals are."""
+    """Lag-one autocorrelation of unloaded residuals."""
 
     value: float
-    """Coefficient of neighbours, freed of what taking out means does to it; NaN of too few."""
+    """Coefficient, corrected for the bias from subtracting means; NaN if there are too few samples."""
     score: float
-    """In standard errors if the noise is white: about standard normal."""
+    """Coefficient in standard errors, about standard normal for white noise."""
 
 
 def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
-    """The samples of each sweep, in the order of their numbers."""
+    """Return the rows of each sweep, in the order of the sweeps' numbers."""
     order = np.argsort(sweep, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
 def unloaded_stretches(sweeps: list[Index], unloaded: NDArray[np.bool_]) -> list[Index]:
-    """Samples that follow each other in a sweep and are unloaded, each stretch by itself."""
+    """Return the rows of every stretch of consecutive unloaded samples in a sweep."""
     stretches = []
     for rows in sweeps:
         flags = unloaded[rows]
@@ -41,7 +41,7 @@ def unloaded_stretches(sweeps: list[Index], unloaded: NDArray[np.bool_]) -> list
 
 
 def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
-    """Readings less the median of their stretch, stretch by stretch, and their robust standard deviation."""
+    """Return readings less the median of their stretch, and their robust standard deviation."""
     residuals = [reading[rows] - np.median(reading[rows]) for rows in stretches]
     together = np.concatenate(residuals) if residuals else np.zeros(0)
     spread = 1.4826 * float(np.median(np.abs(together))) if together.size else 0.0
@@ -49,7 +49,7 @@ def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
 
 
 def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
-    """Of neighbouring samples, over all stretches; NaN where most readings are on one step."""
+    """Return the autocorrelation of neighbouring samples over all stretches; NaN if most readings are equal."""
     _, spread = centred(reading, stretches)
     if spread == 0.0:
         return Autocorrelation(np.nan, np.nan)

@@ -1,4 +1,4 @@
-"""Tables of a record: its samples and what looks wrong in them, its channels, its sweeps."""
+"""Tables of an inspection: samples with their flags, channels and sweeps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def sample_table(
     *,
     false_alarm: float,
 ) -> xr.Dataset:
-    """See `Inspection`; `found` is what `zero_load` returns."""
+    """Return `Inspection.samples` without the status; `found` is the result of `zero_load`."""
     count, present = record.sizes["sample"], present_channels(record)
     level = false_alarm / len(present)
     flags = {name: np.zeros((count, len(CHANNELS)), dtype=bool) for name in ("outlier", "stuck", "cut_off")}
@@ -37,7 +37,7 @@ def sample_table(
         reading = record[name].values
         step, noise = float(found["resolution"][index]), float(found["noise"][index])
         rounding = 4.0 * np.finfo(float).eps * float(np.abs(reading).max())
-        if not noise > rounding:  # an ideal record, whose zeros are equal, or too few unloaded samples to tell
+        if not noise > rounding:  # an ideal record, whose zeros are equal, or too few unloaded samples
             continue
         chance = repeat_chance(reading, stretches, step, noise)
         chances.append(chance)
@@ -76,7 +76,7 @@ def sample_table(
 
 
 def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index], stated: LoadCell | None) -> xr.Dataset:
-    """See `Inspection`; `found` is what `zero_load` returns."""
+    """Return `Inspection.channels`; `found` is the result of `zero_load`."""
     columns = {name: np.full(len(CHANNELS), np.nan) for name in ("smallest", "largest", "stated_noise", "stated_bias")}
     likeness = np.full((2, len(CHANNELS)), np.nan)
     for index, name in enumerate(CHANNELS):
@@ -100,7 +100,7 @@ def channel_table(record: xr.Dataset, found: xr.Dataset, stretches: list[Index],
 
 
 def sweep_table(record: xr.Dataset, found: xr.Dataset, sweeps: list[Index]) -> xr.Dataset:
-    """See `Inspection`; `found` is what `zero_load` returns."""
+    """Return `Inspection.sweeps`; `found` is the result of `zero_load`."""
     angle, unloaded = record["drive_angle"].values, found["unloaded"].values
     first = np.array([rows[0] for rows in sweeps])
     steps = [float(np.median(np.abs(np.diff(angle[rows])))) if rows.size > 1 else np.nan for rows in sweeps]

@@ -12,8 +12,8 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
+from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_states
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, touching
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
 
@@ -93,7 +93,7 @@ class ContactDensity:
         shape = coordinates.shape[:-1]
         flat = coordinates.reshape(-1, 4)
         tip = phase.reshape(-1) == TIP
-        rod = touching(flat, self.delta)
+        rod = contact_states(flat, self.delta)
         reading, side = self.samples.reading, self.samples.side
         moment, force_x, force_y = rod.loads.reshape(3, *shape)
         loads = np.stack([side * moment, side * force_x, force_y], axis=-1)
@@ -115,7 +115,7 @@ class ContactDensity:
 
     def places(self, coordinates: Floats) -> Floats:
         """Places of contacts by coordinates, shape (..., n, 4), as `to_lab_frame` has them."""
-        place = touching(coordinates.reshape(-1, 4), self.delta).place
+        place = contact_states(coordinates.reshape(-1, 4), self.delta).place
         return self.to_lab_frame(place.reshape(4, *coordinates.shape[:-1]))
 
     def to_lab_frame(self, place: Floats) -> Floats:

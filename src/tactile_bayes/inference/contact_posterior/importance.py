@@ -12,9 +12,9 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
+from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 from tactile_bayes.mechanics.fitting import fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.touching import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
 
 __all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
 

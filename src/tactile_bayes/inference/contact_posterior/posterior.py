@@ -30,9 +30,9 @@ from tactile_bayes.inference.contact_posterior.importance import LARGEST_K, LEAS
 from tactile_bayes.inference.ensembles import SamplerSettings, Seed, spawn
 from tactile_bayes.inference.result import seed_words
 from tactile_bayes.load_cell import LoadCell, LoneSamples
+from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.mechanics.touching import PLACE
 from tactile_bayes.reconstruction import reconstruct, samples_of
 from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
 

@@ -24,18 +24,19 @@ the walkers and the states of their random numbers, so that a run that was kille
 not.
 """
 
-from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithms, Plain, in_coordinates
+from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithms, Plain, Proposing, in_coordinates
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.moves import whitened_moves
 from tactile_bayes.inference.ensembles.pilot import learned
 from tactile_bayes.inference.ensembles.places import Place
-from tactile_bayes.inference.ensembles.proposal import Ends, Mixture, Proposal, approximate
+from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
 from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.walkers import Seed, scatter_walkers, seed_sequence, spawn
 
 __all__ = [
+    "ANYTHING",
     "Coordinates",
     "Draws",
     "Ends",
@@ -45,6 +46,7 @@ __all__ = [
     "Plain",
     "Progress",
     "Proposal",
+    "Proposing",
     "SamplerSettings",
     "Seed",
     "Straightened",

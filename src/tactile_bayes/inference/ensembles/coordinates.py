@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from tactile_bayes.inference.ensembles.moves import standard_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["Coordinates", "Logarithms", "Plain", "in_coordinates"]
+__all__ = ["Coordinates", "Logarithms", "Plain", "Proposing", "in_coordinates"]
 
 
 class Coordinates(Protocol):
@@ -30,6 +30,16 @@ class Coordinates(Protocol):
 
     def moves(self) -> list[tuple[Any, float]]:
         """Moves of one ensemble and their shares, new ones at each call."""
+
+
+class Proposing(Coordinates, Protocol):
+    """Coordinates that may know a proposal which comes near the posterior in them."""
+
+    @property
+    def proposal(self) -> Mixture | None: ...
+
+    def with_proposal(self, proposal: Mixture) -> Self:
+        """The same, with a proposal."""
 
 
 class Plain:
@@ -61,8 +71,8 @@ class Logarithms(Plain):
         if proposal is not None:
             self.digest += f", proposal {proposal.digest}"
 
-    def with_proposal(self, proposal: Mixture) -> Logarithms:
-        return Logarithms(self.positive, proposal)
+    def with_proposal(self, proposal: Mixture) -> Self:
+        return type(self)(self.positive, proposal)
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         points = coordinates.copy()

@@ -10,7 +10,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.block import WalkingEnsembles
-from tactile_bayes.inference.ensembles.coordinates import Logarithms, in_coordinates
+from tactile_bayes.inference.ensembles.coordinates import Proposing, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 from tactile_bayes.inference.ensembles.straightened import Straightened
@@ -37,12 +37,12 @@ _LEAST = 0.02
 
 def learned(
     log_probability: LogProbability,
-    base: Logarithms,
+    base: Proposing,
     start: Floats,
     scale: Floats,
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
-) -> Logarithms | Straightened:
+) -> Proposing:
     """Coordinates with a proposal in them, found by walkers who walk in the best so far.
 
     A proposal that is judged by its own draws looks good if it is so narrow that they do not meet what it misses; here
@@ -62,7 +62,7 @@ def learned(
     deadline : Deadline
         Past it, the walkers make one step more, and there is no further stage.
     """
-    best: Logarithms | Straightened = base
+    best: Proposing = base
     points = start
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     for steps in _STEPS:
@@ -94,17 +94,13 @@ def learned(
     return best
 
 
-def _straightened(
-    base: Logarithms, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0
-) -> Straightened:
+def _straightened(base: Proposing, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0) -> Straightened:
     """Coordinates fitted to draws, a share of which are independent, and a proposal in them."""
     found = Straightened.fitted(base, draws, scale, share * len(draws))
     return replace(found, proposal=Mixture((replace(Proposal.fitted(found.of(draws)), efficiency=efficiency),)))
 
 
-def _quality(
-    log_probability: LogProbability, coordinates: Logarithms | Straightened, draws: Floats, rng: np.random.Generator
-) -> float:
+def _quality(log_probability: LogProbability, coordinates: Proposing, draws: Floats, rng: np.random.Generator) -> float:
     """One over the number of proposals after which a walker moves on, on average over draws of the posterior."""
     target, proposal = in_coordinates(log_probability, coordinates), coordinates.proposal
     assert proposal is not None

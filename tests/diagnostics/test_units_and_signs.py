@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.contours import Circle, paper_profile
-from tactile_bayes.diagnostics.suspicions import suspicions
+from tactile_bayes.diagnostics.units_and_signs import check_units_and_signs
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import in_frame
@@ -24,17 +24,17 @@ RECORD = CELL.measure(scan(paper_profile("II", q=0.5), drive_step=STEP).record, 
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_a_right_record_is_not_suspected(contour, direction):
     record = scan(contour, direction=direction, drive_step=STEP).record
-    assert suspicions(record) == ()
-    assert suspicions(in_frame(CELL.measure(record, seed=1), "turning")) == ()
+    assert check_units_and_signs(record) == ()
+    assert check_units_and_signs(in_frame(CELL.measure(record, seed=1), "turning")) == ()
 
 
 def test_what_is_unloaded_or_missing_is_not_suspected(measured):
-    assert suspicions(measured, LOAD_CELL) == ()
+    assert check_units_and_signs(measured, LOAD_CELL) == ()
     alone = RECORD.copy(deep=True)
     alone["force_x"][:] = alone["force_y"][:] = np.nan
-    assert suspicions(alone) == ()
+    assert check_units_and_signs(alone) == ()
     nothing = RECORD.assign({name: 0.0 * RECORD[name] for name in ("holding_moment", "force_x", "force_y")})
-    assert suspicions(nothing) == ()
+    assert check_units_and_signs(nothing) == ()
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_what_is_unloaded_or_missing_is_not_suspected(measured):
     ],
 )
 def test_wrong_units_and_signs_are_suspected(factors, words):
-    found = suspicions(RECORD.assign({name: factor * RECORD[name] for name, factor in factors.items()}))
+    found = check_units_and_signs(RECORD.assign({name: factor * RECORD[name] for name, factor in factors.items()}))
     assert len(found) == 1
     assert words in found[0]
 
@@ -58,4 +58,4 @@ def test_wrong_units_and_signs_are_suspected(factors, words):
 def test_the_unit_of_force_is_told_for_si(measured):
     wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
     unit = Rod(measured.rod_length, measured.rod_flexural_rigidity).force_unit
-    assert f"(with EI/L² = {unit:.3g} N)" in suspicions(wrong)[0]
+    assert f"(with EI/L² = {unit:.3g} N)" in check_units_and_signs(wrong)[0]

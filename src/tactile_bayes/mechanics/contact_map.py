@@ -1,7 +1,7 @@
-"""One touching rod by its coordinates, with derivatives: the closed form of `touching`, compiled.
+"""One contact from its coordinates, with derivatives: the closed form of `contact_coordinates`, compiled.
 
-Along the direction at the contact the chord is (F − C, S)/√f (`arc`). With the length of the arc √f s1 = F(χ | m) held,
-its amplitude gives way: ∂/∂ψ1 at that length is ∂/∂ψ1 − F_ψ1/F_χ ∂/∂χ.
+Along the direction at the contact the chord is (F − C, S)/√f (`arc`). At a fixed length of the arc √f s1 = F(χ | m) the
+amplitude depends on ψ1: ∂/∂ψ1 at that length is ∂/∂ψ1 − F_ψ1/F_χ ∂/∂χ.
 """
 
 from __future__ import annotations
@@ -11,29 +11,29 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.arc import arc_and_slopes, arc_to
-from tactile_bayes.mechanics.compiler import compiled, kept
+from tactile_bayes.mechanics.compiler import cached, compiled
 
-__all__ = ["chords", "moved", "touch", "touches", "wrench_slopes"]
+__all__ = ["chords", "contact_state", "moved", "wrench_slopes", "write_contact_states"]
 
 _EPSILON = 1e-16
-"""Half the difference of two means, over the mean, below which they are one."""
+"""Half the difference of two means, over the mean, below which they are equal."""
 
 
 class Bend(NamedTuple):
-    """What else there is to know of a touching rod; NaN where there is none."""
+    """Further quantities of a contact; NaN where there is none."""
 
     chi: float
     """Amplitude of the arc to the pivot."""
     length_by_psi1: float
-    """Of the arc to that amplitude."""
+    """Derivative by ψ1 of the length of the arc to that amplitude."""
     volume_tip: float
     volume_tangential: float
-    """As in `Touching`."""
+    """As in `ContactStates`."""
 
 
 @compiled
 def _amplitude(load: float, m: float, ratios: Floats) -> float:
-    """Jacobi's am(load | m) by arithmetic and geometric means; NaN beyond twice the quarter period."""
+    """Jacobi's am(load | m) by the arithmetic–geometric mean; NaN beyond twice the quarter period."""
     a, b, last = 1.0, math.sqrt(1.0 - m), 0
     ratios[0] = math.sqrt(m)
     while ratios[last] > _EPSILON and last + 1 < ratios.size:
@@ -54,7 +54,7 @@ def _amplitude(load: float, m: float, ratios: Floats) -> float:
 def _column(
     along: float, across: float, turn: float, beta: float, growth: float, cos: float, sin: float, by: Floats, c: int
 ) -> None:
-    """Derivatives by a coordinate from those in the direction at the contact, of β, and of the force's logarithm."""
+    """Write derivatives by a coordinate, from those along the direction at the contact, of β, and of log f."""
     fx, fy, x, y = by[0, 1], by[0, 2], by[0, 3], by[0, 4]
     x_by, y_by = along * cos - across * sin + y * turn, along * sin + across * cos - x * turn
     fx_by, fy_by = growth * fx - beta * fy, growth * fy + beta * fx
@@ -63,18 +63,18 @@ def _column(
 
 
 @compiled
-def touch(z: Floats, i: int, by: Floats, ratios: Floats) -> Bend:
-    """One rod, NaN if there is none.
+def contact_state(z: Floats, i: int, by: Floats, ratios: Floats) -> Bend:
+    """Write one contact, NaN if there is none.
 
     Parameters
     ----------
     z : ndarray, shape (n, 4)
-        Coordinates, as `touching` takes them; the i-th is meant.
+        Coordinates as in `contact_states`; row i is used.
     by : ndarray, shape (5, 6)
-        Stores moment and force at the base, contact point and direction β of the force; then their derivatives by each
-        coordinate.
+        Result: moment and force at the base, contact point, and direction β of the force; then their derivatives by
+        each coordinate.
     ratios : ndarray, shape (20,)
-        For notes: where 1 − m is 1e-300, it takes 16 means.
+        Workspace; for 1 − m = 1e-300 there are 16 means.
     """
     force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
     possible = abs(psi1) < 0.5 * math.pi and arclength > 0.0 and 0.0 < force < math.inf
@@ -105,11 +105,11 @@ def touch(z: Floats, i: int, by: Floats, ratios: Floats) -> Bend:
     _column(along_f, across_f, turn_f, -turn_f, 1.0 / force, cos, sin, by, 1)
     _column(along_1, across_1, turn_1, -turn_1 - 1.0, 0.0, cos, sin, by, 2)
     _column(1.0 - short, off, turn_s, -turn_s, 0.0, cos, sin, by, 3)
-    by[4, 0], by[4, 1], by[4, 2], by[4, 3], by[4, 4], by[4, 5] = 0.0, -fy, fx, -y, x, 1.0  # the whole turns
+    by[4, 0], by[4, 1], by[4, 2], by[4, 3], by[4, 4], by[4, 5] = 0.0, -fy, fx, -y, x, 1.0  # a rotation of the whole
     return Bend(
         chi,
         by_psi1.length,
-        # In polar coordinates r, ϑ of the contact the volume is r ∂(r, ϑ − α), as all turn with the drive.
+        # In polar coordinates r, ϑ of the contact the volume is r ∂(r, ϑ − α), since all turn with the drive.
         abs(along_f * across_1 - along_1 * across_f + along * along_f + across * across_f),
         abs(along_f * off - (1.0 - short) * across_f),
     )
@@ -119,10 +119,11 @@ def touch(z: Floats, i: int, by: Floats, ratios: Floats) -> Bend:
 def moved(
     z: Floats, i: int, bend: Bend, by: Floats, angle: float, moment: float, fx: float, fy: float
 ) -> tuple[float, float, float, float]:
-    """By how much the place moves, to first order, when drive angle and loads are so much more: the slopes of Step 2.
+    """Shift of the place, to first order, for changes of drive angle and loads: the derivatives of Step 2.
 
-    By equation 26 sin ψ1 = sin ψ0 − m0²/(2 f), where ψ0 = φ0 − β. As ψ1 goes with ψ0, m0 and f held, so does the arc to
-    χ: √f cos ψ1 ∂s1/∂ψ0 = ∂F/∂ψ1 cos ψ0 + (sin ψ1 flat + cos ψ1 steep) flat sin χ/Δ³, which is 0/0 in terms of turns.
+    With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945), sin ψ1 = sin ψ0 − m0²/(2 f). At
+    fixed m0 and f, √f cos ψ1 ∂s1/∂ψ0 = ∂F/∂ψ1 cos ψ0 + (sin ψ1 flat + cos ψ1 steep) flat sin χ/Δ³, which would be 0/0
+    in terms of turns.
     """
     force, m = z[i, 0], math.sin(0.25 * math.pi - 0.5 * z[i, 1]) ** 2
     cos1, w = 2.0 * math.sqrt(m * (1.0 - m)), math.sin(0.5 * bend.chi) ** 2
@@ -145,8 +146,8 @@ def moved(
     )
 
 
-@kept
-def touches(
+@cached
+def write_contact_states(
     coordinates: Floats,
     delta: Floats,
     loads: Floats,
@@ -157,23 +158,23 @@ def touches(
     by: Floats,
     ratios: Floats,
 ) -> None:
-    """Loads and places of touching rods, NaN where there is none.
+    """Write loads and places of contacts, NaN where there is none.
 
     Parameters
     ----------
     coordinates : ndarray, shape (n, 4)
-        As `touching` takes them.
+        As in `contact_states`.
     delta : ndarray, shape (n,)
-        Friction angle.
+        Friction angle [rad].
     loads, place, volumes : ndarray, shapes (3, n), (4, n) and (2, n)
-        As in `Touching`.
-    loads_by, place_by : ndarray, shapes (n, 3, 4) and (n, 4, 4), or none of them
-        As in `TouchingSlopes`.
+        As in `ContactStates`.
+    loads_by, place_by : ndarray, shapes (n, 3, 4) and (n, 4, 4), or without rows
+        As in `ContactStateSlopes`.
     by, ratios : ndarray
-        As in `touch`.
+        As in `contact_state`.
     """
     for i in range(delta.size):
-        bend = touch(coordinates, i, by, ratios)
+        bend = contact_state(coordinates, i, by, ratios)
         for k in range(3):
             loads[k, i] = by[0, k]
         place[0, i], place[1, i], place[2, i], place[3, i] = by[0, 3], by[0, 4], by[0, 5] - delta[i], coordinates[i, 2]
@@ -185,20 +186,20 @@ def touches(
                 place_by[i, 3, c] = 1.0 if c == 2 else 0.0
 
 
-@kept
+@cached
 def wrench_slopes(coordinates: Floats, by: Floats, ratios: Floats, out: Floats) -> None:
-    """Derivatives of places by drive angle and loads, shape (n, 4, 4)."""
+    """Write the derivatives of places by drive angle and loads, shape (n, 4, 4)."""
     for i in range(coordinates.shape[0]):
-        bend = touch(coordinates, i, by, ratios)
+        bend = contact_state(coordinates, i, by, ratios)
         for c in range(4):
             change = moved(coordinates, i, bend, by, 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3))
             for k in range(4):
                 out[i, k, c] = change[k]
 
 
-@kept
+@cached
 def chords(chi: Floats, m: Floats, out: Floats) -> None:
-    """C and S of arcs, shape (2, n)."""
+    """Write C and S of arcs, shape (2, n)."""
     for i in range(chi.size):
         arc, _ = arc_to(chi[i], m[i])
         out[0, i], out[1, i] = arc.shortfall, arc.offset

@@ -1,4 +1,4 @@
-"""Remedies for samples that fit no contact: what the loads, or the drive angle, may have been instead."""
+"""Corrections of records whose samples fit no contact: other signs, frame, friction or drive angle."""
 
 from __future__ import annotations
 
@@ -11,57 +11,57 @@ import xarray as xr
 
 from tactile_bayes.record import CHANNELS
 
-__all__ = ["OTHER_ANGLE", "Remedy", "as_it_is", "remedies_for"]
+__all__ = ["OTHER_ANGLE", "Correction", "as_it_is", "corrections_for"]
 
-Mend = Callable[[xr.Dataset], xr.Dataset]
+Transform = Callable[[xr.Dataset], xr.Dataset]
 
 OTHER_ANGLE = "the drive angle were counted otherwise"
-"""How the words of remedies begin that change the drive angle, and with it perhaps the directions."""
+"""Beginning of the texts of corrections that change the drive angle, and with it perhaps the directions."""
 
 _FRICTIONS = (0.1, 0.2, 0.3, 0.5)
 
-_FRAME_WORDS = {
+_FRAME_TEXTS = {
     "turning": "the load cell turned with the drive (--load-cell-frame turning)",
     "fixed": "the load cell did not turn with the drive (--load-cell-frame fixed)",
 }
 
 
-class Remedy(NamedTuple):
-    """What might have to be otherwise."""
+class Correction(NamedTuple):
+    """A change of a record with which its samples may fit."""
 
-    words: str
-    """After "nearly all would if"."""
-    mended: Mend
-    """From the record to what it would be."""
+    text: str
+    """Text that follows "nearly all would if"."""
+    apply: Transform
+    """Function from the record to the corrected record."""
     friction: float
-    """For Step 2."""
+    """Coefficient of friction for Step 2."""
     changes: int = 1
-    """How many things would have to be otherwise."""
+    """Number of things that are changed."""
 
 
-def remedies_for(frame: Literal["fixed", "turning"], friction: float) -> list[Remedy]:
-    """All that are tried, simple ones first, of a record in a frame that was to have this friction."""
+def corrections_for(frame: Literal["fixed", "turning"], friction: float) -> list[Correction]:
+    """Return all corrections to try, simple ones first, for a record in this frame and with this assumed friction."""
     other: Literal["fixed", "turning"] = "turning" if frame == "fixed" else "fixed"
-    simple: list[tuple[str, Mend]] = [
+    simple: list[tuple[str, Transform]] = [
         ("force_x had the other sign", _with_sign("force_x")),
         ("force_y had the other sign", _with_sign("force_y")),
         ("both forces had the other sign", _with_sign("force_x", "force_y")),
         ("holding_moment had the other sign", _with_sign("holding_moment")),
         ("force_x and force_y were exchanged", _exchanged),
-        (_FRAME_WORDS[other], lambda record: record.assign_attrs(load_cell_frame=other)),
+        (_FRAME_TEXTS[other], lambda record: record.assign_attrs(load_cell_frame=other)),
     ]
-    found = [Remedy(words, mended, friction) for words, mended in simple]
+    found = [Correction(text, apply, friction) for text, apply in simple]
     for coefficient in _FRICTIONS:
-        words = f"there were friction of about {coefficient:g} (have infer find it: --nuisance friction)"
-        found.append(Remedy(words, as_it_is, coefficient))
-    return [*found, *(Remedy(words, mended, friction, changes) for words, mended, changes in _angles())]
+        text = f"there were friction of about {coefficient:g} (have infer find it: --nuisance friction)"
+        found.append(Correction(text, as_it_is, coefficient))
+    return [*found, *(Correction(text, apply, friction, changes) for text, apply, changes in _angles())]
 
 
 def as_it_is(record: xr.Dataset) -> xr.Dataset:
     return record
 
 
-def _with_sign(*names: str) -> Mend:
+def _with_sign(*names: str) -> Transform:
     def turned_round(record: xr.Dataset) -> xr.Dataset:
         return record.assign({name: (record[name].dims, -record[name].values, record[name].attrs) for name in names})
 
@@ -73,12 +73,12 @@ def _exchanged(record: xr.Dataset) -> xr.Dataset:
     return record.assign({x.name: (x.dims, y.values, x.attrs), y.name: (y.dims, x.values, y.attrs)})
 
 
-def _in_turn(*mends: Mend) -> Mend:
-    return lambda record: functools.reduce(lambda given, mend: mend(given), mends, record)
+def _in_turn(*transforms: Transform) -> Transform:
+    return lambda record: functools.reduce(lambda given, transform: transform(given), transforms, record)
 
 
-def _counted(sense: int, turns: float) -> Mend:
-    """With a drive angle that is counted in this sense from a line that lies so many quarter turns off."""
+def _counted(sense: int, turns: float) -> Transform:
+    """Return a transform that counts the drive angle in this sense, with its zero moved by so many quarter turns."""
 
     def counted_anew(record: xr.Dataset) -> xr.Dataset:
         drive, way = record["drive_angle"], record["direction"]
@@ -89,12 +89,12 @@ def _counted(sense: int, turns: float) -> Mend:
             drive_angle=(drive.dims, angles, drive.attrs),
             direction=(way.dims, way.values if sense > 0 else others, way.attrs),
         )
-        return counted.isel(sample=np.abs(angles) < 2.0 * np.pi)  # no record has more, and these carry no load
+        return counted.isel(sample=np.abs(angles) < 2.0 * np.pi)  # no record has larger ones, and they carry no load
 
     return counted_anew
 
 
-def _angles() -> Iterator[tuple[str, Mend, int]]:
+def _angles() -> Iterator[tuple[str, Transform, int]]:
     other_moment = _with_sign("holding_moment")
     for written, sense, turns in (
         ("90-NAME", -1, 1),
@@ -104,10 +104,10 @@ def _angles() -> Iterator[tuple[str, Mend, int]]:
         ("NAME-90", 1, -1),
         ("NAME+180", 1, 2),
     ):
-        words, counted = f"{OTHER_ANGLE} (in degrees: --column 'drive_angle={written}')", _counted(sense, turns)
-        yield words, counted, 1
+        text, counted = f"{OTHER_ANGLE} (in degrees: --column 'drive_angle={written}')", _counted(sense, turns)
+        yield text, counted, 1
         if sense < 0:
-            yield f"{words}, and holding_moment had the other sign", _in_turn(counted, other_moment), 2
+            yield f"{text}, and holding_moment had the other sign", _in_turn(counted, other_moment), 2
         if (sense, turns) == (-1, 1):  # mirrored in the diagonal
-            words += ", holding_moment had the other sign, and force_x and force_y were exchanged"
-            yield words, _in_turn(counted, other_moment, _exchanged), 3
+            text += ", holding_moment had the other sign, and force_x and force_y were exchanged"
+            yield text, _in_turn(counted, other_moment, _exchanged), 3

@@ -1,4 +1,4 @@
-"""Suspicions: what in a record no rod of the stated size can have done, whatever the contour."""
+"""Checks of units and signs: loads that no rod of the stated size can have, whatever the contour."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
 
-__all__ = ["CHECK_UNITS", "suspicions"]
+__all__ = ["CHECK_UNITS", "check_units_and_signs"]
 
 _STRONGEST = 100.0
 """Force in EI/L² above which units are doubted: a tangential contact with more is within 0.37 L of the pivot."""
@@ -23,36 +23,39 @@ _LONGEST_LEVER = 2.0
 """Moment over force, in L, above which units are doubted: no contact is further away than L."""
 
 CHECK_UNITS = "check the units of the loads, and the rod's length and flexural rigidity."
-"""How sentences end that are of loads too large or too small for the rod."""
+"""Ending of the messages on loads that are too large or too small for the rod."""
 
 
-def suspicions(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[str, ...]:
-    """In words, what speaks for a wrong unit or sign in a record; nothing of it depends on a contour.
+def check_units_and_signs(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple[str, ...]:
+    """Check the units and signs of a record's loads, without any assumption on the contour.
 
     Parameters
     ----------
     measured : xr.Dataset
         A valid record.
     load_cell : LoadCell, optional
-        In the record's units; by default its data sheet, if any. Known errors are taken out.
+        The sensor, in the record's units, whose known errors are corrected first; by default the record's data sheet,
+        if any.
 
     Returns
     -------
     tuple of str
+        A message for each unit or sign that is probably wrong; empty if there is none.
 
     Notes
     -----
     The lever arm of the contact force is at most L, so that |m0| ≤ f L with or without friction. In tangential contact
-    √f s1 ≤ 2 K(1/2), so that f ≤ 13.8/s1² in EI/L². The object lies above the pivot, so that fAy > 0.
+    √f s1 ≤ 2 K(1/2), so that f ≤ 13.8/s1² in EI/L². The object lies above the pivot, so that fAy > 0. These bounds
+    follow from the closed solution of the rod in elliptic integrals, see `tactile_bayes.elastica`.
 
     Examples
     --------
     >>> from tactile_bayes import scan
     >>> from tactile_bayes.contours import paper_profile
     >>> record = scan(paper_profile("II", q=0.5)).record
-    >>> suspicions(record)
+    >>> check_units_and_signs(record)
     ()
-    >>> print(suspicions(record.assign(force_y=-record.force_y))[0])
+    >>> print(check_units_and_signs(record.assign(force_y=-record.force_y))[0])
     force_y is negative in contact, but the object pushes the pivot's support up: its sign is wrong, or the frame.
     """
     cell = load_cell or LoadCell.from_record(measured) or LoadCell()
@@ -90,25 +93,25 @@ def suspicions(measured: xr.Dataset, load_cell: LoadCell | None = None) -> tuple
 def _of_size(
     record: xr.Dataset, measured: xr.Dataset, force: Floats, firm: NDArray[np.bool_], *, has_all: bool
 ) -> list[str]:
-    """Loads that are too large or too small for the rod."""
+    """Return a message on loads that are too large or too small for the rod."""
     unit = rod_of(measured).force_unit
     largest = _largest(force)
     stated = f" (with EI/L² = {unit:.3g} N)" if measured.attrs["units"] == "SI" else ""
-    remedy = CHECK_UNITS
+    advice = CHECK_UNITS
     if largest > _STRONGEST:
-        return [f"Forces reach {largest:.3g} EI/L²{stated}, more than such a rod can carry: {remedy}"]
+        return [f"Forces reach {largest:.3g} EI/L²{stated}, more than such a rod can carry: {advice}"]
     moment = np.abs(record.holding_moment.values)
     if has_all and firm.any() and np.median(moment[firm] / force[firm]) > _LONGEST_LEVER:
         lever = float(np.median(moment[firm] / force[firm]))
         return [
             f"The holding moment is {lever:.3g} L times the force, but no contact is further from the pivot than L: "
-            f"{remedy}"
+            f"{advice}"
         ]
     if 0.0 < largest < _WEAKEST and has_all:
-        return [f"Forces reach {largest:.3g} EI/L²{stated} only, which hardly bends such a rod: {remedy}"]
+        return [f"Forces reach {largest:.3g} EI/L²{stated} only, which hardly bends such a rod: {advice}"]
     return []
 
 
 def _largest(values: Floats) -> float:
-    """Nearly: a knock or two do not count."""
+    """Return the 98 % quantile: the largest value, a few outliers left out."""
     return float(np.quantile(values, 0.98))

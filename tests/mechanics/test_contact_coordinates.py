@@ -9,18 +9,18 @@ import pytest
 from scipy.special import ellipkinc
 
 from helpers import integrated_step2
-from tactile_bayes.mechanics.elastica import contact_from_wrench, wrench_from_contact
-from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
-from tactile_bayes.mechanics.touching import (
+from tactile_bayes.mechanics.contact_coordinates import (
     ARCLENGTH,
     DRIVE_ANGLE,
     FORCE,
     PSI1,
-    Touching,
+    ContactStates,
+    contact_states,
+    contact_states_and_slopes,
     place_by_wrench,
-    touching,
-    touching_and_slopes,
 )
+from tactile_bayes.mechanics.elastica import contact_from_wrench, wrench_from_contact
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
 PHASES = pytest.mark.parametrize("phase", [TIP, TANGENTIAL], ids=["tip", "tangential"])
 FREE = {TIP: [FORCE, PSI1, DRIVE_ANGLE], TANGENTIAL: [FORCE, ARCLENGTH, DRIVE_ANGLE]}
@@ -52,7 +52,7 @@ def some_rods(phase, amplitudes, *, seed, count=70, shortest=0.02, steepest=1.5)
     beta = delta + rng.uniform(-1.5, 1.5, count)
     drive_angle = np.zeros(count)
     coordinates = np.stack([force, psi1, arclength, drive_angle], axis=-1)
-    coordinates[:, DRIVE_ANGLE] = beta - touching(coordinates, delta).place[2] - delta
+    coordinates[:, DRIVE_ANGLE] = beta - contact_states(coordinates, delta).place[2] - delta
     return Rods(coordinates, delta)
 
 
@@ -69,7 +69,7 @@ def assert_slopes_agree(found, right, tolerance):
 def test_loads_and_place_are_those_of_elastica(phase):
     """Not for a force nearly along the rod: a contact that is rounded to doubles does not tell it to 1e-11."""
     rods = some_rods(phase, BENT, seed=1, count=400, steepest=1.2)
-    rod = touching(*rods)
+    rod = contact_states(*rods)
     x, y, alpha, arclength = rod.place
     wrench = wrench_from_contact(x, y, alpha, rods.delta)
     assert (wrench.phase == phase).all()
@@ -85,7 +85,7 @@ def test_loads_and_place_are_those_of_elastica(phase):
 @PHASES
 def test_step2_gives_the_place_back_also_of_weak_loads(phase):
     rods = some_rods(phase, BENT + WEAK, seed=2, count=400)
-    rod = touching(*rods)
+    rod = contact_states(*rods)
     contact = contact_from_wrench(rods.coordinates[:, DRIVE_ANGLE], *rod.loads, rods.delta, side=1.0)
     np.testing.assert_allclose(np.stack(contact[:4]), rod.place, rtol=0.0, atol=1e-11)
 
@@ -94,7 +94,7 @@ def test_step2_gives_the_place_back_also_of_weak_loads(phase):
 def test_integration_agrees(phase):
     rods = some_rods(phase, BENT + WEAK, seed=3, count=200)
     loads, place = integrated_step2.touched(*rods)
-    rod = touching(*rods)
+    rod = contact_states(*rods)
     force = rods.coordinates[:, FORCE, None]
     np.testing.assert_allclose(rod.loads.T / force, loads.real / force, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(rod.place.T, place.real, rtol=0.0, atol=1e-12)
@@ -102,13 +102,15 @@ def test_integration_agrees(phase):
 
 def test_slopes_come_with_the_same_values():
     rods = some_rods(TIP, BENT, seed=4)
-    for found, right in zip(touching_and_slopes(*rods)[0], touching(*rods), strict=True):
+    for found, right in zip(contact_states_and_slopes(*rods)[0], contact_states(*rods), strict=True):
         np.testing.assert_array_equal(found, right)
 
 
 def test_friction_may_be_one_number():
     coordinates = some_rods(TIP, BENT, seed=5).coordinates
-    for found, right in zip(touching(coordinates, 0.3), touching(coordinates, np.full(70, 0.3)), strict=True):
+    for found, right in zip(
+        contact_states(coordinates, 0.3), contact_states(coordinates, np.full(70, 0.3)), strict=True
+    ):
         np.testing.assert_array_equal(found, right)
 
 
@@ -122,8 +124,8 @@ def test_what_is_no_rod_is_nan_and_leaves_the_others():
         (2.0, np.nan, 1.0, 1.0),
         (1e6, 0.0, 1.0, 1.0),  # the rod would turn round and round
     ]
-    alone, alone_slopes = touching_and_slopes(good, 0.1)
-    mixed, slopes = touching_and_slopes(np.concatenate([wrong, good]), 0.1)
+    alone, alone_slopes = contact_states_and_slopes(good, 0.1)
+    mixed, slopes = contact_states_and_slopes(np.concatenate([wrong, good]), 0.1)
     for rows in (mixed.loads.T, mixed.place.T[:, :3], slopes.loads):
         assert np.isnan(rows[: len(wrong)]).reshape(len(wrong), -1).any(axis=1).all()
     for found, right in zip(mixed, alone, strict=True):
@@ -139,7 +141,7 @@ def test_what_is_no_rod_is_nan_and_leaves_the_others():
 @pytest.mark.parametrize("amplitudes", [BENT, WEAK], ids=["bent", "weak"])
 def test_slopes_are_those_of_the_integrated_rod(phase, amplitudes):
     rods = some_rods(phase, amplitudes, seed=7)
-    _, slopes = touching_and_slopes(*rods)
+    _, slopes = contact_states_and_slopes(*rods)
     for number, found in enumerate(slopes):
 
         def integrated(coordinates, delta, number=number):
@@ -153,7 +155,7 @@ def test_slopes_are_those_of_the_integrated_rod(phase, amplitudes):
 def test_volumes_are_the_determinants_of_the_slopes(phase):
     """The volume of a sheet is found in polar coordinates of the contact, the slopes are not."""
     rods = some_rods(phase, BENT, seed=8, count=300)
-    rod, slopes = touching_and_slopes(*rods)
+    rod, slopes = contact_states_and_slopes(*rods)
     determinant = np.abs(np.linalg.det(slopes.place[:, :3][:, :, FREE[phase]]))
     volume = rod.volume_tip if phase == TIP else rod.volume_tangential
     size = np.prod(np.linalg.norm(slopes.place[:, :3][:, :, FREE[phase]], axis=1), axis=1)
@@ -164,7 +166,7 @@ def test_volumes_are_the_determinants_of_the_slopes(phase):
 def test_all_turns_with_the_drive():
     rods = some_rods(TIP, BENT, seed=9)
     turned = rods.coordinates + np.array([0.0, 0.0, 0.0, 0.3])
-    one, other = touching(*rods), touching(turned, rods.delta)
+    one, other = contact_states(*rods), contact_states(turned, rods.delta)
     cos, sin = np.cos(0.3), np.sin(0.3)
     for (x, y), (x_turned, y_turned) in ((one.loads[1:], other.loads[1:]), (one.place[:2], other.place[:2])):
         np.testing.assert_allclose(x_turned, cos * x - sin * y, rtol=0.0, atol=1e-13)
@@ -182,7 +184,7 @@ def test_a_longer_rod_is_a_scaled_one():
     s1 = unit[:, ARCLENGTH].copy()
     unit[:, FORCE] *= s1**2
     unit[:, ARCLENGTH] = 1.0
-    one, rod = touching(unit, rods.delta), touching(*rods)
+    one, rod = contact_states(unit, rods.delta), contact_states(*rods)
     np.testing.assert_allclose(rod.loads * np.stack([s1, s1**2, s1**2]), one.loads, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(rod.place[:2] / s1, one.place[:2], rtol=0.0, atol=1e-12)
 
@@ -190,7 +192,7 @@ def test_a_longer_rod_is_a_scaled_one():
 # --- Slopes of Step 2 ---------------------------------------------------------------------------------------------
 
 
-def wrench_of(rod: Touching, rods: Rods):
+def wrench_of(rod: ContactStates, rods: Rods):
     return np.concatenate([rods.coordinates[:, [DRIVE_ANGLE]], rod.loads.T], axis=-1)
 
 
@@ -199,7 +201,7 @@ def wrench_of(rod: Touching, rods: Rods):
 def test_slopes_of_step2_are_those_of_the_integrated_one(phase, amplitudes):
     """From the pivot on, to the first zero of curvature: relative to the largest slope by the same number."""
     rods = some_rods(phase, amplitudes, seed=11)
-    rod = touching(*rods)
+    rod = contact_states(*rods)
     wrench = wrench_of(rod, rods)
     place = integrated_step2.step2(wrench, rods.delta)
     np.testing.assert_allclose(place.real, rod.place.T, rtol=0.0, atol=1e-11)
@@ -214,7 +216,7 @@ def test_contacts_of_step2_beyond_the_tip_have_slopes_too():
     longer[:, FORCE] /= 9.0
     longer[:, PSI1] += 0.2
     rods = Rods(longer, rods.delta)
-    rod = touching(*rods)
+    rod = contact_states(*rods)
     right = integrated_step2.slopes(integrated_step2.step2, wrench_of(rod, rods), rods.delta)
     assert_slopes_agree(place_by_wrench(rods.coordinates), right, 1e-10)
 
@@ -223,6 +225,6 @@ def test_contacts_of_step2_beyond_the_tip_have_slopes_too():
 @PHASES
 def test_many_slopes_of_step2(phase):
     rods = some_rods(phase, BENT + WEAK, seed=13, count=1000, shortest=1e-3)
-    rod = touching(*rods)
+    rod = contact_states(*rods)
     right = integrated_step2.slopes(integrated_step2.step2, wrench_of(rod, rods), rods.delta)
     assert_slopes_agree(place_by_wrench(rods.coordinates), right, 1e-10)

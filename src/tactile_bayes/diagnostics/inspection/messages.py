@@ -1,4 +1,4 @@
-"""Words for what looks wrong with a record, the most serious first."""
+"""Messages on what looks wrong with a record, the most serious first."""
 
 from __future__ import annotations
 
@@ -9,56 +9,56 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_bayes.diagnostics.inspection.corrections import OTHER_ANGLE
 from tactile_bayes.diagnostics.inspection.fit import Fit
-from tactile_bayes.diagnostics.inspection.remedies import OTHER_ANGLE
-from tactile_bayes.diagnostics.suspicions import CHECK_UNITS
+from tactile_bayes.diagnostics.units_and_signs import CHECK_UNITS
 from tactile_bayes.inference.misfit import CHECK_RIG
 from tactile_bayes.inference.nuisances import BIAS
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS, present_channels, rod_of
 
-__all__ = ["UNFIT", "in_words", "prefix_of", "quantity"]
+__all__ = ["UNFIT", "inspection_messages", "prefix_of", "quantity"]
 
 UNFIT = 0.25
-"""Share of loaded samples that no contact explains above which it is told: of a rod 10 % stiffer than stated it is
-less at the usual noise."""
+"""Share of loaded samples without a fitting contact above which it is reported: a rod 10 % stiffer than stated stays
+below it at the usual noise."""
 
 _FACTOR = 2.0
-"""Between the noise that is stated and the one that is found, as for verdicts."""
+"""Ratio of estimated to stated noise beyond which it is reported, as for verdicts."""
 
 _OFF_ZERO = 5.0
 """Standard errors by which a zero must differ from the stated one."""
 
 _FAR = 3.0
-"""Standard deviations of a bias's prior beyond which infer would object."""
+"""Standard deviations of a bias's prior beyond which `verdicts` would report the bias."""
 
 _CORRELATED = 0.2
-"""Coefficient of neighbours below which noise is as good as white."""
+"""Autocorrelation of neighbours below which noise counts as white."""
 
 _FEWEST_IN_CONTACT = 10
 
 _SHOWN = 5
-"""Samples that are listed, at most."""
+"""Largest number of samples that a message lists."""
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
-def in_words(
+def inspection_messages(
     record: xr.Dataset,
     sweeps: xr.Dataset,
     channels: xr.Dataset,
     samples: xr.Dataset,
-    suspected: Sequence[str],
+    of_loads: Sequence[str],
     fit: Fit,
     cell: LoadCell | None,
     source: str,
     false_alarm: float,
 ) -> tuple[str, ...]:
-    """See `inspect_record`; no sentence at all where nothing looks wrong."""
+    """Return the messages of `inspect_record`; none if nothing looks wrong."""
     return (
         *_never_loaded(sweeps),
         *_dead(record, sweeps),
-        *_of_loads(suspected, fit),
+        *_loads(of_loads, fit),
         *_cut_off(record, samples, cell),
         *_without_contact(sweeps),
         *_stuck(samples),
@@ -71,7 +71,7 @@ def in_words(
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """A value with its unit, in SI with a prefix.
+    """Return a value with its unit as text, in SI with a prefix.
 
     Examples
     --------
@@ -85,35 +85,35 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def prefix_of(value: float) -> tuple[float, str]:
-    """The size of the prefix that suits a value in SI, and the prefix.
+    """Return the size of the prefix that suits a value in SI, and the prefix.
 
     Examples
     --------
     >>> prefix_of(-0.0125)
     (0.001, 'm')
     """
-    if not abs(value) > 0.0:  # nothing, or not known
+    if not abs(value) > 0.0:  # zero or NaN
         return _PREFIXES[0]
     return next((pair for pair in _PREFIXES if abs(value) >= pair[0]), _PREFIXES[-1])
 
 
-def _of_loads(suspected: Sequence[str], fit: Fit) -> list[str]:
-    """Units and signs, and loads that contradict one another."""
-    told = list(suspected)
+def _loads(of_loads: Sequence[str], fit: Fit) -> list[str]:
+    """Report wrong units and signs, and loads that fit no contact."""
+    messages = list(of_loads)
     if not max(fit.share, fit.below) > UNFIT:
-        return told
-    if told and (not fit.remedy or told[0].endswith(CHECK_UNITS)):  # the first sentence says it all
-        return told
+        return messages
+    if messages and (not fit.correction or messages[0].endswith(CHECK_UNITS)):  # the first message suffices
+        return messages
     against = f"The loads of {fit.share:.0%} of the {fit.loaded} loaded samples fit no contact of such a rod"
     would = "would"
     if not fit.share > UNFIT:
         against = f"Of the {fit.loaded} loaded samples {fit.below:.0%} touch something below the pivot, not above"
         would = "would touch something above"
-    remedy = CHECK_RIG
-    if fit.remedy:
-        remedy = f"nearly all {would} if {fit.remedy}"
-    told.insert(0 if fit.remedy.startswith(OTHER_ANGLE) else len(told), f"{against}: {remedy}.")
-    return told
+    advice = CHECK_RIG
+    if fit.correction:
+        advice = f"nearly all {would} if {fit.correction}"
+    messages.insert(0 if fit.correction.startswith(OTHER_ANGLE) else len(messages), f"{against}: {advice}.")
+    return messages
 
 
 def _dead(record: xr.Dataset, sweeps: xr.Dataset) -> list[str]:
@@ -128,19 +128,19 @@ def _dead(record: xr.Dataset, sweeps: xr.Dataset) -> list[str]:
 
 
 def _cut_off(record: xr.Dataset, samples: xr.Dataset, cell: LoadCell | None) -> list[str]:
-    told = []
+    messages = []
     for index, name in enumerate(CHANNELS):
         flags = samples.cut_off.values[:, index]
         if not flags.any():
             continue
         largest = float(np.abs(record[name].values[flags]).max())
         stated = cell is not None and np.isfinite(cell.limit[index])
-        remedy = "" if stated else ": state its end in the header, or take a cell with a larger one"
-        told.append(
+        advice = "" if stated else ": state its end in the header, or take a cell with a larger one"
+        messages.append(
             f"{_count(flags, 'reading')} of {name} {_are(flags)} cut off at {quantity(largest, _unit(record, name))}, "
-            f"the end of a range ({_listed(flags)}){remedy}."
+            f"the end of a range ({_listed(flags)}){advice}."
         )
-    return told
+    return messages
 
 
 def _never_loaded(sweeps: xr.Dataset) -> list[str]:
@@ -160,62 +160,62 @@ def _without_contact(sweeps: xr.Dataset) -> list[str]:
 
 
 def _stuck(samples: xr.Dataset) -> list[str]:
-    told = []
+    messages = []
     for index, name in enumerate(CHANNELS):
         flags = samples.stuck.values[:, index]
         if flags.any():
-            told.append(
+            messages.append(
                 f"{_count(flags, 'reading')} of {name} {_are(flags)} the same as before or after, for longer than its "
                 f"steps explain ({_listed(flags)}): did the acquisition hang?"
             )
     flags = samples.repeated.values
     if flags.any():
-        told.append(
+        messages.append(
             f"{_count(flags, 'sample')} {'has' if np.sum(flags) == 1 else 'have'} all the readings of the one before "
             f"({_listed(flags)}): stored twice? Remove what is no measurement."
         )
-    return told
+    return messages
 
 
 def _outlying(samples: xr.Dataset, cell: LoadCell | None) -> list[str]:
-    told = []
-    remedy = (
+    messages = []
+    advice = (
         "If there are more, state noise with outliers, load_cell_degrees_of_freedom: 4, in the header; else remove the "
         "row."
     )
     if cell is not None and np.isfinite(cell.degrees_of_freedom):
-        remedy = "The noise with outliers that is stated allows for some; else remove the row."
+        advice = "The noise with outliers that is stated allows for some; else remove the row."
     for index, name in enumerate(CHANNELS):
         flags = samples.outlier.values[:, index]
         if flags.any():
             stands = "stands" if np.sum(flags) == 1 else "stand"
-            told.append(
+            messages.append(
                 f"{_count(flags, 'reading')} of {name} {stands} out from {'its' if stands[-1] == 's' else 'their'} "
-                f"neighbours ({_listed(flags)}): a knock? {remedy}"
+                f"neighbours ({_listed(flags)}): a knock? {advice}"
             )
-    return told
+    return messages
 
 
 def _zeros(
     record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float
 ) -> list[str]:
-    told = []
+    messages = []
     level = false_alarm / max(int(np.isfinite(channels.same_bias_p_value.values).sum()), 1)
     moved = [str(row.channel.values) for row in _rows(channels) if float(row.same_bias_p_value) < level]
     if moved and not _drifts(cell):
-        told.append(
+        messages.append(
             f"The zero of {_and(moved)} moved between one unloaded stretch and another: tare before each sweep, or "
             "have infer find a drift (--nuisance drift)."
         )
     is_stated = source in ("given", "data sheet")
     far = _far_off(record, channels, cell if is_stated else None)
     if far:
-        told.append(
+        messages.append(
             f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Take it off as the "
             "column is read: --column 'force_x=NAME+12.5' adds 12.5 in the column's unit."
         )
     if not is_stated or _drifts(cell):
-        return told
+        return messages
     off = []
     for row in _rows(channels):
         if str(row.channel.values) in far:
@@ -229,15 +229,15 @@ def _zeros(
                 f"({abs(away) / error:.0f} standard errors)"
             )
     if off:
-        told.append(
+        messages.append(
             f"Without load the cell does not read what is stated: {', '.join(off)}. Was the tare forgotten? "
             "infer finds it as it is (--nuisance bias, one of the defaults), but not with --as-stated."
         )
-    return told
+    return messages
 
 
 def _far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) -> dict[str, str]:
-    """Zeros by channel, in words, that the prior of a bias hardly allows, and that are not stated."""
+    """Return, by channel and as text, zeros that the prior of a bias hardly allows and that are not stated."""
     rod, found = rod_of(record), {}
     for row in _rows(channels):
         name, bias = str(row.channel.values), float(row.bias)
@@ -250,7 +250,7 @@ def _far_off(record: xr.Dataset, channels: xr.Dataset, cell: LoadCell | None) ->
 
 
 def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm: float) -> list[str]:
-    told = []
+    messages = []
     level = -float(ndtri(0.5 * false_alarm / len(CHANNELS)))
     like = [
         f"{row.channel.values} ({float(row.neighbour_correlation):+.2f})"
@@ -258,7 +258,7 @@ def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
         if abs(float(row.neighbour_score)) > level and abs(float(row.neighbour_correlation)) > _CORRELATED
     ]
     if like and not _drifts(cell):
-        told.append(
+        messages.append(
             f"The noise is not white: unloaded neighbours are correlated in {_and(like)}. Filter less or sample less "
             "often, or have infer find a drift (--nuisance drift), else bands come out too narrow."
         )
@@ -268,15 +268,15 @@ def _noise(channels: xr.Dataset, cell: LoadCell | None, source: str, false_alarm
             ratio = found / stated if stated else np.nan
             if not 1.0 / _FACTOR <= ratio <= _FACTOR and abs(found - stated) > _OFF_ZERO * error:
                 unit = str(row.unit.values)
-                told.append(
+                messages.append(
                     f"The noise of {row.channel.values} is {quantity(found, unit)} in unloaded samples, and stated as "
                     f"{quantity(stated, unit)}: state what it is, or are the units right?"
                 )
-    return told
+    return messages
 
 
 def _drifts(cell: LoadCell | None) -> bool:
-    """Whether a drift is stated, which explains a zero that moves and neighbours that are alike."""
+    """Return True if a drift is stated, which explains a zero that moves and correlated neighbours."""
     return cell is not None and cell.drift is not None
 
 
@@ -291,9 +291,9 @@ def _steps(samples: xr.Dataset) -> list[str]:
 
 
 def _unfinished(sweeps: xr.Dataset) -> list[str]:
-    told = []
+    messages = []
     contact = sweeps.contact.values
-    for name, words, remedy in (
+    for name, words, advice in (
         ("onset_drive_angle", "begin", "begin before first contact"),
         ("snap_off_drive_angle", "end", "go on until the rod snaps off"),
     ):
@@ -302,17 +302,17 @@ def _unfinished(sweeps: xr.Dataset) -> list[str]:
         )
         numbers = [int(number) for number in sweeps.sweep.values[inside]]
         if numbers:
-            told.append(f"{_of_sweeps(numbers, words)} in contact: {remedy}, which tells much of the contour.")
+            messages.append(f"{_of_sweeps(numbers, words)} in contact: {advice}, which tells much of the contour.")
     few = contact & (sweeps.samples.values - sweeps.unloaded.values < _FEWEST_IN_CONTACT)
     numbers = [int(number) for number in sweeps.sweep.values[few]]
     if numbers:
         which = _of_sweeps(numbers, "show")
-        told.append(f"{which} fewer than {_FEWEST_IN_CONTACT} samples in contact: take finer steps of the drive.")
-    return told
+        messages.append(f"{which} fewer than {_FEWEST_IN_CONTACT} samples in contact: take finer steps of the drive.")
+    return messages
 
 
 def _rows(channels: xr.Dataset) -> list[xr.Dataset]:
-    """Of the channels that are there."""
+    """Return the rows of the channels that are present."""
     return [channels.isel(channel=i) for i in np.flatnonzero(np.isfinite(channels.largest.values))]
 
 
@@ -330,7 +330,7 @@ def _are(flags: NDArray[np.bool_]) -> str:
 
 
 def _listed(flags: NDArray[np.bool_]) -> str:
-    """Like "samples 3, 5 to 9 and 12": neighbours together."""
+    """Return text like "samples 3, 5 to 9 and 12", neighbours joined."""
     where = np.flatnonzero(flags)
     runs = np.split(where, np.flatnonzero(np.diff(where) != 1) + 1)
     words = [f"{run[0]}" if run.size == 1 else f"{run[0]} to {run[-1]}" for run in runs]

@@ -1,4 +1,4 @@
-"""Where a path may run: whether a rod reaches its contour, where it first touches, and where no lever arm is left."""
+"""Limits of a path: whether a rod reaches the contour, first contact, and the point where the lever arm vanishes."""
 
 from __future__ import annotations
 
@@ -7,59 +7,59 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.fates import CLEARANCE, Reach
 from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
+from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
 __all__ = ["Limits", "clear_angle", "limits"]
 
 
 class _Sought(IntEnum):
-    """What vanishes at a root, and falls away from the pivot's side."""
+    """Function whose root is sought; it decreases away from the side of the pivot."""
 
     LEVER = 0
-    """The lever arm of a force across the contour."""
+    """Lever arm of a force across the contour."""
     TURNED = 1
-    """How much less the line from the pivot is turned from the contour's direction."""
+    """Given angle less the angle between the line from the pivot and the contour's direction."""
     WITHIN = 2
-    """How far inside the rod's reach it is."""
+    """Margin to the rod's reach."""
 
 
-_TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reach.TOUCHES), int(Reach.TOO_FAR), int(Reach.CUTS_PIVOT)
-_ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reach.ENDS), int(Reach.TOO_CLOSE), int(Reach.RUNS_OUT)
+_TOUCHES, _TOO_FAR, _CUTS_PIVOT = int(Reachability.TOUCHES), int(Reachability.TOO_FAR), int(Reachability.CUTS_PIVOT)
+_ENDS, _TOO_CLOSE, _RUNS_OUT = int(Reachability.ENDS), int(Reachability.TOO_CLOSE), int(Reachability.RUNS_OUT)
 _CLEARANCE = CLEARANCE
 
 _ROUNDING = 1e-14
-"""Distance from the end of the rod's reach that is none."""
+"""Distance from the end of the rod's reach [L] that counts as zero."""
 
 
 class Limits(NamedTuple):
-    """How far the path of an outline can run; parameters are the contour's own."""
+    """Limits of the path of an outline, as parameters of the contour."""
 
     reach: int
-    """A `Reach`."""
+    """A `Reachability`."""
     distance: float
-    """Least distance of contour and pivot, in rod lengths."""
+    """Least distance of contour and pivot [L]."""
     begin: float
     """First contact."""
     end: float
-    """Where the line of force passes through the pivot, or the rod's length is used up again, or the contour ends."""
+    """Point where the line of force passes through the pivot, the rod is too short again, or the contour ends."""
     tip_first: bool
-    """Whether the tip touches first, or a tangent line from the pivot."""
+    """True if the tip touches first, and not a tangent line from the pivot."""
     runs_out: bool
-    """Whether it is the contour that ends."""
+    """True if the contour ends there."""
 
 
 @compiled
 def _missing(outline: Outline, what: _Sought, turned: float, p: float) -> tuple[float, float]:
-    """What is sought, with its derivative."""
+    """Function whose root is sought, and its derivative."""
     at = place(outline, p)
     along, facing = frame(at)
     if what == _Sought.LEVER:
         return along, at.speed + facing * at.bend
     if what == _Sought.WITHIN:
         return 1.0 - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
-    # How much less the line from the pivot is turned from the contour's direction: the farther to the left the more it
-    # is, as long as the contour faces the pivot. It jumps below the pivot, where no contour is.
+    # The angle between the line from the pivot and the contour's direction grows to the left as long as the contour
+    # faces the pivot. It jumps below the pivot, where no contour is.
     bearing = math.atan2(-at.x, at.y) + 0.5 * math.pi
     rate = facing * at.speed / (at.x * at.x + at.y * at.y) + at.bend
     return turned - (bearing - math.atan2(at.sin, at.cos)), rate
@@ -67,7 +67,7 @@ def _missing(outline: Outline, what: _Sought, turned: float, p: float) -> tuple[
 
 @compiled
 def _root(outline: Outline, what: _Sought, turned: float, positive: float, negative: float, last_step: float) -> float:
-    """Newton kept in its bracket; the last step is a share of that."""
+    """Root by Newton's method within a bracket, until a step is a given share of it."""
     p, before = 0.5 * (positive + negative), abs(negative - positive)
     settled = last_step * before
     for _ in range(100):
@@ -77,7 +77,7 @@ def _root(outline: Outline, what: _Sought, turned: float, positive: float, negat
         else:
             negative = p
         new = p - value / slope
-        # Steps that do not shrink by half go round in circles, for instance about a kink.
+        # Steps that do not shrink by half may cycle, for instance about a kink.
         if (new - positive) * (new - negative) <= 0.0 and abs(new - p) <= 0.5 * before:
             before = abs(new - p)
         elif value == 0.0:
@@ -94,7 +94,7 @@ def _root(outline: Outline, what: _Sought, turned: float, positive: float, negat
 
 @compiled
 def _nearest(outline: Outline, low: float, high: float, last_step: float) -> tuple[float, bool, bool]:
-    """Parameter of the nearest point, and whether it lies beyond the greatest or the least one."""
+    """Parameter of the nearest point, and whether it lies beyond the greatest or the least parameter."""
     beyond_high = _missing(outline, _Sought.LEVER, 0.0, high)[0] <= 0.0
     beyond_low = _missing(outline, _Sought.LEVER, 0.0, low)[0] >= 0.0
     if beyond_high:
@@ -121,14 +121,14 @@ def _first(outline: Outline, high: float, nearest: float, last_step: float) -> t
 
 @compiled
 def limits(outline: Outline, delta: float, last_step: float) -> Limits:
-    """Where the path can run with a friction angle δ [rad]; roots are found to a share of their brackets."""
+    """Limits of the path for a friction angle δ [rad]; roots are found to a share of their brackets."""
     low, high = ends(outline)
     nearest, beyond_high, beyond_low = _nearest(outline, low, high, last_step)
     at = place(outline, nearest)
     distance, below = math.hypot(at.x, at.y), frame(at)[1] > 0.0
     begin, tip_first = _first(outline, high, nearest, last_step)
 
-    # A force that friction turns passes through the pivot only beyond the nearest point, if not out of reach.
+    # With friction the line of force passes through the pivot only beyond the nearest point, if within reach.
     end = nearest
     if delta > 0.0:
         largest = 0.5 * math.pi + delta
@@ -155,7 +155,7 @@ def limits(outline: Outline, delta: float, last_step: float) -> Limits:
 
 @compiled
 def clear_angle(outline: Outline, last_step: float) -> float:
-    """Drive angle from which on a straight rod is past the contour: there the opposite sweep would first touch."""
+    """Drive angle beyond which a straight rod has passed the contour: first contact of the opposite sweep [rad]."""
     opposite = mirrored(outline)
     low, high = ends(opposite)
     begin, _ = _first(opposite, high, _nearest(opposite, low, high, last_step)[0], last_step)

@@ -1,0 +1,100 @@
+"""Contours in the sweep frame: relative to the pivot, in rod lengths, mirrored for a backward sweep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.contours.base import Contour, Locus, Parameter
+
+__all__ = ["SweepFrame"]
+
+_FAR = 1e3
+"""Rod lengths beyond which an end of a contour does not matter."""
+
+
+@dataclass(frozen=True)
+class SweepFrame:
+    """A batch of n contours of one family, each in the frame of a sweep with its own pivot.
+
+    The rod's centreline stays `standoff` (half the rod's diameter) outside the object: it traces the parallel curve,
+    which is strictly convex too. In this frame all sweeps are forward ones.
+
+    Parameters
+    ----------
+    contour : Contour
+        Contours whose parameters are all arrays of shape (n,).
+    base_x, base_y : ndarray, shape (n,)
+        Pivots, in the contour's unit of length.
+    length : float or ndarray, shape (n,)
+        Length of the rod, in the same unit.
+    standoff : float or ndarray, shape (n,)
+        Half the rod's diameter, in the same unit.
+    mirrored : ndarray of bool, shape (n,)
+        Whether the sweep is a backward one.
+    """
+
+    contour: Contour
+    base_x: Floats
+    base_y: Floats
+    length: Parameter
+    standoff: Parameter
+    mirrored: NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        return int(self.base_x.size)
+
+    def locate(self, index: Index, parameter: Floats) -> Locus:
+        """Points in the sweep frame; `index` and `parameter` broadcast. The parameter is in the sweep frame too: it
+        grows from left to right."""
+        sign = np.where(self.mirrored[index], -1.0, 1.0)
+        x, y, slope, arclength_rate, slope_rate = self.contour.take(index).locate(sign * parameter)
+        length, standoff = (v[index] if isinstance(v, np.ndarray) else v for v in (self.length, self.standoff))
+        if np.any(standoff):
+            x = x + standoff * np.sin(slope)
+            y = y - standoff * np.cos(slope)
+            arclength_rate = arclength_rate + standoff * slope_rate
+        return Locus(
+            sign * (x - self.base_x[index]) / length,
+            (y - self.base_y[index]) / length,
+            sign * slope,
+            arclength_rate / length,
+            slope_rate,
+        )
+
+    def domain(self) -> tuple[Floats, Floats]:
+        """Least and greatest parameter of every contour, shape (n,).
+
+        Where a contour has no end, or one so far away that rounding hides its direction, it is cut just beyond the
+        rod's reach.
+        """
+        lo, hi = (np.broadcast_to(end, (self.size,)).astype(float) for end in self.contour.domain)
+        lo, hi = np.where(self.mirrored, -hi, lo), np.where(self.mirrored, -lo, hi)
+        size = np.arange(self.size)
+        for end, outward in ((lo, -1.0), (hi, 1.0)):
+            open_ended = ~np.isfinite(end)
+            reach = np.full(self.size, self.length)
+            while np.any(open_ended):
+                end[open_ended] = outward * reach[open_ended]
+                x = self.locate(size[open_ended], end[open_ended]).x
+                open_ended[open_ended] = outward * x <= 1.0
+                reach *= 2.0
+            far = np.flatnonzero(~(outward * self.locate(size, end).x <= _FAR))
+            if far.size:
+                end[far] = self._parameter_at(far, 2.0 * outward)
+        return lo, hi
+
+    def own_domain(self) -> tuple[Floats, Floats]:
+        """Least and greatest parameter of every contour in its own frame, shape (n,); see `domain`."""
+        low, high = self.domain()
+        return np.where(self.mirrored, -high, low), np.where(self.mirrored, -low, high)
+
+    def _parameter_at(self, index: Index, x: float) -> Floats:
+        """Parameters at which the contour itself, without standoff, is at x in the sweep frame."""
+        sign = np.where(self.mirrored[index], -1.0, 1.0)
+        length = self.length[index] if isinstance(self.length, np.ndarray) else self.length
+        return np.asarray(sign * self.contour.take(index).parameter_of_x(self.base_x[index] + sign * x * length))

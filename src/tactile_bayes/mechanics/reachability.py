@@ -1,0 +1,57 @@
+"""The outcome of a sweep: whether the rod reaches the contour, and how contact ends."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["CLEARANCE", "Reachability", "SnapOff"]
+
+CLEARANCE = 0.02
+"""Least distance of pivot and contour at which a path is followed [L]. Nearer, almost the whole path lies within a
+degree of snap-off, and the nodes would miss it."""
+
+
+class Reachability(IntEnum):
+    """Reachability of a contour by a rod in a sweep."""
+
+    TOUCHES = 0
+    TOO_FAR = 1
+    """No point is within the rod's length."""
+    CUTS_PIVOT = 2
+    """The pivot is not below the contour."""
+    ENDS = 3
+    """The rod would first touch beyond the end of the contour from which it comes."""
+    TOO_CLOSE = 4
+    """The pivot is nearer to the contour than `CLEARANCE`."""
+    RUNS_OUT = 5
+    """The rod would still touch at the other end of the contour."""
+    GRAZES = 6
+    """Contact is so weak that rounding hides how it ends."""
+
+    @property
+    def message(self) -> str:
+        """Reason why there is no path, in a few words; "ok" if there is one."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Reachability.TOUCHES: "ok",
+    Reachability.TOO_FAR: "out of reach",
+    Reachability.CUTS_PIVOT: "cuts the pivot",
+    Reachability.ENDS: "first touched beyond its end",
+    Reachability.TOO_CLOSE: "too close to the pivot",
+    Reachability.RUNS_OUT: "still touched at its other end",
+    Reachability.GRAZES: "hardly touched",
+}
+
+
+class SnapOff(IntEnum):
+    """Kind of the end of a path."""
+
+    NEVER = 0
+    FOLD = 1
+    """A smooth maximum of the drive angle."""
+    CORNER = 2
+    """A maximum where the phase changes or the contour's curvature jumps."""
+    THRUST = 3
+    """The line of force passes through the pivot, so that the holding moment vanishes."""
