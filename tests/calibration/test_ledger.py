@@ -7,6 +7,7 @@ import math
 
 import pytest
 
+from helpers.refusals import refused
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.errors import CalibrationError
@@ -43,10 +44,10 @@ def filled(folder, words=WORDS):
     return folder / LEDGER
 
 
-def refused(folder, match, words=WORDS):
-    """Also nothing in the folder has changed."""
+def left_alone(folder, *named, words=WORDS):
+    """It is refused, and nothing in the folder has changed."""
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(CalibrationError, match=match), open_ledger(words, folder, REPLICATES):
+    with refused(CalibrationError, *named), open_ledger(words, folder, REPLICATES):
         raise AssertionError("the block began")
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
@@ -138,7 +139,7 @@ def test_one_run_at_a_time(tmp_path):
     pytest.importorskip("fcntl")
     with (
         open_ledger(WORDS, tmp_path, REPLICATES),
-        pytest.raises(CalibrationError, match=r"another run is at work on .*: wait"),
+        refused(CalibrationError, "another run", tmp_path),
     ):
         open_ledger(WORDS, tmp_path, REPLICATES).__enter__()
     filled(tmp_path)
@@ -149,16 +150,15 @@ def test_one_run_at_a_time(tmp_path):
 
 def test_another_experiment_is_refused(tmp_path):
     filled(tmp_path)
-    remedy = "; give another folder, or remove replicates.json from it to begin anew$"
-    for words, told in (
-        ({"seed": "2"}, "another experiment: seed is 1 there and 2 here"),
-        ({"seed": "2", "friction": "0.3"}, "seed is 1 there and 2 here, friction is 0.0 there and 0.3 here"),
-        ({"events": "True"}, "events is left out there and True here"),
-        (dict.fromkeys(WORDS, "x"), "friction is 0.0 there and x here and 1 more"),
-        ({"load_cell": 99 * "7"}, f"load_cell is .* there and {57 * '7'}… here"),
+    for words, named in (
+        ({"seed": "2"}, ["seed is 1 there and 2 here"]),
+        ({"seed": "2", "friction": "0.3"}, ["seed is 1 there and 2 here", "friction is 0.0 there and 0.3 here"]),
+        ({"events": "True"}, ["events", "left out there", "True here"]),
+        (dict.fromkeys(WORDS, "x"), ["friction is 0.0 there and x here", "1 more"]),
+        ({"load_cell": 99 * "7"}, ["load_cell", f"{57 * '7'}…"]),
     ):
-        refused(tmp_path, told + remedy, WORDS | words)
-    refused(tmp_path, "seed is 1 there and left out here" + remedy, {n: w for n, w in WORDS.items() if n != "seed"})
+        left_alone(tmp_path, *named, LEDGER, words=WORDS | words)
+    left_alone(tmp_path, "seed", "left out here", words={n: w for n, w in WORDS.items() if n != "seed"})
 
 
 def test_of_another_experiment_without_replicates_nothing_is_lost(tmp_path):
@@ -191,16 +191,16 @@ GARBAGE = {
 @pytest.mark.parametrize("content", GARBAGE.values(), ids=GARBAGE)
 def test_garbage_is_refused_with_path_and_remedy(tmp_path, content):
     (tmp_path / LEDGER).write_bytes(content)
-    refused(tmp_path, f"{tmp_path / LEDGER} holds no replicates that can be read .*: give another folder, or remove")
+    left_alone(tmp_path, tmp_path / LEDGER, "read")
 
 
 def test_another_format_is_refused(tmp_path):
     file = filled(tmp_path)
     file.write_text(file.read_text(encoding="utf-8").replace('"format": 1', '"format": 2'), encoding="utf-8")
-    refused(tmp_path, f"^{file} has format 2, this version reads 1: give another folder, or remove replicates.json")
+    left_alone(tmp_path, file, "format 2", 1)
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
     (tmp_path / "taken").touch()
-    with pytest.raises(CalibrationError, match="taken is a file: give a folder"):
+    with refused(CalibrationError, tmp_path / "taken"):
         open_ledger(WORDS, tmp_path / "taken", REPLICATES).__enter__()

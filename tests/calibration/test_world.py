@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.refusals import refused
 from tactile_bayes.calibration.world import World
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
@@ -27,37 +28,31 @@ def radius(slope_angle):
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "remedy"),
+    ("name", "value"),
     [
-        *((name, value, "a finite number") for name in ("friction", "rigidity_scale") for value in ("much", None)),
-        ("friction", math.nan, "a finite number"),
-        ("drive_angle_offset", math.inf, "a finite number"),
-        ("drive_angle_offset", (0.1, 0.2), "a finite number"),
-        ("base_shift", 0.1, "2 finite numbers"),
-        ("base_shift", (0.1, math.nan), "2 finite numbers"),
-        ("further_base_shift", (0.1, 0.2, 0.3), "2 finite numbers"),
-        ("bias", 0.1, "3 finite numbers"),
-        ("bias", (0.1, 0.2), "3 finite numbers"),
-        ("drift", ("a", "b", "c"), "3 finite numbers"),
-        ("flat_spot", 0.3, "2 finite numbers"),
+        ("friction", "much"),
+        ("friction", -0.1),
+        ("friction", math.nan),
+        ("rigidity_scale", None),
+        ("drive_angle_offset", math.inf),
+        ("drive_angle_offset", (0.1, 0.2)),
+        ("base_shift", 0.1),
+        ("base_shift", (0.1, math.nan)),
+        ("further_base_shift", (0.1, 0.2, 0.3)),
+        ("bias", 0.1),
+        ("bias", (0.1, 0.2)),
+        ("drift", ("a", "b", "c")),
+        ("flat_spot", 0.3),
     ],
 )
-def test_what_is_no_number_is_refused(name, value, remedy):
-    with pytest.raises(ParameterError, match=f"^{name} of the world is .*: give {remedy}$"):
+def test_what_is_no_number_is_refused(name, value):
+    with refused(ParameterError, **{name: value}):
         World(**{name: value})
 
 
-@pytest.mark.parametrize(
-    ("entries", "message"),
-    [
-        ({"friction": -0.1}, "friction of the world is -0.1: give a coefficient from 0 up"),
-        ({"rigidity_scale": 0.0}, "rigidity_scale and the factor of a flat spot are positive numbers"),
-        ({"rigidity_scale": -1.0}, "rigidity_scale and the factor of a flat spot are positive numbers"),
-        ({"flat_spot": (0.1, 0.0)}, "rigidity_scale and the factor of a flat spot are positive numbers"),
-    ],
-)
-def test_impossible_numbers_are_refused(entries, message):
-    with pytest.raises(ParameterError, match=f"^{message}$"):
+@pytest.mark.parametrize("entries", [{"rigidity_scale": 0.0}, {"rigidity_scale": -1.0}, {"flat_spot": (0.1, 0.0)}])
+def test_factors_are_positive(entries):
+    with refused(ParameterError, "rigidity_scale", "flat spot", "positive"):
         World(**entries)
 
 

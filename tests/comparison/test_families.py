@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from helpers.contour_posteriors import CELL, swept
+from helpers.refusals import refused
 from tactile_bayes.comparison.families import compare_families
 from tactile_bayes.contours import Circle, Ellipse, paper_profile
 from tactile_bayes.errors import ParameterError
@@ -107,7 +108,7 @@ def test_an_interrupt_ends_the_comparison(circle):
     def interrupt(name, state):
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="interrupted while sampling circle: nothing comes of it"):
+    with refused(KeyboardInterrupt, "circle"):
         compare_families(
             circle,
             families=["circle", "ellipse"],
@@ -120,15 +121,15 @@ def test_an_interrupt_ends_the_comparison(circle):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "named"),
     [
-        ({"families": "circle"}, r"families is 'circle': give several, like \['parabola', 'circle'\]"),
-        ({"families": ["circle"]}, "families are circle: give two or more different ones"),
-        ({"families": ["circle", "circle"]}, "give two or more different ones"),
-        ({"families": ["circle", "square"]}, "there is no family 'square'"),
-        ({"families": ["circle", "ellipse"], "priors": {"parabola": {}}}, "there are priors for 'parabola', which is"),
+        ({"families": "circle"}, ["families", "'circle'"]),
+        ({"families": ["circle"]}, ["families", "circle"]),
+        ({"families": ["circle", "circle"]}, ["families", "circle", "different"]),
+        ({"families": ["circle", "square"]}, ["family", "'square'"]),
+        ({"families": ["circle", "ellipse"], "priors": {"parabola": {}}}, ["priors", "'parabola'"]),
     ],
 )
-def test_families_that_cannot_be_compared(circle, options, message):
-    with pytest.raises(ParameterError, match=message):
+def test_families_that_cannot_be_compared(circle, options, named):
+    with refused(ParameterError, *named):
         compare_families(circle, load_cell=CELL, seed=1, **options)

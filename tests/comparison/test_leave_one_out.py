@@ -15,6 +15,7 @@ from arviz_stats.base.array import array_stats
 from scipy import stats
 
 from helpers.load_cells import CELL, SHARED, WALK, WANDER, moments
+from helpers.refusals import refused
 from tactile_bayes.comparison import leave_one_out
 from tactile_bayes.comparison.leave_one_out import (
     difference,
@@ -372,7 +373,7 @@ def test_weights_that_were_not_found_are_not_given(monkeypatch):
     minimize = leave_one_out.minimize
     stopped = {"ftol": 1e-14, "maxiter": 1}
     monkeypatch.setattr(leave_one_out, "minimize", lambda *a, **k: minimize(*a, **{**k, "options": stopped}))
-    with pytest.raises(InferenceError, match="stacking did not converge"):
+    with refused(InferenceError, "stacking"):
         stacking_weights(np.random.default_rng(18).normal(size=(3, 60)))
 
 
@@ -380,22 +381,22 @@ def test_weights_that_were_not_found_are_not_given(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("call", "named"),
     [
-        (lambda: left_out(np.zeros((4, 100))), r"shape \(4, 100\): give \(chains, draws, samples\)"),
-        (lambda: left_out(np.zeros((4, 6, 2))), "has 24 draws: give 25 at least"),
-        (lambda: left_out(np.full((4, 50, 2), -np.inf)), "sample 0 is -inf at draw 0 of chain 0: give draws of the"),
-        (lambda: left_out_from_wider(np.zeros((4, 50, 2)), 2), "chosen is 2: give the index of one of 2 samples"),
-        (lambda: left_out_from_wider(np.full((4, 50, 2), np.nan), 1), "log_weights is nan at draw 0 of chain 0"),
-        (lambda: reweighted(np.zeros((4, 50)), np.full((4, 50), np.inf)), "log_density is inf at draw 0 of chain 0"),
-        (lambda: reweighted(np.zeros((4, 50)), np.zeros((4, 51))), r"\(4, 50\) and log_density \(4, 51\): give"),
-        (lambda: difference(np.zeros(4), np.zeros(5)), r"shapes \(4,\) and \(5,\): give those of the same samples"),
-        (lambda: difference(np.zeros(1), np.zeros(1)), "2 at least"),
-        (lambda: stacking_weights(np.zeros(4)), r"shape \(4,\): give \(models, samples\)"),
-        (lambda: stacking_weights(np.array([[0.0, np.nan]])), "model 0 has a log-density of nan of sample 1"),
-        (lambda: stacking_weights(np.full((2, 3), -np.inf)), "no model allows sample 0: remove it, or add one"),
+        (lambda: left_out(np.zeros((4, 100))), ["(4, 100)"]),
+        (lambda: left_out(np.zeros((4, 6, 2))), ["24 draws", 25]),
+        (lambda: left_out(np.full((4, 50, 2), -np.inf)), ["sample 0", "-inf", "draw 0", "chain 0"]),
+        (lambda: left_out_from_wider(np.zeros((4, 50, 2)), 2), ["chosen", 2, "2 samples"]),
+        (lambda: left_out_from_wider(np.full((4, 50, 2), np.nan), 1), ["log_weights", "nan", "draw 0", "chain 0"]),
+        (lambda: reweighted(np.zeros((4, 50)), np.full((4, 50), np.inf)), ["log_density", "inf", "draw 0", "chain 0"]),
+        (lambda: reweighted(np.zeros((4, 50)), np.zeros((4, 51))), ["(4, 50)", "log_density", "(4, 51)"]),
+        (lambda: difference(np.zeros(4), np.zeros(5)), ["(4,)", "(5,)"]),
+        (lambda: difference(np.zeros(1), np.zeros(1)), [2]),
+        (lambda: stacking_weights(np.zeros(4)), ["(4,)"]),
+        (lambda: stacking_weights(np.array([[0.0, np.nan]])), ["model 0", "nan", "sample 1"]),
+        (lambda: stacking_weights(np.full((2, 3), -np.inf)), ["model", "sample 0"]),
     ],
 )
-def test_what_cannot_be_is_refused(call, message):
-    with pytest.raises(ParameterError, match=message):
+def test_what_cannot_be_is_refused(call, named):
+    with refused(ParameterError, *named):
         call()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +21,7 @@ from helpers.contours_drawn import (
     shapes,
     vertex_joints,
 )
+from helpers.refusals import refused
 from tactile_bayes import scan
 from tactile_bayes.contours import (
     Circle,
@@ -220,7 +220,7 @@ def test_of_many_the_wrong_one_is_named():
         lambda x, k: k * x**2, lambda x, k: np.where(k == 0.7, 1.9, 2.0) * k * x, lambda x, k: 2.0 * k + 0 * x
     )
     check(family([[0.3], [0.5]]))
-    with pytest.raises(ContourError, match=r"at index \(1, 0\): g' is not the derivative of g"):
+    with refused(ContourError, "index (1, 0)", "g'"):
         check(family([[0.3], [0.7]]))
 
 
@@ -245,14 +245,12 @@ class Arc(Contour):
 def test_rates_of_a_family_that_is_no_graph():
     check(Arc(0.7))
     check(Arc([0.7, 2.0]))
-    with pytest.raises(
-        ContourError, match=r"arclength_rate · cos\(slope_angle\) is not the derivative of x: from x = "
-    ):
+    with refused(ContourError, "arclength_rate", "slope_angle", "from x ="):
         check(Arc(0.7, error=1e-3))
 
 
 def test_what_is_no_contour():
-    with pytest.raises(ContourError, match="None is no contour"):
+    with refused(ContourError, None):
         check(None)
 
 
@@ -310,31 +308,9 @@ def test_equality():
     assert copy.deepcopy(many) == many
 
 
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: Parabola([0.5, 0.6], [0.1, 0.2, 0.3]), "Parabola: a of shape (2,), q of shape (3,) do not broadcast"),
-        (lambda: Circle(1.0, [0.1, 0.2], [1, 2, 3]), "Circle: q of shape (2,), x_c of shape (3,) do not broadcast"),
-        (lambda: PowerLaw([1, 2], [3, 4, 5], 0.3), "PowerLaw: a of shape (2,), n of shape (3,) do not broadcast"),
-        (
-            lambda: Joined(Parabola([0.5, 0.6], 0.3), Parabola([0.5, 0.6, 0.7], 0.3)),
-            "Joined: left of shape (2,), right of shape (3,) do not broadcast",
-        ),
-        (
-            lambda: ShapeFree(KNOTS, np.zeros(5), [0, 1], [0.1, 0.2, 0.3]),
-            "ShapeFree: x of shape (2,), y of shape (3,) do not broadcast",
-        ),
-        (lambda: Parabola("wide", 0.3), "Parabola: a is 'wide': give a number, or an array of numbers"),
-        (lambda: Ellipse(1.0, None, 0.3), "Ellipse: b is None: give a number, or an array of numbers"),
-        (lambda: Circle([[1.0], [1.0, 2.0]], 0.3), "Circle: r is [[1.0], [1.0, 2.0]]: give a number, or an array"),
-        (lambda: Joined(Parabola(0.5, 0.3), 0.3), "Joined: right is 0.3: give a contour"),
-        (lambda: PowerLaw(1.0, 1000, 0.3), "PowerLaw: n must be at most 50: above, the bottom is as good as straight"),
-        (lambda: Hyperbola(np.abs), "Hyperbola: size is <ufunc 'absolute'>: give a number, or an array of numbers"),
-    ],
-)
-def test_parameters_that_are_none(build, message):
-    with pytest.raises(ContourError, match=re.escape(message)):
-        build()
+def test_a_parameter_of_a_class_of_ones_own_is_checked_as_well():
+    with refused(ContourError, "Hyperbola", "size", np.abs):
+        Hyperbola(np.abs)
 
 
 def test_the_largest_exponent_does_not_overflow():

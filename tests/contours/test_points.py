@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom, chi2
 from scipy.stats import t as student_t
 
+from helpers.refusals import refused
 from tactile_bayes import scan
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
 from tactile_bayes.contours.bends import FALSE_ALARM, Bends, refuse_two_bands
@@ -226,7 +227,7 @@ def stretch(error):
 @pytest.mark.parametrize("seed", range(5))
 def test_a_dent_of_several_scatters_is_named(scatter, seed):
     """Eight scatters beyond the chord, some 19 points wide: caught 20 times out of 20."""
-    with pytest.raises(ContourError, match="Leave this stretch out") as error:
+    with refused(ContourError, "Leave this stretch out") as error:
         from_points(*dented(0.016, 0.002, seed), scatter=scatter)
     left, right, _ = stretch(error)
     overlap = min(right, 0.45) - max(left, 0.15)
@@ -308,31 +309,31 @@ X = np.linspace(-1.0, 1.0, 20)
 
 
 @pytest.mark.parametrize(
-    ("x", "y", "scatter", "message"),
+    ("x", "y", "scatter", "named"),
     [
-        (X[:5], X[:5] ** 2, None, "5 different x: at least 6"),
-        (np.repeat(X[:5], 4), np.repeat(X[:5] ** 2, 4), None, "5 different x"),
-        ([], [], None, "0 different x"),
-        (X, X[:-1] ** 2, None, "x has 20 numbers, y has 19"),
-        (X, X**2, np.ones(19), "x has 20 numbers, scatter has 19"),
-        (X.reshape(4, 5), X.reshape(4, 5), None, r"x has shape \(4, 5\)"),
-        (0.0, 1.0, None, r"x has shape \(\)"),
-        (np.where(np.arange(20) == 3, np.nan, X), X**2, None, r"x\[3\] is nan"),
-        (X, np.where(np.arange(20) == 7, np.inf, X**2), None, r"y\[7\] is inf"),
-        (X, X**2, 0.0, "scatter is 0.0: a scatter must be positive"),
-        (X, X**2, -0.1, "scatter is -0.1"),
-        (X, X**2, np.nan, "scatter is nan"),
-        (X, X**2, np.where(np.arange(20) == 2, 0.0, 0.1), r"scatter\[2\] is 0.0"),
-        (X, 0.0 * X, None, "on a straight line"),
-        (X, 0.1 + 0.3 * X, None, "on a straight line"),
-        (X, 0.1 + 0.3 * X, 0.01, "on a straight line"),
-        (X, 0.01 * X**2, 0.1, "cannot be told from a straight line"),
-        (X, -(X**2), None, "upside down.* above the pivot; .* mirror y"),
-        (X, -np.cosh(X), 0.01, "upside down"),
+        (X[:5], X[:5] ** 2, None, ["5 different x", 6]),
+        (np.repeat(X[:5], 4), np.repeat(X[:5] ** 2, 4), None, ["5 different x"]),
+        ([], [], None, ["0 different x"]),
+        (X, X[:-1] ** 2, None, ["x", 20, "y", 19]),
+        (X, X**2, np.ones(19), ["x", 20, "scatter", 19]),
+        (X.reshape(4, 5), X.reshape(4, 5), None, ["x", "(4, 5)"]),
+        (0.0, 1.0, None, ["x", "()"]),
+        (np.where(np.arange(20) == 3, np.nan, X), X**2, None, ["x[3]", "nan"]),
+        (X, np.where(np.arange(20) == 7, np.inf, X**2), None, ["y[7]", "inf"]),
+        (X, X**2, 0.0, ["scatter", 0.0]),
+        (X, X**2, -0.1, ["scatter", -0.1]),
+        (X, X**2, np.nan, ["scatter", "nan"]),
+        (X, X**2, np.where(np.arange(20) == 2, 0.0, 0.1), ["scatter[2]", 0.0]),
+        (X, 0.0 * X, None, ["straight line"]),
+        (X, 0.1 + 0.3 * X, None, ["straight line"]),
+        (X, 0.1 + 0.3 * X, 0.01, ["straight line"]),
+        (X, 0.01 * X**2, 0.1, ["straight line"]),
+        (X, -(X**2), None, ["upside down", "mirror y"]),
+        (X, -np.cosh(X), 0.01, ["upside down"]),
     ],
 )
-def test_refusals(x, y, scatter, message):
-    with pytest.raises(ContourError, match=message):
+def test_refusals(x, y, scatter, named):
+    with refused(ContourError, *named):
         from_points(x, y, scatter=scatter)
 
 
@@ -343,7 +344,7 @@ def test_a_closed_outline_is_told_from_a_straight_line(count, scatter, tilt):
     t, rng = np.linspace(0.0, 2.0 * np.pi, count), np.random.default_rng(count)
     x = np.cos(t) + scatter * rng.standard_normal(count)
     y = 1.3 + np.sin(t) + tilt * x + scatter * rng.standard_normal(count)
-    with pytest.raises(ContourError, match=r"near x = .* points at y = .* and at y = .*give the lower boundary only"):
+    with refused(ContourError, "near x =", "at y =", "lower boundary"):
         from_points(x, y)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, Smooth, check
 from tactile_bayes.errors import ContourError
 from tactile_bayes.inference.likelihood import RecordLikelihood
@@ -74,19 +75,15 @@ def test_loads_are_the_exact_ones(diameter):
 
 
 @pytest.mark.parametrize(
-    ("log_radius", "q", "words"),
+    ("log_radius", "q", "named"),
     [
-        ([0.0], 0.3, r"log_radius of shape \(1,\) has not at least 2 values"),
-        ([0.0, np.nan], 0.3, "log_radius must be finite"),
-        ([0.0, 0.0], np.inf, "q and x_c must be finite"),
-        (np.zeros((2, 4)), [0.1, 0.2, 0.3], "do not broadcast"),
+        ([0.0], 0.3, ["log_radius", "(1,)", 2]),
+        ([0.0, np.nan], 0.3, ["log_radius", "finite"]),
+        ([0.0, 0.0], np.inf, ["q", "x_c"]),
+        (np.zeros((2, 4)), [0.1, 0.2, 0.3], ["broadcast"]),
+        (np.full(4, 500.0), 0.3, ["log_radius", 500]),
     ],
 )
-def test_what_is_no_contour_is_refused(log_radius, q, words):
-    with pytest.raises(ContourError, match=words):
+def test_what_is_no_contour_is_refused(log_radius, q, named):
+    with refused(ContourError, *named):
         Smooth(log_radius, q)
-
-
-def test_radii_that_run_off_are_refused():
-    with pytest.raises(ContourError, match="log_radius runs off to 500"):
-        Smooth(np.full(4, 500.0), 0.3)

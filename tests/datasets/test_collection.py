@@ -12,6 +12,7 @@ import xarray as xr
 
 import tactile_bayes as tb
 from helpers.data_sets import PLAIN, RICH, changed
+from helpers.refusals import refused
 from tactile_bayes.datasets.collection import opened_shard
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
 from tactile_bayes.datasets.netcdf import netcdf_of
@@ -134,21 +135,21 @@ def test_what_is_in_the_making_can_be_opened(folder, whole, tmp_path):
     shutil.copytree(folder, some)
     manifest = read_manifest(some)
     write_manifest(type(manifest)(**{**vars(manifest), "shards": (manifest.shards[0], manifest.shards[2])}), some)
-    with pytest.warns(UserWarning, match="half has 16 of 24 records: run dataset generate again for the others"):
+    with pytest.warns(UserWarning, match="half has 16 of 24"):
         data = tb.datasets.open(some)
     assert data.record.values.tolist() == [*range(8), *range(16, 24)]
     assert tb.datasets.record(some, 17).sizes["sample"] == 48  # without a warning: this one is there
     xr.testing.assert_identical(data.sel(record=17).load(), whole.sel(record=17))
-    with pytest.raises(SpecificationError, match="record 9 is not there yet: run dataset generate again"):
+    with refused(SpecificationError, "record 9"):
         tb.datasets.record(some, 9)
     write_manifest(type(manifest)(**{**vars(manifest), "shards": ()}), some)
-    with pytest.raises(SpecificationError, match="holds no shard yet: run dataset generate again"):
+    with refused(SpecificationError, some):
         tb.datasets.open(some)
 
 
 def test_what_is_no_data_set_is_refused(folder, tmp_path):
     for path in (tmp_path, tmp_path / "nothing", folder / "README.md"):
-        with pytest.raises(SpecificationError, match=r"holds no data set: there is no manifest\.json"):
+        with refused(SpecificationError, "manifest.json"):
             tb.datasets.open(path)
 
 
@@ -157,10 +158,10 @@ def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
     shutil.copytree(folder, some)
     data = tb.datasets.open(some)
     (some / "shard-000001.nc").unlink()
-    with pytest.raises(SpecificationError, match=r"shard-000001\.nc is gone: dataset generate makes it again"):
+    with refused(SpecificationError, "shard-000001.nc", "gone"):
         data.isel(record=9).load()
     (some / "shard-000002.nc").write_bytes(b"no NetCDF")
-    with pytest.raises(SpecificationError, match=r"shard-000002\.nc cannot be read, .*: run dataset verify"):
+    with refused(SpecificationError, "shard-000002.nc", "read"):
         data.isel(record=20).load()
     data.isel(record=3).load()
 

@@ -11,6 +11,7 @@ from scipy import stats
 
 import tactile_bayes as tb
 from helpers.data_sets import PLAIN, RICH, changed
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.shape_free_family import SHAPE_FREE
@@ -370,9 +371,7 @@ def test_draws_in_vain_are_counted_with_their_reasons():
 @pytest.mark.parametrize("count", [1, 3])
 def test_what_cannot_be_reached_is_given_up_with_the_counts(count):
     spec = {**FAR, "records": count, "contours": [{"family": "circle", "r": 0.5, "q": {"uniform": [1.2, 1.7]}}]}
-    with pytest.raises(
-        SpecificationError, match=r"record 0 was drawn 1000 times, .* \(1000 out of reach\): bring contours and pivots"
-    ):
+    with refused(SpecificationError, "record 0", "1000 times", "1000 out of reach"):
         generate_records(read_specification(spec), 0, count)
 
 
@@ -386,8 +385,7 @@ def test_what_is_no_contour_is_drawn_again():
 
 def test_what_is_hardly_ever_a_contour_is_given_up_with_the_familys_own_words():
     contour = {"family": "parabola", "a": {"normal": [-1.0, 1e-3]}, "q": 0.5}
-    rule = r"1000 no contour \(a must be positive, else the object is not strictly convex\)"
-    with pytest.raises(SpecificationError, match=rf"drawn 1000 times.* \({rule}\): change the law of that parameter"):
+    with refused(SpecificationError, "1000 times", "1000 no contour", "a must be positive"):
         generate_records(read_specification({**FAR, "contours": [contour]}), 0, 2)
 
 
@@ -395,9 +393,7 @@ def test_the_reasons_of_a_record_that_is_given_up_are_its_own():
     """Of sixty records only the last is hopeless, while others are often drawn again."""
     levels = {"each": [0.7] * 59 + [-0.4]}
     spec = {**FAR, "contours": [{"family": "circle", "r": {"uniform": [0.01, 0.8]}, "q": levels}]}
-    with pytest.raises(
-        SpecificationError, match=r"record 59 was drawn 1000 times, .* \(1000 [^,]*pivot[^,]*\): raise the"
-    ):
+    with pytest.raises(SpecificationError, match=r"record 59 .* 1000 times.* \(1000 [^,]*pivot[^,]*\)"):
         generate_records(read_specification(spec), 0, 60)
 
 
@@ -457,7 +453,7 @@ def test_sweeps_without_a_sample_in_contact_are_counted():
 def test_an_impossible_load_cell_names_itself():
     cell = {"force_resolution": {"uniform": [0.1, 1.0]}, "force_range": {"uniform": [0.9, 9.0]}}
     spec = {**PLAIN, "records": 400, "load_cell": cell}
-    with pytest.raises(SpecificationError, match="load_cell: the load cell's force_resolution is"):
+    with refused(SpecificationError, "load_cell", "force_resolution"):
         generate_records(read_specification(spec), 0, 400)
 
 
@@ -508,5 +504,5 @@ def test_another_seed_gives_other_numbers():
 
 
 def test_a_record_without_contour_is_refused():
-    with pytest.raises(ParameterError, match="attributes name no contour: take it from a data set, with truth=True"):
+    with refused(ParameterError, "contour", "truth=True"):
         contour_of(record(PLAIN, 0, truth=False))

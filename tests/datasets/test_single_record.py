@@ -8,6 +8,8 @@ import xarray as xr
 
 import tactile_bayes as tb
 from helpers.data_sets import PLAIN, RICH, changed
+from helpers.refusals import refused
+from tactile_bayes.checks import shown
 from tactile_bayes.datasets import contour_of, generate, read_specification, record
 from tactile_bayes.datasets.specification_text import toml_of
 from tactile_bayes.errors import ParameterError
@@ -113,7 +115,7 @@ def plain(tmp_path_factory):
 @pytest.mark.parametrize("index", [-1, 24, 10**9, 1.0, "1", None])
 def test_a_number_that_there_is_not_is_refused(index, plain):
     for source in (PLAIN, plain):
-        with pytest.raises(ParameterError, match=r"there is no record .*: they are numbered from 0 to 23"):
+        with refused(ParameterError, shown(index), "0 to 23"):
             record(source, index)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from helpers.data_sets import PLAIN
+from helpers.refusals import refused
 from tactile_bayes.datasets import generate, verify
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import read_manifest, write_manifest
@@ -43,7 +44,7 @@ def test_one_flipped_bit_anywhere_is_found(folder, name):
         damaged = bytearray(content)
         damaged[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(damaged)
-        with pytest.raises(SpecificationError, match=name.replace(".", r"\.")):
+        with refused(SpecificationError, name):
             verify(folder)
     path.write_bytes(content)
     verify(folder)
@@ -53,27 +54,20 @@ def test_one_flipped_bit_anywhere_is_found(folder, name):
 @pytest.mark.parametrize("cut", [lambda c: c[:-1], lambda c: c + b"\0", lambda c: b""], ids=["short", "long", "empty"])
 def test_another_length_is_found(folder, name, cut):
     (folder / name).write_bytes(cut((folder / name).read_bytes()))
-    with pytest.raises(SpecificationError, match=name.replace(".", r"\.")):
+    with refused(SpecificationError, name):
         verify(folder)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("shard-000001.nc", r"shard-000001\.nc is missing: dataset generate makes it again"),
-        ("README.md", r"README\.md is missing: dataset generate makes it again"),
-        ("manifest.json", r"holds no data set: there is no manifest\.json, but shards: put a copy of it back, or run"),
-    ],
-)
-def test_a_missing_file_is_found(folder, name, message):
+@pytest.mark.parametrize("name", ["shard-000001.nc", "README.md", "manifest.json"])
+def test_a_missing_file_is_found(folder, name):
     (folder / name).unlink()
-    with pytest.raises(SpecificationError, match=message):
+    with refused(SpecificationError, name):
         verify(folder)
 
 
 def test_a_shard_too_many_is_found(folder):
     shutil.copy(folder / "shard-000001.nc", folder / "shard-000003.nc")
-    with pytest.raises(SpecificationError, match=r"shard-000003\.nc is not in the manifest"):
+    with refused(SpecificationError, "shard-000003.nc", "manifest"):
         verify(folder)
 
 
@@ -97,7 +91,7 @@ def test_other_files_are_nobodys_business(folder):
 def test_an_edited_manifest_is_found(folder, edit):
     path = folder / "manifest.json"
     path.write_text(json.dumps(edit(json.loads(path.read_text())), indent=1, ensure_ascii=False) + "\n")
-    with pytest.raises(SpecificationError, match=r"manifest\.json is no"):
+    with refused(SpecificationError, "manifest.json"):
         verify(folder)
 
 
@@ -106,7 +100,7 @@ def test_a_damaged_manifest_comes_with_a_remedy(folder):
     for content in (path.read_text().replace('"seed": 7', '"seed": 8'), "no JSON", path.read_text()[:-30]):
         path.write_text(content)
         for act in (lambda: verify(folder), lambda: generate(PLAIN, folder, workers=1)):
-            with pytest.raises(SpecificationError, match="put a copy of it back, or run dataset generate with"):
+            with refused(SpecificationError, "manifest.json", "put a copy of it back"):
                 act()
 
 
@@ -119,7 +113,7 @@ def test_progress_is_told(folder):
 def test_a_specification_that_is_not_the_stated_one_is_found(folder):
     manifest = read_manifest(folder)
     write_manifest(type(manifest)(**{**vars(manifest), "specification_sha256": "0" * 64}), folder)
-    with pytest.raises(SpecificationError, match="specification is not the one that its checksum states"):
+    with refused(SpecificationError, "specification", "checksum"):
         verify(folder)
 
 
@@ -130,7 +124,7 @@ def test_a_manifest_of_another_format_says_so(folder):
     table = json.loads(path.read_text())
     table.pop("sha256")
     path.write_bytes(module._content(table | {"format": 99}))
-    with pytest.raises(SpecificationError, match="has format 99, and this version reads format"):
+    with refused(SpecificationError, "format 99"):
         verify(folder)
 
 
@@ -138,7 +132,7 @@ def test_what_is_not_complete_says_so(folder):
     manifest = read_manifest(folder)
     write_manifest(type(manifest)(**{**vars(manifest), "shards": manifest.shards[:2], "card_sha256": ""}), folder)
     (folder / "shard-000002.nc").unlink()
-    with pytest.raises(SpecificationError, match="has 16 of 24 records: run dataset generate again"):
+    with refused(SpecificationError, "16 of 24"):
         verify(folder)
 
 
@@ -152,20 +146,20 @@ def test_numbers_that_come_out_otherwise_are_found(folder, monkeypatch):
 
     monkeypatch.setattr("tactile_bayes.datasets.verification.generate_records", otherwise)
     verify(folder)
-    with pytest.raises(SpecificationError, match=r"shard-000000\.nc: truth_force_x comes out otherwise .* numpy \d"):
+    with pytest.raises(SpecificationError, match=r"shard-000000\.nc: truth_force_x .* numpy \d"):
         verify(folder, regenerate=1)
 
 
 @pytest.mark.parametrize("count", [-1, 1.5, "all"])
 def test_no_number_of_shards_is_refused(folder, count):
-    with pytest.raises(ParameterError, match=r"regenerate is .*: give a number of shards, 0 for none"):
+    with refused(ParameterError, regenerate=count):
         verify(folder, regenerate=count)
 
 
 @pytest.mark.parametrize("name", ["shard-000001.nc", "README.md"])
 def test_what_is_damaged_is_mended_as_the_refusal_says(folder, original, name):
     (folder / name).write_bytes(b"damaged")
-    with pytest.raises(SpecificationError, match="delete it, and dataset generate makes it again"):
+    with refused(SpecificationError, name, "delete it"):
         verify(folder)
     (folder / name).unlink()
     generate(PLAIN, folder, workers=1)
