@@ -471,7 +471,7 @@ def test_bad_arguments_are_told(noted, tmp_path, wrong):
     """Before there is a folder."""
     out = tmp_path / "out"
     (name,) = wrong
-    with refused(ParameterError, "the rod" if name == "rod" else name, shown(wrong[name])):
+    with refused(ParameterError, name, shown(wrong[name])):
         quickly(**({"out": None if name == "workers" else out} | wrong))
     assert not out.exists()
     assert noted == []
