@@ -482,7 +482,7 @@ def test_bad_arguments_are_told(noted, tmp_path, wrong):
         ({"nuisances": ["base"]}, ["base", "shifted together"]),
         ({"family": "cube", "priors": {}}, ["'cube'", "parabola"]),
         ({"load_cell": LoadCell()}, ["load cell", "noise"]),
-        ({"priors": {"b": stats.norm()}}, ["b", "a, noise_scale, q, x_c"]),
+        ({"priors": {"b": stats.norm()}}, ["b", "a, q, x_c, noise_scale"]),
         ({"world": World(priors={"friction": stats.norm()})}, ["world", "friction"]),
     ],
 )

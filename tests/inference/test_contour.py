@@ -27,8 +27,8 @@ from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference import contour_groups
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod

@@ -14,12 +14,13 @@ from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Question, _band_widths, expected_of
 from tactile_bayes.planning.design import design
 from tactile_bayes.planning.information import information
-from tactile_bayes.planning.knowledge import Knowledge, known_from_posterior, known_from_prior
+from tactile_bayes.planning.knowledge import COARSE, empty_record, known_from_posterior, known_from_prior
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.sweep import scan
 
@@ -42,29 +43,22 @@ def posterior():
     return infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=QUICK)
 
 
-def known(**options):
-    asked = {
-        "draws": 3,
-        "rng": np.random.default_rng(1),
-        "load_cell": None,
-        "rod": None,
-        "friction": 0.0,
-        "nuisances": (),
-        "priors": PRIORS,
-        "base": (0.0, 0.0),
-    }
-    return known_from_prior("parabola", **(asked | options))
+def known():
+    cell = usual_load_cell(Rod())
+    empty = empty_record([(0.0, 0.0)], COARSE, None, cell)
+    experiment = Experiment(empty, "parabola", cell, PRIORS, friction=0.0, nuisances=())
+    return known_from_prior(experiment, draws=3, rng=np.random.default_rng(1))
 
 
 def test_with_one_truth_it_is_the_information_of_its_record():
     """The same bounds as of a plan, whose loads are exact; these are interpolated, and their differences rougher."""
     told = known()
     point = np.array([0.5, 0.5, 0.0, 1.0])
-    one = Knowledge(told.family, point[None], 1e-9 * np.eye(4), (), None, told.load_cell, 0.0, (), dict(PRIORS))
+    one = replace(told, points=point[None], precision=1e-9 * np.eye(4))
     x = np.linspace(-0.5, 0.5, 11)
     found = expected_of((Question(one, (Candidate((0.0, 0.0), STEP),), x, 0.95, 0, 1), 0))
     angles = np.arange(np.radians(-30.0), np.radians(210.0), STEP)
-    plan = Plan(Parabola(0.5, q=0.5), load_cell=told.load_cell, drive_angles=angles, nuisances=[])
+    plan = Plan(Parabola(0.5, q=0.5), load_cell=told.experiment.load_cell, drive_angles=angles, nuisances=[])
     bounds = information(plan)
     slopes = np.stack([x**2, np.ones_like(x), -x * 2.0 * 0.5], axis=1)  # of a (x − x_c)² + q
     # Bounds are those without priors, of four parameters of which the noise is independent.
@@ -196,7 +190,7 @@ def test_in_metres_and_newtons_it_is_the_same():
 def test_a_posterior_is_known_by_its_own_rig(posterior):
     told = known_from_posterior(posterior, draws=5, rng=np.random.default_rng(1))
     assert told.bases == ((0.0, 0.0),)
-    assert told.load_cell.force_noise == CELL.force_noise
+    assert told.experiment.load_cell.force_noise == CELL.force_noise
     deviation = np.sqrt(np.diag(np.linalg.inv(told.precision)))
     samples = posterior["posterior"].to_dataset()
     np.testing.assert_allclose(

@@ -121,10 +121,12 @@ def task_of(options):
     return kept["task"]
 
 
-def test_an_outcome_comes_back_from_its_row():
+def test_an_outcome_comes_back_from_its_row(tmp_path):
     outcome = CellOutcome({"gap_width": 0.1 + 0.2, "posterior_gap_width": np.nan}, "ok")
-    row = json.loads(json.dumps(CELLS.encode(outcome), allow_nan=False))
-    back = CELLS.decode(row)
+    with module.open_results_store({}, tmp_path, CELLS) as ledger:
+        ledger.outcomes[0] = outcome
+    with module.open_results_store({}, tmp_path, CELLS) as ledger:
+        back = ledger.outcomes[0]
     assert back.message == "ok"
     assert back.numbers["gap_width"] == 0.1 + 0.2
     assert np.isnan(back.numbers["posterior_gap_width"])

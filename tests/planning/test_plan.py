@@ -13,10 +13,11 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, paper_profile
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.experiment import usual_load_cell
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
-from tactile_bayes.planning.plan import Plan, usual_load_cell
+from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS
 
 PROFILE = paper_profile("II", q=0.5)
