@@ -15,7 +15,6 @@ from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import to_dimensionless
 from tactile_bayes.runs import contour as module
 from tactile_bayes.runs.contour import analyse

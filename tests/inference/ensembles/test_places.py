@@ -96,7 +96,14 @@ def funnel(x):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("log_probability", "steps"),
-    [(banana, 60), (banana, 250), (uneven, 60), (uneven, 250), (funnel, 60), (funnel, 150)],  # a funnel is walked through in 250
+    [
+        (banana, 60),
+        (banana, 250),
+        (uneven, 60),
+        (uneven, 250),
+        (funnel, 60),
+        (funnel, 150),
+    ],  # a funnel is walked through in 250
 )
 def test_a_slow_run_is_not_taken_for_several_modes(log_probability, steps):
     """One mode each, hard to walk through, and ensembles that start as small clusters far from one another."""
