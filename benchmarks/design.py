@@ -18,9 +18,9 @@ import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import TactileBayesError
 from tactile_bayes.inference.ensembles import SamplerSettings
-from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.planning.candidate import measured_of
-from tactile_bayes.planning.knowledge import known_from_prior
+from tactile_bayes.planning.knowledge import COARSE, empty_record, known_from_prior
 from tactile_bayes.tasks import run_tasks
 
 PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.35, 0.3), "x_c": stats.norm(0.0, 0.1)}
@@ -76,21 +76,13 @@ def _spread(ratio: Floats) -> str:
 
 def compared(number: int) -> Outcome:
     rng = np.random.default_rng([2031, number])
-    known = known_from_prior(
-        "parabola",
-        draws=1,
-        rng=rng,
-        load_cell=None,
-        rod=None,
-        friction=0.0,
-        nuisances=STANDARD,
-        priors=PRIORS,
-        base=(0.0, 0.0),
-    )
+    cell = usual_load_cell(tb.Rod())
+    empty = empty_record([(0.0, 0.0)], COARSE, None, cell)
+    known = known_from_prior(Experiment(empty, "parabola", cell, PRIORS, friction=0.0), draws=1, rng=rng)
     point = known.points[0]
     nan = float("nan")
     try:
-        first = measured_of(known.model(known.blank([(0.0, 0.0)], STEP)), point, rng)
+        first = measured_of(known.model_from([(0.0, 0.0)], STEP), point, rng)
         posterior = _inferred(first, number)
         gap = tb.gap(posterior)
         x = np.linspace(*_span(posterior), PLACES)
@@ -105,7 +97,7 @@ def compared(number: int) -> Outcome:
         }
         widths = {"first": _width(posterior, x)}
         for name, base in bases.items():
-            second = measured_of(known.model(known.blank([base], STEP)), point, np.random.default_rng([2032, number]))
+            second = measured_of(known.model_from([base], STEP), point, np.random.default_rng([2032, number]))
             both = xr.concat([first, second.assign(sweep=second.sweep + 2)], "sample", combine_attrs="override")
             widths[name] = _width(_inferred(both, number), x)
     except TactileBayesError as error:

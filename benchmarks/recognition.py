@@ -20,8 +20,8 @@ from scipy import stats
 import tactile_bayes as tb
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Circle, Contour, Joined
-from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.tasks import run_tasks
 
@@ -142,9 +142,9 @@ def _drawn(family: str, cell: tb.LoadCell, rng: np.random.Generator) -> Contour:
     """From the prior, within reach."""
     record = tb.scan(tb.contours.Parabola(0.5, 0.5), drive_angles=ANGLES).record
     priors = {**matched_priors(family, 1.0), **VERTEX}
-    problem = contour_problem(record, Assumptions(family, cell, priors, friction=0.0, nuisances=NUISANCES))
-    points, _ = problem.model.draw_prior(rng, 1)
-    return problem.model.contours(points).take(0)
+    model = Experiment(record, family, cell, priors, friction=0.0, nuisances=NUISANCES).model
+    points, _ = model.draw_prior(rng, 1)
+    return model.contours(points).take(0)
 
 
 def _neither(rng: np.random.Generator) -> Contour:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from tactile_bayes.cli import app
-from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw, paper_profile
-from tactile_bayes.errors import ContourError, ParameterError, ReachError, RecordError
+from helpers import commands
+from helpers.refusals import refused
+from tactile_bayes.contours import Ellipse, Parabola
+from tactile_bayes.errors import ContourError, ReachError, RecordError
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import present_channels, read_record, write_record
 from tactile_bayes.sweep import scan
@@ -55,66 +54,58 @@ FIRST_ROW = 9
 MISTAKES = {
     "a missing column": (
         lambda rows: (NAMES[:-1], without_last(rows)),
-        "there is no column 'force_y' (columns: sweep, direction, base_x, base_y, drive_angle, holding_moment, "
-        "force_x): add it, or say what stands for it, columns={'force_y': 'NAME[UNIT]'}, on the command line --column "
-        "'force_y=NAME[UNIT]', or declare the channel missing, with an empty column or missing=('force_y',), on the "
-        "command line --missing force_y",
+        ["column 'force_y'", "columns={'force_y': 'NAME[UNIT]'}", "--column 'force_y=NAME[UNIT]'", "--missing force_y"],
     ),
     "a misspelt column": (
         lambda rows: ([name.replace("drive_angle", "drive_angel") for name in NAMES], rows),
-        "there is no column 'drive_angle', but a column 'drive_angel': did you mean 'drive_angle'? Rename it, or "
-        "say what stands for it, columns={'drive_angle': 'drive_angel'}, on the command line --column "
-        "drive_angle=drive_angel",
+        ["column 'drive_angel'", "columns={'drive_angle': 'drive_angel'}", "--column drive_angle=drive_angel"],
     ),
     "text in a row": (
         lambda rows: (NAMES, edited(rows, 3, "force_x", "overload")),
-        f"line {FIRST_ROW + 3}, column 'force_x': 'overload' is not a number: correct it, or remove the row",
+        [f"line {FIRST_ROW + 3}, column 'force_x'", "'overload'"],
     ),
     "NaN in a row": (
         lambda rows: (NAMES, edited(rows, 5, "holding_moment", "nan")),
-        f"line {FIRST_ROW + 5}, column 'holding_moment': the value is missing (nan): give a finite number, remove the "
-        "row, or empty the whole column if the channel is missing",
+        [f"line {FIRST_ROW + 5}, column 'holding_moment'", "nan"],
     ),
     "an empty cell": (
         lambda rows: (NAMES, edited(rows, 5, "drive_angle", "")),
-        f"line {FIRST_ROW + 5}, column 'drive_angle': the value is missing (nan): give a finite number, remove the row",
+        [f"line {FIRST_ROW + 5}, column 'drive_angle'", "missing"],
     ),
     "a row too short": (
         lambda rows: (NAMES, [*rows[:4], rows[4][:-1], *rows[5:]]),
-        f"line {FIRST_ROW + 4}: there are 7 cells in 8 columns ({', '.join(NAMES)}): write one per column, with a "
-        "point in decimals",
+        [f"line {FIRST_ROW + 4}", "7 cells", "8 columns", ", ".join(NAMES)],
     ),
     "angles in degrees": (
         lambda rows: (NAMES, mapped(rows, "drive_angle", lambda cell: f"{math.degrees(float(cell)):.4f}")),
-        "is more than a turn (2π), so the angles look like degrees: convert the column to radians, with numpy.radians "
-        "or times 0.017453292519943295",
+        ["degrees", "numpy.radians", "0.017453292519943295"],
     ),
     "a decreasing sweep labelled forward": (
         lambda rows: (NAMES, mapped(rows, "direction", lambda cell: "forward")),
-        "sweep 1 is labelled 'forward', but its drive angle decreases, from ",
+        ["sweep 1", "'forward'", "decreases"],
     ),
     "two strokes in one sweep": (
         lambda rows: (NAMES, mapped(rows, "sweep", lambda cell: "0")),
-        f"sweep 0 mixes two values of 'direction', 'forward' (line {FIRST_ROW}) and 'backward' (line ",
+        ["sweep 0", "'direction'", f"'forward' (line {FIRST_ROW})", "'backward' (line"],
     ),
     "no load at all": (
         lambda rows: (NAMES, [[*cells[:5], "", "", ""] for cells in rows]),
-        "every load channel is empty: a record needs measurements of at least one of holding_moment, force_x, force_y",
+        ["holding_moment, force_x, force_y"],
     ),
-    "no samples": (lambda rows: (NAMES, []), "there are no samples: give at least one row below the column names"),
+    "no samples": (lambda rows: (NAMES, []), ["no samples"]),
 }
 
 
-@pytest.mark.parametrize(("mistake", "message"), MISTAKES.values(), ids=MISTAKES)
-def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, message):
+@pytest.mark.parametrize(("mistake", "named"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, named):
     """By the library as an error, by the command as a line on stderr and exit code 2: the same words."""
     header, rows = table
     names, rows = mistake(rows)
     path = written(tmp_path / "record.csv", header, names, rows)
-    with pytest.raises(RecordError, match=re.escape(message)) as caught:
+    with refused(RecordError, *named) as caught:
         read_record(path)
     assert str(caught.value).startswith(f"{path}: ")
-    result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run")])
+    result = commands.call("infer", path, "--out", tmp_path / "run")
     assert (result.exit_code, result.stdout) == (2, "")
     assert result.stderr == f"tactile-bayes: {caught.value}\n"
     assert not (tmp_path / "run").exists()
@@ -129,13 +120,13 @@ def test_semicolons_and_decimal_commas_are_read_but_not_commas_for_both(table, t
     path.write_text("\n".join([*header, ",".join(NAMES), *map(",".join, rows)]), encoding="utf-8")
     assert record.identical(read_record(path))
     path.write_text("\n".join([*header, ",".join(NAMES), *(",".join(cells).replace(".", ",") for cells in rows)]))
-    with pytest.raises(RecordError, match=f"line {FIRST_ROW}: there are 1[0-9] cells in 8 columns .*with a point in"):
+    with refused(RecordError, f"line {FIRST_ROW}", "8 columns"):
         read_record(path)
 
 
 def test_si_without_a_rod_says_how_to_state_one(table, tmp_path):
     path = written(tmp_path / "record.csv", ["# units: SI"], NAMES, table[1])
-    result = CliRunner().invoke(app, ["infer", str(path), "--out", str(tmp_path / "run")])
+    result = commands.call("infer", path, "--out", tmp_path / "run")
     assert result.exit_code == 2
     assert "the record is SI, but rod_length and rod_flexural_rigidity of its rod are not stated: give " in (
         result.stderr
@@ -155,91 +146,45 @@ def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
         path = written(tmp_path / "record.csv", header, NAMES, mapped(rows, "force_y", lambda cell: ""))
         options = []
     assert present_channels(read_record(path, missing=options[1:])) == ("holding_moment", "force_x")
-    result = CliRunner().invoke(
-        app, ["infer", str(path), "--out", str(tmp_path / "run"), "-q", "--as-stated", *options]
-    )
+    result = commands.call("infer", path, "--out", tmp_path / "run", "-q", "--as-stated", *options)
     assert result.exit_code == 0, result.output
     assert "No contact points: Step 2 needs all three load channels." in result.stdout
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: Rod(True, 1.0), "the rod's length is True: give a positive number [m]"),
-        (lambda: Rod(1.0, True), "the rod's flexural_rigidity is True: give a positive number [N m²]"),
-        (lambda: Rod(1.0, 1.0, False), "the rod's diameter is False: give zero or a positive number [m]"),
-        (lambda: Rod(elastic_strain=True), "the rod's elastic strain is True: give a positive number, or none"),
-    ],
-)
-def test_true_is_no_number_of_a_rod(build, message):
-    with pytest.raises(ParameterError, match=re.escape(message)):
-        build()
 
 
 # --- Contours -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("contour", "base", "rod", "message"),
+    ("contour", "base", "rod", "named"),
     [
-        (
-            Parabola(0.5, 1.25),
-            (0.0, 0.0),
-            None,
-            "the contour is out of reach: its nearest point is 1.25 from the pivot at (0, 0), and the rod is 1 long",
-        ),
-        (
-            Parabola(2.5, 0.5),
-            (0.0, 0.1),
-            Rod(0.2, 2.4e-3),
-            "the contour is out of reach: its nearest point is 0.4 from the pivot at (0, 0.1), and the rod is 0.2 long",
-        ),
+        (Parabola(0.5, 1.25), (0.0, 0.0), None, ["1.25 from the pivot", "(0, 0)", "1 long"]),
+        (Parabola(2.5, 0.5), (0.0, 0.1), Rod(0.2, 2.4e-3), ["0.4 from the pivot", "(0, 0.1)", "0.2 long"]),
     ],
 )
-def test_a_contour_out_of_reach_says_how_far_and_how_long(contour, base, rod, message):
-    with pytest.raises(ReachError, match=re.escape(message)):
+def test_a_contour_out_of_reach_says_how_far_and_how_long(contour, base, rod, named):
+    with refused(ReachError, "out of reach", *named):
         scan(contour, base=base, rod=rod)
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_a_contour_that_is_hardly_touched_is_refused(direction):
-    with pytest.raises(ReachError, match="rounding hides where contact ends"):
+    with refused(ReachError, "rounding"):
         scan(Ellipse(0.25, 8e5, 1.0 - 2e-11), direction=direction, friction=0.3)
 
 
 def test_a_contour_at_the_end_of_reach_but_for_rounding_is_out_of_it():
-    with pytest.raises(ReachError, match="out of reach"):
+    with refused(ReachError, "out of reach"):
         scan(Parabola(2.0, np.nextafter(1.0, 0.0)))
 
 
 @pytest.mark.parametrize(
-    ("q", "base", "message"),
+    ("q", "base", "named"),
     [
-        (
-            -0.2,
-            (0.0, 0.0),
-            "the contour cuts the base: at x = 0 it is at y = -0.2, not above the pivot at y = 0; raise",
-        ),
-        (0.3, (1.0, 1.0), "the contour cuts the base: at x = 1 it is at y = 0.8, not above the pivot at y = 1; raise"),
-        (0.0, (0.0, 0.0), "the contour cuts the base: at x = 0 it is at y = 0, not above the pivot at y = 0; raise"),
+        (-0.2, (0.0, 0.0), ["x = 0", "y = -0.2", "y = 0"]),
+        (0.3, (1.0, 1.0), ["x = 1", "y = 0.8", "y = 1"]),
+        (0.0, (0.0, 0.0), ["x = 0", "y = 0"]),
     ],
 )
-def test_a_contour_that_cuts_the_base_is_refused(q, base, message):
-    with pytest.raises(ContourError, match=re.escape(message)):
+def test_a_contour_that_cuts_the_base_is_refused(q, base, named):
+    with refused(ContourError, "base", *named):
         scan(Parabola(0.5, q), base=base)
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: Parabola(-0.5, 0.5), "Parabola: a must be positive, else the object is not strictly convex; found a"),
-        (lambda: Parabola(0.0, 0.5), "Parabola: a must be positive, else the object is not strictly convex; found a"),
-        (lambda: Parabola(0.5, np.nan), "Parabola: q and x_c must be finite; found q = nan"),
-        (lambda: Circle(-1.0, 0.5), "r must be positive"),
-        (lambda: PowerLaw(1.0, 1.0, 0.5), "n"),
-        (lambda: paper_profile("V", q=0.3), "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
-    ],
-)
-def test_what_is_not_strictly_convex_is_refused(build, message):
-    with pytest.raises(ContourError, match=re.escape(message)):
-        build()

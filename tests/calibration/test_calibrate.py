@@ -22,7 +22,6 @@ from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.world import World
-from tactile_bayes.checks import shown
 from tactile_bayes.errors import CalibrationError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.ensembles import SamplerSettings, moves
@@ -470,9 +469,8 @@ def test_what_an_experiment_is_follows_from_its_words():
 def test_bad_arguments_are_told(noted, tmp_path, wrong):
     """Before there is a folder."""
     out = tmp_path / "out"
-    (name,) = wrong
-    with refused(ParameterError, "the rod" if name == "rod" else name, shown(wrong[name])):
-        quickly(**({"out": None if name == "workers" else out} | wrong))
+    with refused(ParameterError, **wrong):
+        quickly(**({"out": None if "workers" in wrong else out} | wrong))
     assert not out.exists()
     assert noted == []
 
@@ -484,7 +482,7 @@ def test_bad_arguments_are_told(noted, tmp_path, wrong):
         ({"nuisances": ["base"]}, ["base", "shifted together"]),
         ({"family": "cube", "priors": {}}, ["'cube'", "parabola"]),
         ({"load_cell": LoadCell()}, ["load cell", "noise"]),
-        ({"priors": {"b": stats.norm()}}, ["b", "a, noise_scale, q, x_c"]),
+        ({"priors": {"b": stats.norm()}}, ["b", "a, q, x_c, noise_scale"]),
         ({"world": World(priors={"friction": stats.norm()})}, ["world", "friction"]),
     ],
 )

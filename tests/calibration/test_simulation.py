@@ -304,7 +304,7 @@ def test_truths_have_the_distribution_of_the_prior():
     asked = experiment(priors=PRIORS | {"x_c": stats.uniform(-0.1, 0.2)})
     rng = np.random.default_rng(4)
     truths = [simulate(asked, rng).truth for _ in range(12)]
-    for name, prior in asked.priors.items():
+    for name, prior in asked.assumed.priors.items():
         assert stats.kstest([truth[name] for truth in truths], prior.cdf).pvalue > 1e-6
 
 

@@ -136,7 +136,7 @@ def test_a_record_too_short_of_steps_is_said_not_to_have_converged(record, tmp_p
 def test_a_run_may_be_given_a_time(record, tmp_path):
     of_many = ("--family", "parabola/power-law")  # parameters, which take more than one look
     result = call("infer", record, "--out", tmp_path / "run", *of_many, "--max-seconds", 0.1, "--quiet")
-    assert result.stdout.startswith("NOT CONVERGED, the time allowed ran out")
+    assert any(line.startswith("NOT CONVERGED, the time allowed ran out") for line in result.stdout.splitlines())
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, "demo", "dataset generate", "dataset verify", "dataset record"])
@@ -280,16 +280,16 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--length", "0.1"], "--length and --flexural-rigidity go together: give both, or neither"),
-        (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity go together: give both, or neither"),
-        (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity beside it: give all three"),
-        (["--length", "-1", "--flexural-rigidity", "1"], "the rod's length is -1.0: give a positive number [m]"),
+        (["--length", "0.1"], "--length and --flexural-rigidity go together"),
+        (["--flexural-rigidity", "0.1"], "--length and --flexural-rigidity go together"),
+        (["--diameter", "0.001"], "--diameter needs --length and --flexural-rigidity beside it"),
+        (["--length", "-1", "--flexural-rigidity", "1"], "the rod's length is -1.0"),
         (["--length", "0.3", "--flexural-rigidity", "1"], "but Rod(length=0.3, flexural_rigidity=1.0, diameter=0.0) w"),
-        (["--family", "blob"], "there is no family 'blob': choose parabola, circle, ellipse, power-law, one"),
+        (["--family", "blob"], "there is no family 'blob'"),
         (["--probability", "1"], "probability is 1.0: give a number between 0 and 1, like 0.95"),
-        (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise as well, above zero, or leave"),
-        (["--moment-noise", "0.1"], "force_x is measured too: give --force-noise as well, above zero, or leave both"),
-        (["--force-noise", "-1"], "the load cell's force_noise is -1.0: give a standard deviation, zero or positive"),
+        (["--force-noise", "0.1"], "holding_moment is measured too: give --moment-noise"),
+        (["--moment-noise", "0.1"], "force_x is measured too: give --force-noise"),
+        (["--force-noise", "-1"], "the load cell's force_noise is -1.0"),
         (["--missing", "force_z"], "'force_z' is no channel; the channels are holding_moment, force_x, force_y"),
         (["--missing", "force_x"], "column 'force_x' has values, but is declared missing"),
         (["--column", "force_x"], "--column force_x: write COLUMN=NAME[UNIT], like force_x=Fx[mN]"),
@@ -298,7 +298,7 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
         (["--column", "force_x=Fx[mN]"], "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
         (
             ["--column", "force_x=force_x[mm]"],
-            "column 'force_x' is in [N], but [mm] is given for it: leave out the one",
+            "column 'force_x' is in [N], but [mm] is given for it",
         ),
         (["--split-sweeps"], "column 'sweep' is there already: do without split_sweeps, or remove the column"),
     ],

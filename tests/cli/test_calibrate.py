@@ -5,15 +5,15 @@ from __future__ import annotations
 import importlib
 import json
 import signal
+from functools import partial
 
 import pytest
 import typer
 import xarray as xr
-from typer.testing import CliRunner
 
+from helpers import commands
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
-from tactile_bayes.cli.app import app
 from tactile_bayes.cli.interrupts import resumable
 
 making = importlib.import_module("tactile_bayes.calibration.replicate")
@@ -23,8 +23,7 @@ QUICK = ("--as-stated", "--drive-step", "8", "--workers", "1", "-q")
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 
-def call(*words):
-    return CliRunner().invoke(app, ["calibrate", *map(str, words)])
+call = partial(commands.call, "calibrate")
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +139,7 @@ def test_a_lost_replicate_is_said_to_be(tmp_path, monkeypatch):
 def test_debug_lets_its_error_through(tmp_path, monkeypatch, words):
     monkeypatch.setattr(making, "sampled", fail)
     options = ("--out", tmp_path, "--replicate", 3, *QUICK)
-    result = CliRunner().invoke(app, [*words, *map(str, options)])
+    result = commands.call(*words, *options)
     assert result.exit_code == 1
     assert "Traceback (most recent call last)" in result.stderr
     assert "in make_replicate" in result.stderr

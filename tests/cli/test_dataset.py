@@ -9,16 +9,17 @@ import subprocess
 import sys
 import time
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
 import tactile_bayes as tb
+from helpers import commands
+from helpers.commands import assert_refused
 from helpers.tasks import alive, wait_until
-from tactile_bayes.cli import app
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.datasets.specification import left_out
 from tactile_bayes.record import LOAD_CELL_UNITS
@@ -45,18 +46,7 @@ moment_noise = 0.02
 """
 
 
-def call(*arguments):
-    return CliRunner().invoke(app, ["dataset", *map(str, arguments)])
-
-
-def assert_refused(result, message):
-    """Exit code 2, a line on stderr with these words, and nothing else."""
-    assert result.exit_code == 2, result.output
-    assert isinstance(result.exception, SystemExit)
-    assert result.stdout == ""
-    assert message in result.stderr
-    assert len(result.stderr.splitlines()) == 1
-    assert result.stderr.startswith("tactile-bayes: ")
+call = partial(commands.call, "dataset")
 
 
 @pytest.fixture

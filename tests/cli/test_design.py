@@ -7,10 +7,9 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
+from helpers import commands
 from helpers.refusals import refused
-from tactile_bayes.cli.app import app
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting import design as draw
 
@@ -20,7 +19,7 @@ ASKED = ["design", "--base", "0,0", "--base", "0.2,0", "--drive-step", "6", "--d
 
 
 def run(*arguments):
-    return CliRunner().invoke(app, [*ASKED, "--workers", "1", *map(str, arguments)])
+    return commands.call(*ASKED, "--workers", 1, *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +56,7 @@ def test_json_for_scripts(tmp_path):
         (["--force-noise", "0.1"], "--force-noise and --moment-noise go together"),
         (["--family", "square"], "there is no family 'square'"),
         (["nowhere.nc"], "there is no file nowhere.nc"),
-        (["nowhere"], "there is no folder nowhere: give the folder that `tactile-bayes infer RECORD --out FOLDER` has"),
+        (["nowhere"], "there is no folder nowhere"),
         (["."], ". holds no posterior.nc"),
     ],
 )

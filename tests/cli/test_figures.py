@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import matplotlib as mpl
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
+
+from helpers import commands
 
 mpl.use("Agg")
 
-from tactile_bayes.cli.app import app
 from tactile_bayes.paper_figures import caption
 
 QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5", "--rods", "3"]
@@ -19,8 +20,7 @@ QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5",
 pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, ["figures", *map(str, arguments)])
+run = partial(commands.call, "figures")
 
 
 @pytest.fixture(scope="module")

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import json
 import shlex
+from functools import partial
 from typing import get_type_hints
 
 import pytest
-from typer.testing import CliRunner
 
+from helpers import commands
 from helpers.report_pages import Page, analysed_quickly, coarse_record
 from tactile_bayes.cli import report as report_command
-from tactile_bayes.cli.app import app
 from tactile_bayes.cli.command import Output
 from tactile_bayes.record import write_record
 
-
-def call(*arguments):
-    return CliRunner().invoke(app, ["report", *map(str, arguments)])
+call = partial(commands.call, "report")
 
 
 @pytest.mark.usefixtures("quick")
@@ -25,7 +23,7 @@ def test_infer_states_its_file_and_its_words(tmp_path):
     path, out = tmp_path / "my record.csv", tmp_path / "run"
     write_record(coarse_record(), path)
     words = ["infer", str(path), "--as-stated", "--out", str(out), "--quiet"]
-    assert CliRunner().invoke(app, words).exit_code == 0
+    assert commands.call(*words).exit_code == 0
     assert call(out).exit_code == 0
     page = Page((out / "report.html").read_text(encoding="utf-8"))
     assert page.texts["code"][0] == shlex.join(["tactile-bayes", *words])
@@ -76,9 +74,9 @@ def test_json_for_scripts(folder, tmp_path, monkeypatch):
 
 def test_what_is_wrong_is_said_in_a_line(folder, tmp_path):
     for arguments, message in (
-        ([tmp_path / "nowhere"], f"there is no folder {tmp_path / 'nowhere'}: give the folder that"),
-        ([tmp_path], f"{tmp_path} holds no posterior.nc: give the folder that"),
-        ([folder, "--compare", tmp_path], f"{tmp_path} holds no comparison.nc: give --compare the folder that"),
+        ([tmp_path / "nowhere"], f"there is no folder {tmp_path / 'nowhere'}"),
+        ([tmp_path], f"{tmp_path} holds no posterior.nc"),
+        ([folder, "--compare", tmp_path], f"{tmp_path} holds no comparison.nc"),
         ([folder, "--out", tmp_path / "no" / "page.html"], f"{tmp_path / 'no'}: No such file or directory"),
     ):
         result = call(*arguments)

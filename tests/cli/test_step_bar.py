@@ -8,10 +8,8 @@ import re
 import sys
 from contextlib import contextmanager, nullcontext, suppress
 
-from typer.testing import CliRunner
-
+from helpers import commands
 from helpers.report_pages import analysed_quickly, coarse_record
-from tactile_bayes.cli.app import app
 from tactile_bayes.cli.task_bar import step_bar
 from tactile_bayes.record import write_record
 
@@ -81,6 +79,6 @@ def _steps_shown(monkeypatch, module, words):
     monkeypatch.setattr(
         f"tactile_bayes.cli.{module}.step_bar", lambda quiet: nullcontext(lambda *step: steps.append(step))
     )
-    result = CliRunner().invoke(app, words)
+    result = commands.call(*words)
     assert result.exit_code == 0, result.output
     return steps

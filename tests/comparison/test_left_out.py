@@ -10,8 +10,9 @@ from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.comparison.left_out import predicted_samples
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour import sampled
-from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
+from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 
 SETTINGS = SamplerSettings(ensembles=2, walkers=20, min_ess=250, max_r_hat=1.05)
@@ -19,7 +20,7 @@ SETTINGS = SamplerSettings(ensembles=2, walkers=20, min_ess=250, max_r_hat=1.05)
 
 def problem_of(cell=CELL):
     measured = cell.measure(swept(Parabola(0.5, 0.5), step=0.12), seed=4)
-    return contour_problem(measured, Assumptions("parabola", cell, friction=0.0, nuisances=()))
+    return contour_problem(Experiment(measured, "parabola", cell, friction=0.0, nuisances=()))
 
 
 @pytest.fixture(scope="module")

@@ -134,15 +134,15 @@ def graph(g, slope, curvature, **members):
 WRONG = {
     "a wave": (
         graph(lambda x, k: k + np.sin(x), lambda x, k: np.cos(x), lambda x, k: -np.sin(x)),
-        r"not strictly convex.*slope angle falls from 0\.785\d* to -0\.7\d* rad, from x = ",
+        r"convex.* 0\.785\d* to -0\.7\d* rad, from x = ",
     ),
     "a slope that is none": (
         graph(lambda x, k: k * x**2, lambda x, k: k * x, lambda x, k: k + 0 * x),
-        r"g' is not the derivative of g: from x = .* they differ by",
+        r"g' .* g: from x = ",
     ),
     "a curvature that is none": (
         graph(lambda x, k: k * x**2, lambda x, k: 2 * k * x, lambda x, k: k + 0 * x),
-        r"g'' is not the derivative of g': from x = .* they differ by",
+        r"g'' .* g': from x = ",
     ),
     "a jump": (
         graph(
@@ -150,7 +150,7 @@ WRONG = {
             lambda x, k: np.where(x < 0, k, 2 * k) * 2 * x,
             lambda x, k: np.where(x < 0, k, 2 * k) * 2,
         ),
-        r"g'' jumps at x ≈ 0: name the parameter there in `knots`",
+        r"g'' jumps at x ≈ 0: .*`knots`",
     ),
     "a flat bottom": (
         graph(
@@ -158,7 +158,7 @@ WRONG = {
             lambda x, k: 4 * k * np.sign(x) * np.maximum(np.abs(x) - 0.5, 0.0) ** 3,
             lambda x, k: 12 * k * np.maximum(np.abs(x) - 0.5, 0.0) ** 2,
         ),
-        r"it is straight from x = -0\.4\d* to -0\.\d*",
+        r"straight from x = -0\.4\d* to -0\.\d*",
     ),
     "no numbers": (
         graph(lambda x, k: k * x**2 + 0 * np.sqrt(x + 1), lambda x, k: 2 * k * x, lambda x, k: 2 * k),
@@ -166,7 +166,7 @@ WRONG = {
     ),
     "no arrays": (
         graph(lambda x, k: k * math.cosh(x), lambda x, k: k * math.sinh(x), lambda x, k: k * math.cosh(x)),
-        r"its formulas do not work on arrays",
+        "arrays",
     ),
     "a domain upside down": (
         graph(
@@ -175,7 +175,7 @@ WRONG = {
             lambda x, k: 2 * k,
             domain=property(lambda self: (np.asarray(1.0), np.asarray(-1.0))),
         ),
-        r"its domain is .*the first must be the smaller",
+        "domain",
     ),
     "another height": (
         graph(
@@ -184,7 +184,7 @@ WRONG = {
             lambda x, k: 2 * k,
             height=lambda self, x: self.k * np.asarray(x),
         ),
-        r"the height at x is .* at x = .*, not",
+        r"height .* at x = ",
     ),
     "another slope": (
         graph(
@@ -193,7 +193,7 @@ WRONG = {
             lambda x, k: 2 * k,
             parameter_of_slope=lambda self, slope_angle: np.tan(slope_angle) / self.k,
         ),
-        r"the slope angle that parameter_of_slope finds is .* at x = .*, not",
+        r"parameter_of_slope .* at x = ",
     ),
     "other contours": (
         graph(
@@ -202,7 +202,7 @@ WRONG = {
             lambda x, k: 2 * k,
             broadcast_to=lambda self, shape: type(self)(np.full(shape, 0.4)),
         ),
-        r"picked by broadcast_to and take it is at y = .*, not ",
+        r"broadcast_to .* y = ",
     ),
 }
 

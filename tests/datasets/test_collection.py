@@ -168,7 +168,7 @@ def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("spec", [PLAIN, RICH, changed(PLAIN, contours=[
-    {"family": "shape-free", "radius": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": 0.5}])])  # fmt: skip
+    {"family": "shape-free", "r": 0.8, "amplitude": 0.1, "length_scale": 1.5, "q": 0.5}])])  # fmt: skip
 def test_files_are_as_xarray_would_write_them(spec, tmp_path):
     """Up to the order in which HDF5 lists them: read back, both are the same, in every name, number and attribute."""
     tb.datasets.generate(changed(spec, records=3, shard_records=3), tmp_path, workers=1)

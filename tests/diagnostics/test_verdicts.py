@@ -8,14 +8,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from helpers.predicted_records import CELL, ideal, predicted, with_readings
-from tactile_bayes.contours import paper_profile
+from helpers.predicted_records import ideal, predicted, taken_for_a_parabola, with_readings
 from tactile_bayes.diagnostics.verdicts import verdicts
-from tactile_bayes.inference.contour import infer_contour
-from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.load_cell import LoadCell, RandomWalk
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.sweep import scan
 
 
 def changed(tree, group, **values):
@@ -37,9 +33,7 @@ def test_of_a_good_result_all_is_well():
 
 
 def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
-    measured = CELL.measure(scan(paper_profile("IV", q=0.5), drive_step=0.1).record, seed=1)
-    short = SamplerSettings(ensembles=2, walkers=26, max_steps=40)
-    found = verdicts(infer_contour(measured, load_cell=CELL, nuisances=[], seed=1, settings=short))
+    found = verdicts(taken_for_a_parabola("IV"))
     assert re.match(
         "The family parabola and the rig as assumed do not describe the record: none of [0-9]+ records that the "
         "posterior predicts is so far off. Worst is (holding_moment|force_x|force_y), whose ",
@@ -50,7 +44,7 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
         "compare), or infer more of the rig (--nuisance friction, gain, drift, lever, backlash, "
         "suspension_compliance); a rod that is not straight or not uniform looks like this, too."
     )
-    assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 40 steps")
+    assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 60 steps")
     assert found[2].startswith("The noise is ")
     assert found[2].endswith(" as stated: the rest is misfit, no noise.")
 

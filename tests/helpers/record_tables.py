@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
-import pytest
 
-from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rod import Rod
 
 WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=0.7e-3)
@@ -34,8 +30,3 @@ def edited(name, sample, value):
     cells = list(columns()[name])
     cells[sample] = value
     return columns(**{name: cells})
-
-
-def refused(message):
-    """Expect a RecordError with these words in it."""
-    return pytest.raises(RecordError, match=re.escape(message))

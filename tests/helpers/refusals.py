@@ -12,7 +12,7 @@ _NO_LETTER = r"(?!(?<=\w)\w)"
 """A place that is not inside a word or a number."""
 
 
-def refused(error, *named, **arguments):
+def refused(error, /, *named, **arguments):
     """Expect an error of this kind that names all of these, and each argument with its value."""
     words = [*map(str, named), *arguments, *map(shown, arguments.values())]
     each = "".join(f"(?=.*{_NO_LETTER}{re.escape(word)}{_NO_LETTER})" for word in words)

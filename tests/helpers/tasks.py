@@ -64,7 +64,8 @@ def alive(pid):
         return False
 
 
-def wait_until(condition, seconds=20.0):
+def wait_until(condition, seconds=120.0):
+    """Time enough for processes that begin on a machine that others use, too; what hangs fails."""
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:

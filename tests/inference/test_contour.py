@@ -21,13 +21,14 @@ from helpers.contour_posteriors import (
     swept,
     without,
 )
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError, ReachError
 from tactile_bayes.inference import contour_groups
 from tactile_bayes.inference.contour import contours_of, infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
@@ -314,28 +315,26 @@ def test_priors_of_which_little_is_within_reach(monkeypatch):
     assert result["prior"].attrs["share_within_reach"] < 0.01
 
 
-def test_what_cannot_be_is_refused():
-    record = coarse()
-    with pytest.raises(ParameterError, match="a prior of b, which is no parameter: there are a, q, x_c, noise_scale"):
-        infer_as_stated(record, seed=1, priors={"b": stats.norm()})
-    with pytest.raises(ParameterError, match=r"the prior of a is 0\.5: give a frozen distribution"):
-        infer_as_stated(record, seed=1, priors={"a": 0.5})
-    with pytest.raises(ParameterError, match="no family 'spline'"):
-        infer_as_stated(record, family="spline", seed=1)
-    with pytest.raises(ReachError, match="the rod can reach none in every sweep: are base, rod length and units right"):
-        infer_as_stated(record, seed=1, priors={"q": stats.uniform(2.0, 1.0)})
-    with pytest.raises(ParameterError, match="force_x is measured, but the load cell has no noise on it"):
-        infer_as_stated(record, seed=1, load_cell=LoadCell(moment_noise=0.02))
-    for seed in (-1, "x"):
-        with pytest.raises(ParameterError, match=r"seed is .*: give a whole number from 0 up"):
-            infer_as_stated(record, seed=seed)
+@pytest.mark.parametrize(
+    ("given", "kind", "named"),
+    [
+        ({"priors": {"b": stats.norm()}}, ParameterError, ["prior of b", "a, q, x_c, noise_scale"]),
+        ({"priors": {"a": 0.5}}, ParameterError, ["prior of a", 0.5]),
+        ({"family": "spline"}, ParameterError, ["'spline'"]),
+        ({"priors": {"q": stats.uniform(2.0, 1.0)}}, ReachError, ["base", "rod length"]),
+        ({"load_cell": LoadCell(moment_noise=0.02)}, ParameterError, ["force_x", "noise"]),
+    ],
+)
+def test_what_cannot_be_is_refused(given, kind, named):
+    with refused(kind, *named):
+        infer_as_stated(coarse(), seed=1, **given)
 
 
 def test_a_record_without_load_is_refused():
     record = coarse()
     for name in CHANNELS:
         record[name] = 0.01 * record[name] / abs(record[name]).max()
-    with pytest.raises(InferenceError, match="no sample carries a load that noise does not explain"):
+    with refused(InferenceError, "no sample", "load"):
         infer_as_stated(record, seed=1)
 
 
@@ -391,24 +390,30 @@ def test_samples_without_load_tell_where_contact_begins_and_ends():
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    "given",
     [
-        ({"priors": {"a": stats.norm}}, r"the prior of a is <.*>: give a frozen distribution"),
-        ({"settings": {"min_ess": 3}}, r"settings is {'min_ess': 3}: give SamplerSettings"),
-        ({"load_cell": 0.05}, r"load_cell is 0.05: give LoadCell\(force_noise"),
-        ({"events": "no"}, "events is 'no': give True or False"),
-        ({"checkpoint": 3}, "checkpoint is 3: give the path of a folder"),
-        ({"checkpoint": ""}, "checkpoint is '': give the path of a folder"),
-        ({"friction": -0.1}, "friction is -0.1: give a coefficient from 0 to 0.84"),
-        (
-            {"priors": {"gain": stats.norm(1.0, 0.1)}},
-            "a prior of gain, which is no parameter: .* moment_gain, friction and so on",
-        ),
+        {"settings": {"min_ess": 3}},
+        {"load_cell": 0.05},
+        {"events": "no"},
+        {"checkpoint": 3},
+        {"checkpoint": ""},
+        {"friction": -0.1},
+        {"seed": -1},
     ],
+    ids=str,
 )
-def test_what_is_of_another_kind_is_refused(given, words):
-    with pytest.raises(ParameterError, match=words):
+def test_what_is_of_another_kind_is_refused(given):
+    with refused(ParameterError, **given):
         infer_contour(measured(), **{"seed": 1, **given})
+
+
+@pytest.mark.parametrize(
+    ("name", "prior", "named"),
+    [("a", stats.norm, ["frozen"]), ("gain", stats.norm(1.0, 0.1), ["moment_gain", "friction"])],
+)
+def test_a_prior_that_is_none_is_refused(name, prior, named):
+    with refused(ParameterError, f"prior of {name}", *named):
+        infer_contour(measured(), priors={name: prior}, seed=1)
 
 
 @pytest.mark.slow
@@ -443,7 +448,7 @@ def test_a_prior_that_ends_before_what_the_record_wants_is_named():
     """Far beyond it that is a mistake, and near its end the posterior lies there."""
     record, deviation = coarse(), 3e-4  # by Fisher information
     narrow = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.15)}
-    with pytest.raises(InferenceError, match=r"the record wants q = 0\.\d+ \(prior: 0\.\d+ to 0\.\d+\): give a wider"):
+    with pytest.raises(InferenceError, match=r"q = 0\.\d+ .*0\.\d+ to 0\.\d+"):
         infer_contour(record, priors=narrow, nuisances=[], seed=1, settings=BRIEF)
     edged = {"q": stats.uniform(TRUTH["q"] - 0.2, 0.2 - deviation)}
     found = infer_contour(record, priors=edged, nuisances=[], seed=1, settings=BRIEF)
@@ -513,7 +518,7 @@ class Clock:
 def test_the_time_bounds_the_search_too(family, seconds, monkeypatch):
     """Past it, only the step that is under way ends, a cloud is found, and walkers start and make one step."""
     clock, drawn = Clock(monkeypatch), []
-    settings = SamplerSettings(ensembles=2, walkers=80, max_seconds=seconds, min_ess=1e9)
+    settings = SamplerSettings(ensembles=2, walkers=90, max_seconds=seconds, min_ess=1e9)
     result = infer_contour(
         measured(), family=family, load_cell=CELL, seed=1, settings=settings, keep=lambda tree: drawn.append(clock.now)
     )

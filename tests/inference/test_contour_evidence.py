@@ -10,8 +10,9 @@ from helpers.contour_posteriors import CELL, swept
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, contour_evidence
-from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
+from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import Experiment
 
 NARROW = {
     "parabola": {"a": stats.lognorm(s=0.02, scale=0.5), "q": stats.norm(0.5, 0.0015), "x_c": stats.norm(0.0, 0.005)},
@@ -24,7 +25,7 @@ SETTINGS = SamplerSettings(ensembles=2, min_ess=400, max_r_hat=1.03)
 def problem_of(family, truth, noise=1.0):
     measured = CELL.measure(swept(TRUTHS[truth], step=0.15), seed=4)
     priors = NARROW[family] | {"noise_scale": stats.lognorm(s=0.1, scale=noise)}
-    return contour_problem(measured, Assumptions(family, CELL, priors, friction=0.0, nuisances=()))
+    return contour_problem(Experiment(measured, family, CELL, priors, friction=0.0, nuisances=()))
 
 
 @pytest.mark.slow

@@ -47,7 +47,7 @@ def test_posteriors_lie_about_the_truth(name):
 def test_contours_that_the_rod_would_cut_after_snap_off_are_not_usable():
     """The same as `scan_many` says, of ellipses of which some are not clear."""
     rng = np.random.default_rng(5)
-    count = 3000
+    count = 20_000
     family = family_named("ellipse")
     priors = default_priors(family, (0.0, 0.0), 1.0)
     points = [priors[name].rvs(count, random_state=rng) for name in family.parameters]

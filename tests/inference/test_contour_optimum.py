@@ -9,7 +9,8 @@ import pytest
 
 from tactile_bayes.contours import Parabola
 from tactile_bayes.inference.contour_optimum import event_brackets, optima_of
-from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
+from tactile_bayes.inference.contour_problem import contour_problem
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.sweep import scan
 
@@ -25,7 +26,7 @@ def brief():
     scanned = scan(contour, drive_angles=angles, friction=TRUTH["friction"])
     touched = (scanned.record.holding_moment != 0.0).groupby(scanned.record.sweep).sum()
     assert touched.values.tolist() == [2, 2]
-    return scanned, contour_problem(CELL.measure(scanned.record, seed=3), Assumptions("parabola", CELL)).model
+    return scanned, contour_problem(Experiment(CELL.measure(scanned.record, seed=3), "parabola", CELL)).model
 
 
 def test_contact_of_a_few_samples_brackets_its_events(brief):

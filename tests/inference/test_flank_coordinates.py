@@ -74,7 +74,7 @@ def test_a_checkpoint_tells_them_apart():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [15, 43, 65])
+@pytest.mark.parametrize("number", [15, 25, 43, 65])
 def test_a_flank_that_is_told_to_a_hundred_thousandth_is_found_and_walked(number):
     """Pivots next to the object, loads of up to 65,000 times their noise: replicates of the published calibration."""
     replicate = calibration_replicate(number, family="power-law", seed=2026)

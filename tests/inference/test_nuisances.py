@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import default_priors
 from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import nuisances_of
@@ -254,9 +255,9 @@ def test_pivots_are_named_from_the_second_on():
     assert named("base") == ["base_2_x", "base_2_y", "base_3_x", "base_3_y"]
     assert named("base_y") == ["base_2_y", "base_3_y"]
     assert named("base_3_x", "base_x") == ["base_3_x", "base_2_x"]
-    with pytest.raises(ParameterError, match=r"base_1_y cannot be inferred: .* relative to the first pivot"):
+    with refused(ParameterError, "base_1_y", "first pivot"):
         named("base_1_y")
-    with pytest.raises(ParameterError, match=r"there is no base_4_x: the record has 3 pivots"):
+    with refused(ParameterError, "base_4_x", "3 pivots"):
         named("base_4_x")
 
 
@@ -455,49 +456,45 @@ def test_biases_that_the_cell_is_not_sure_of_are_integrated_out_and_not_inferred
     measured = coarse()
     assert "moment_bias" not in default_priors(measured, load_cell=cell)
     assert "force_x_bias" in default_priors(measured, load_cell=cell)
-    with pytest.raises(ParameterError, match="moment_bias is in the load cell's bias_uncertainty already"):
+    with refused(ParameterError, "moment_bias", "bias_uncertainty"):
         default_priors(measured, load_cell=cell, nuisances=["moment_bias"])
 
 
 @pytest.mark.parametrize(
-    ("nuisances", "words"),
+    ("nuisances", "named"),
     [
-        (["lever_x", "lever_z"], "there is no nuisance parameter 'lever_z'"),
-        (["base_x"], "base_x cannot be inferred: if pivot and object are shifted together"),
-        (["EI"], "there is no nuisance parameter 'EI': choose from bias, drift, gain, lever, rigidity_scale"),
-        ("bias", r"nuisances is 'bias': give a list of names, like \['bias'\]"),
-        (
-            ["rigidity_scale", "gain"],
-            "rigidity_scale and moment_gain, force_x_gain, force_y_gain cannot all be inferred",
-        ),
+        (["lever_x", "lever_z"], ["'lever_z'"]),
+        (["base_x"], ["base_x", "pivot", "object"]),
+        (["EI"], ["'EI'", "bias, drift, gain, lever, rigidity_scale"]),
+        ("bias", ["nuisances", "'bias'"]),
+        (["rigidity_scale", "gain"], ["rigidity_scale", "moment_gain, force_x_gain, force_y_gain"]),
     ],
 )
-def test_what_cannot_be_inferred_is_refused(nuisances, words):
-    with pytest.raises(ParameterError, match=words):
+def test_what_cannot_be_inferred_is_refused(nuisances, named):
+    with refused(ParameterError, *named):
         infer_contour(CELL.measure(coarse(), seed=1), nuisances=nuisances, seed=1)
 
 
 def test_a_missing_channel_has_no_bias():
     measured = coarse().drop_vars(["force_x"]).assign(force_x=("sample", np.full(coarse().sizes["sample"], np.nan)))
     assert "force_x_bias" not in default_priors(measured)
-    with pytest.raises(ParameterError, match="force_x_bias cannot be inferred: the record has no such channel"):
+    with refused(ParameterError, "force_x_bias", "no such channel"):
         default_priors(measured, nuisances=["force_x_bias"])
 
 
 @pytest.mark.parametrize("name", ["lever", "lever_y"])
 def test_a_lever_takes_a_moment_that_was_measured(name):
     measured = coarse().assign(holding_moment=np.nan * coarse().holding_moment)
-    with pytest.raises(ParameterError, match=rf"{name} cannot be inferred: it shows in the moment, which was not mea"):
+    with refused(ParameterError, name, "moment"):
         default_priors(measured, nuisances=[name])
-    with pytest.raises(ParameterError, match="lever_y cannot be inferred"):
+    with refused(ParameterError, "lever_y"):
         infer_contour(measured, nuisances=[], priors={"lever_y": stats.norm(0.0, 0.01)}, seed=1)
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_a_backlash_takes_two_directions(direction):
     measured = scanned(direction=direction)
-    words = f"backlash cannot be inferred: every sweep is {direction}, .* cannot be told from drive_angle_offset"
-    with pytest.raises(ParameterError, match=words):
+    with refused(ParameterError, "backlash", direction, "drive_angle_offset"):
         default_priors(measured, nuisances=["bias", "backlash"])
 
 
@@ -505,8 +502,9 @@ def test_friction_is_either_known_or_inferred():
     measured = coarse()
     assert "friction" in default_priors(measured, load_cell=CELL)
     for known in (0.0, 0.2):
-        result = infer_contour(CELL.measure(measured, seed=1), friction=known, seed=1, settings=FEW)
+        rubbed = CELL.measure(scanned(friction=known), seed=1)
+        result = infer_contour(rubbed, friction=known, seed=1, settings=FEW)
         assert "friction" not in result["posterior"].data_vars
         assert result.attrs["friction"] == known
-    with pytest.raises(ParameterError, match=r"friction is 0.2 and to be inferred as well"):
+    with refused(ParameterError, "friction", 0.2):
         infer_contour(CELL.measure(coarse(), seed=1), nuisances=["friction"], friction=0.2, seed=1)

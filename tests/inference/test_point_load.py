@@ -12,6 +12,7 @@ import xarray as xr
 from scipy import stats
 from scipy.integrate import solve_ivp
 
+from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.point_load import default_priors, infer_point_load
@@ -217,30 +218,26 @@ def test_known_parameters_are_left_out_and_seeds_count():
     assert 0.0 <= predictive_p_value(fixed) <= 1.0
 
 
-def test_bad_input_is_refused():
-    axial, lateral, reading = made_up_readings(5)
-    with pytest.raises(ParameterError, match="same length"):
-        infer_point_load(axial[1:], lateral, reading, seed=1)
-    with pytest.raises(ParameterError, match=r"lateral\[3\]"):
-        infer_point_load(axial, np.where(np.arange(32) == 3, np.nan, lateral), reading, seed=1)
-    with pytest.raises(ParameterError, match="at least 10"):
-        infer_point_load(axial[:9], lateral[:9], reading[:9], seed=1)
-    with pytest.raises(ParameterError, match="all readings are the same"):
-        infer_point_load(axial, lateral, np.ones(32), seed=1)
-    with pytest.raises(ParameterError, match="no such parameter: clamp_axail"):
-        infer_point_load(axial, lateral, reading, seed=1, priors={"clamp_axail": 1.0})
-    with pytest.raises(ParameterError, match="negative"):
-        infer_point_load(axial, lateral, reading, seed=1, priors={"compliance": -1.0})
-    with pytest.raises(ParameterError, match="noise_sd is 0"):
-        infer_point_load(axial, lateral, reading, seed=1, priors={"noise_sd": 0.0})
-    with pytest.raises(ParameterError, match="at least one"):
-        infer_point_load(axial, lateral, reading, seed=1, priors=RIG | {"noise_sd": 1.0})
-    with pytest.raises(ParameterError, match="full_scale"):
-        infer_point_load(axial, lateral, reading, seed=1, full_scale=0.0)
-    with pytest.raises(ParameterError, match="seed is -1"):
-        infer_point_load(axial, lateral, reading, seed=-1)
-    with pytest.raises(InferenceError, match="no clamp"):
-        infer_point_load(axial, lateral, reading, seed=1, priors={"clamp_axial": 100.0, "clamp_angle": 0.0})
+@pytest.mark.parametrize(
+    ("wrong", "kind", "named"),
+    [
+        ({"axial": np.zeros(31)}, ParameterError, ["length"]),
+        ({"lateral": np.where(np.arange(32) == 3, np.nan, made_up_readings(5)[1])}, ParameterError, ["lateral[3]"]),
+        ({name: np.ones(9) for name in ("axial", "lateral", "reading")}, ParameterError, [10]),
+        ({"reading": np.ones(32)}, ParameterError, ["readings", "same"]),
+        ({"priors": {"clamp_axail": 1.0}}, ParameterError, ["clamp_axail"]),
+        ({"priors": {"compliance": -1.0}}, ParameterError, ["negative"]),
+        ({"priors": {"noise_sd": 0.0}}, ParameterError, ["noise_sd", 0]),
+        ({"priors": RIG | {"noise_sd": 1.0}}, ParameterError, ["at least one"]),
+        ({"full_scale": 0.0}, ParameterError, ["full_scale", 0.0]),
+        ({"seed": -1}, ParameterError, ["seed", -1]),
+        ({"priors": {"clamp_axial": 100.0, "clamp_angle": 0.0}}, InferenceError, ["clamp"]),
+    ],
+)
+def test_bad_input_is_refused(wrong, kind, named):
+    right = dict(zip(("axial", "lateral", "reading"), made_up_readings(5), strict=True)) | {"seed": 1}
+    with refused(kind, *named):
+        infer_point_load(**(right | wrong))
 
 
 @pytest.fixture(scope="module")

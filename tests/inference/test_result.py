@@ -9,10 +9,10 @@ import warnings
 
 import arviz_stats
 import numpy as np
-import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import posterior
+from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.ensembles import SamplerSettings, sample
 from tactile_bayes.inference.result import (
@@ -58,17 +58,14 @@ def test_a_file_holds_the_whole_result(tmp_path):
 
 
 def test_what_is_no_result_is_refused(tmp_path):
-    with pytest.raises(InferenceError, match="there is no file"):
+    with refused(InferenceError, tmp_path / "none.nc"):
         read_result(tmp_path / "none.nc")
     (tmp_path / "text.nc").write_text("no NetCDF")
-    with pytest.raises(
-        InferenceError,
-        match=r"text\.nc cannot be read, it is damaged .*no NetCDF 4 file .*: infer again",
-    ):
+    with refused(InferenceError, "text.nc", "NetCDF"):
         read_result(tmp_path / "text.nc")
     other = xr.DataTree.from_dict({"prior": xr.Dataset({"a": 1.0})})
     other.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
-    with pytest.raises(InferenceError, match="no group 'posterior', only prior"):
+    with refused(InferenceError, "'posterior'", "prior"):
         read_result(tmp_path / "other.nc")
 
 
@@ -76,7 +73,7 @@ def test_draws_of_a_tree_and_of_a_dataset():
     dataset = posterior()["posterior"].to_dataset()
     xr.testing.assert_identical(posterior_draws(posterior()), dataset)
     assert posterior_draws(dataset) is dataset
-    with pytest.raises(InferenceError, match="no group 'posterior', only nothing"):
+    with refused(InferenceError, "'posterior'"):
         posterior_draws(xr.DataTree())
 
 

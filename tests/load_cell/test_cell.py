@@ -7,7 +7,9 @@ import pytest
 from scipy import stats
 
 from helpers.load_cells import CELL, GAIN, NORMAL, SHARED, UNKNOWN, WALK, cell, ideal
+from helpers.refusals import refused
 from tactile_bayes import scan
+from tactile_bayes.checks import shown
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
@@ -132,20 +134,19 @@ def test_noise_is_normal():
 
 @pytest.mark.parametrize("seed", [None, -1, 1.5, "1"])
 def test_a_seed_that_is_none_is_refused(seed):
-    with pytest.raises(ParameterError, match="give a nonnegative integer or a numpy"):
+    with refused(ParameterError, "seed", shown(seed)):
         CELL.measure(ideal(), seed=seed)
 
 
 def test_what_is_no_record_is_refused():
-    with pytest.raises(RecordError, match="there is no column 'drive_angle'"):
+    with refused(RecordError, "'drive_angle'"):
         CELL.measure(ideal().drop_vars("drive_angle"), seed=1)
 
 
 @pytest.mark.parametrize("further", [{"bias": (0.1, 0.0, 0.0)}, {"degrees_of_freedom": 3.0}, {"drift": WALK}])
 def test_measuring_twice_is_refused_where_it_makes_no_load_cell(further):
-    message = "two load cells of which one has more than white normal noise.*measure the ideal record, or remove"
     for first, second in ((cell(**further), CELL), (CELL, cell(**further))):
-        with pytest.raises(ParameterError, match=message):
+        with refused(ParameterError, "two load cells", "remove"):
             second.measure(first.measure(ideal(), seed=1), seed=2)
 
 
@@ -165,12 +166,12 @@ def test_a_record_is_measured_as_arrays_are(name):
 
 def test_cross_talk_from_a_channel_that_is_missing_is_refused():
     partial = ideal(missing=("force_x",))
-    with pytest.raises(ParameterError, match="has cross-talk on holding_moment from a channel that the record misses"):
+    with refused(ParameterError, "cross-talk", "holding_moment"):
         cell(gain=GAIN).measure(partial, seed=1)
     alone = cell(gain=np.diag([1.1, 1.2, 1.3])).measure(partial, seed=1)
     assert present_channels(alone) == ("holding_moment", "force_y")
     for sheet in (cell(gain=GAIN), cell(lever=(0.0, 0.1))):
-        with pytest.raises(ParameterError, match="has cross-talk from a channel that the record misses: its gain"):
+        with refused(ParameterError, "cross-talk", "gain"):
             sheet.corrected(partial)
     assert cell(lever=(0.1, 0.0)).corrected(partial).holding_moment[-1] == partial.holding_moment[-1] + 0.1 * 2.0
 
@@ -185,9 +186,9 @@ def test_a_cell_that_turns_turns_the_record():
     assert measured.identical(turning.measure(in_frame(ideal(), "turning"), seed=1))
     assert frame_of(measured) == "turning"
     assert frame_of(cell(frame="fixed").measure(in_frame(ideal(), "turning"), seed=1)) == "fixed"
-    with pytest.raises(RecordError, match="force_x was not measured"):
+    with refused(RecordError, "force_x"):
         sheet.measure(ideal(missing=("force_x",)), seed=1)
-    with pytest.raises(ParameterError, match=r"the load cell is fixed, but the record's forces are turning: give"):
+    with refused(ParameterError, "fixed", "turning"):
         cell(frame="fixed", bias=(0.1, 0.0, 0.0)).corrected(measured)
 
 
@@ -219,7 +220,7 @@ def test_an_ideal_encoder_keeps_no_truth():
 
 
 def test_an_encoder_that_shows_no_sweep_is_refused():
-    with pytest.raises(RecordError, match=r"sweep 0 is labelled 'forward', but its drive angle decreases"):
+    with refused(RecordError, "sweep 0", "'forward'"):
         LoadCell(drive_angle_noise=1.0).measure(ideal(2), seed=13)
 
 

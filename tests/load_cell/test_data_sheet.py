@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from helpers.load_cells import cell, ideal, load_cells
+from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.mechanics.rod import Rod
@@ -37,126 +38,51 @@ def test_variances_are_of_every_channel_and_finite(sheet, has_them):
 # --- What is refused --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [*SIZES, "drive_angle_noise", "drive_angle_resolution"])
-@pytest.mark.parametrize("value", [-1e-9, np.nan, np.inf])
-def test_an_impossible_size_is_refused(name, value):
-    with pytest.raises(ParameterError, match=f"the load cell's {name} is .*: give a (standard dev|step, z|share, z)"):
-        LoadCell(**{name: value})
-
-
-@pytest.mark.parametrize("name", ["force_range", "moment_range", "degrees_of_freedom"])
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan])
-def test_an_impossible_range_is_refused(name, value):
-    with pytest.raises(ParameterError, match=f"the load cell's {name} is .*: give a positive number, inf for none"):
-        LoadCell(**{name: value})
-
-
 @pytest.mark.parametrize(
-    "name", [*SIZES, "force_range", "degrees_of_freedom", "drive_angle_offset", "drive_angle_backlash"]
-)
-@pytest.mark.parametrize("value", ["0.1", None, (0.1, 0.2), np.ones(1), [[1], [2, 3]], {}, 1j, True, np.False_])
-def test_what_is_no_number_is_refused(name, value):
-    with pytest.raises(ParameterError, match=rf"the load cell's {name} is .*: give a number"):
-        LoadCell(**{name: value})
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize("name", ["drive_angle_offset", "drive_angle_backlash"])
-def test_an_offset_that_is_no_angle_is_refused(name, value):
-    with pytest.raises(ParameterError, match=rf"{name} is .*: give an angle \[rad\]"):
-        LoadCell(**{name: value})
-
-
-@pytest.mark.parametrize("value", [0.1, (0.1,), (0.1, 0.2, 0.3), "12", (0.1, np.nan), None, (True, 0)])
-def test_a_lever_that_is_no_point_is_refused(value):
-    with pytest.raises(ParameterError, match=r"(?s)the load cell's lever is .*: give two finite numbers \(x, y\)"):
-        LoadCell(lever=value)
-
-
-@pytest.mark.parametrize(
-    "value",
+    ("name", "values"),
     [
-        0.1,
-        (0.1, 0.2),
-        "123",
-        (0.1, 0.2, np.nan),
-        (0.1, 0.2, "3"),
-        np.eye(3),
-        None,
-        {"force_x": 1},
-        (1j, 0, 0),
-        (True, 0, 0),
+        *((name, [-1e-9, np.nan, np.inf, "0.1", True]) for name in (*SIZES, "drive_angle_noise")),
+        ("drive_angle_resolution", [-1e-9, np.nan]),
+        *((name, [0.0, np.nan, "0.1"]) for name in ("force_range", "moment_range", "degrees_of_freedom")),
+        *((name, [np.nan, np.inf, None, (0.1, 0.2)]) for name in ("drive_angle_offset", "drive_angle_backlash")),
+        ("lever", [0.1, (0.1, 0.2, 0.3), (0.1, np.nan), (True, 0)]),
+        *((name, [0.1, (0.1, 0.2), (0.1, 0.2, np.nan), (0.1, 0.2, "3")]) for name in ("bias", "correlation")),
+        ("bias_uncertainty", [0.1, None, (0.0, -0.1, 0.0)]),
+        ("gain", [1.01, (1.0, 1.0, 1.0), np.eye(2), [[1, 0, 0], [0, 1, 0], 1], np.diag([1.0, 0.0, np.nan])]),
+        ("gain", [((0.0, 0.0, 0.0),) * 3, ((1.0, 0.0, 0.0), (0.0, 1.0, 1.0), (0.0, 1.0, 1.0))]),
+        ("correlation", [(1.0, 0.0, 0.0), (0.9, 0.9, -0.9), (-0.6, -0.6, -0.6), (0.0, 1.5, 0.0)]),
+        ("drift", [0.1, "random_walk", RandomWalk, (0.1, 0.1)]),
+        ("frame", ["rotating", "", 1, ["fixed"], np.array(["fixed"])]),
     ],
 )
-@pytest.mark.parametrize("name", ["bias", "bias_uncertainty", "correlation"])
-def test_three_numbers_are_wanted(name, value):
-    first = "holding_moment with force_x" if name == "correlation" else "holding_moment, force_x"
-    with pytest.raises(ParameterError, match=rf"(?s)the load cell's {name} is .*: give three finite numbers \({first}"):
-        LoadCell(**{name: value})
-
-
-@pytest.mark.parametrize(
-    "value",
-    [1.01, (1.0, 1.0, 1.0), np.eye(2), "abc", None, [[1, 0, 0], [0, 1, 0], 1], ((1, 0, 0), (0, 1, 0), (0, 0, np.nan))],
-)
-def test_a_gain_that_is_no_matrix_is_refused(value):
-    with pytest.raises(ParameterError, match=r"(?s)load cell's gain is .*: give three rows of three numbers, \(\(1"):
-        LoadCell(gain=value)
-
-
-@pytest.mark.parametrize("value", [np.zeros((3, 3)), ((1, 0, 0), (0, 1, 1), (0, 1, 1)), np.diag([1.0, 0.0, 1.0])])
-def test_a_gain_that_loses_a_load_is_refused(value):
-    with pytest.raises(ParameterError, match="such a cell cannot tell three loads apart: give rows that are"):
-        LoadCell(gain=value)
-
-
-def test_a_negative_uncertainty_is_refused():
-    with pytest.raises(ParameterError, match="give three standard deviations, each zero or positive"):
-        LoadCell(bias_uncertainty=(0.0, -0.1, 0.0))
-
-
-@pytest.mark.parametrize("value", [(1.0, 0.0, 0.0), (0.9, 0.9, -0.9), (-0.6, -0.6, -0.6), (0.0, 1.5, 0.0)])
-def test_a_correlation_that_nothing_has_is_refused(value):
-    with pytest.raises(
-        ParameterError, match=r"no noise has these coefficients between holding_moment .*: give smaller"
-    ):
-        LoadCell(correlation=value)
+def test_what_no_load_cell_has_is_refused(name, values):
+    for value in values:
+        with refused(ParameterError, "load cell", **{name: value}):
+            LoadCell(**{name: value})
 
 
 def test_a_step_beyond_the_range_is_refused():
-    with pytest.raises(ParameterError, match=r"force_resolution is 2\.0, more than its force_range, 1\.0: give"):
+    with refused(ParameterError, force_resolution=2.0, force_range=1.0):
         LoadCell(force_resolution=2.0, force_range=1.0)
     assert LoadCell(force_resolution=1.0, force_range=1.0).limit[1] == 1.0
 
 
-@pytest.mark.parametrize("value", [0.1, "random_walk", RandomWalk, (0.1, 0.1)])
-def test_a_drift_that_is_no_law_is_refused(value):
-    with pytest.raises(ParameterError, match=r"drift is .*: give RandomWalk\(...\) or OrnsteinUhlenbeck\(...\)"):
-        LoadCell(drift=value)
-
-
 @pytest.mark.parametrize("law", [RandomWalk, OrnsteinUhlenbeck])
-@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, "0.1", None, (0.1,)])
-def test_an_impossible_drift_is_refused(law, value):
-    for name in ("moment", "force"):
-        with pytest.raises(ParameterError, match=f"{law.__name__}: {name} is .*: give zero or a positive number"):
+@pytest.mark.parametrize("name", ["moment", "force"])
+def test_an_impossible_drift_is_refused(law, name):
+    for value in (-1.0, np.nan, np.inf, "0.1", None, (0.1,)):
+        with refused(ParameterError, law.__name__, **{name: value}):
             law(**{name: value})
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "3"])
+@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, "3"])
 def test_an_impossible_time_is_refused(value):
-    with pytest.raises(ParameterError, match=r"OrnsteinUhlenbeck: time is .*: give"):
+    with refused(ParameterError, "OrnsteinUhlenbeck", time=value):
         OrnsteinUhlenbeck(moment=0.1, time=value)
 
 
-@pytest.mark.parametrize("value", ["rotating", "", 1, ["fixed"], np.array(["fixed"])])
-def test_a_frame_that_is_none_is_refused(value):
-    with pytest.raises(ParameterError, match=r"frame is .*: choose 'fixed' or 'turning', or None"):
-        LoadCell(frame=value)
-
-
 def test_outliers_that_are_correlated_are_refused():
-    with pytest.raises(ParameterError, match="go together in more than one way: leave one of the two out"):
+    with refused(ParameterError, "degrees_of_freedom", "correlated"):
         LoadCell(degrees_of_freedom=4.0, correlation=(0.0, 0.1, 0.0))
 
 
@@ -183,14 +109,14 @@ def test_entries_say_everything(sheet):
 
 
 def test_entries_that_are_none_are_refused():
-    with pytest.raises(ParameterError, match=r"has no entry 'Force_noize': did you mean 'force_noise'\? An attribute"):
+    with refused(ParameterError, "'Force_noize'", "'force_noise'"):
         LoadCell.from_entries({"Force_noize": 0.1})
-    with pytest.raises(ParameterError, match=r"has no entry 'q': there are frame, force_noise, .*, drive_angle_resol"):
+    with refused(ParameterError, "'q'", "frame, force_noise"):
         LoadCell.from_entries({"q": 0.1})
     both = {"random_walk_force": 0.1, "ornstein_uhlenbeck_force": 0.1}
-    with pytest.raises(ParameterError, match="drifts by a random walk or an Ornstein-Uhlenbeck process, not by both"):
+    with refused(ParameterError, "random walk", "Ornstein-Uhlenbeck"):
         LoadCell.from_entries(both)
-    with pytest.raises(ParameterError, match="force_noise is 'much': give a number"):
+    with refused(ParameterError, force_noise="much"):
         LoadCell.from_entries({"force_noise": "much"})
 
 
@@ -235,7 +161,7 @@ def test_a_lever_and_a_backlash_are_kept_with_their_units(tmp_path, ending):
 
 @pytest.mark.parametrize(("name", "value"), [("noise", 1e3), ("offset", 57.3)])
 def test_an_encoder_in_degrees_is_refused_where_it_measures(name, value):
-    with pytest.raises(ParameterError, match=r"the encoder reads .* more than a turn \(2π\): give a smaller .*radians"):
+    with refused(ParameterError, "encoder", "radians"):
         LoadCell(**{f"drive_angle_{name}": value}).measure(ideal(), seed=1)
 
 

@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 
 from helpers.load_cells import CELL, NORMAL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
+from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 
@@ -193,27 +194,27 @@ def test_nothing_measured_says_nothing():
 
 
 @pytest.mark.parametrize(
-    ("further", "message"),
+    ("further", "named"),
     [
-        ({"drift": WALK, "degrees_of_freedom": 4.0}, "has no closed form: leave one of them out"),
-        ({"drift": WALK, "correlation": SHARED, "relative_noise": 0.1}, "together are not offered: leave one out"),
-        ({"drift": WALK, "correlation": SHARED, "bias_uncertainty": UNKNOWN}, "together are not offered: leave one"),
-        ({"bias_uncertainty": UNKNOWN, "moment_range": 0.5}, "sample 0 of holding_moment is at the end of the load"),
-        ({"moment_range": 0.1}, "sample 0 of holding_moment reads 0.5, beyond the load cell's range"),
+        ({"drift": WALK, "degrees_of_freedom": 4.0}, ["degrees_of_freedom"]),
+        ({"drift": WALK, "correlation": SHARED, "relative_noise": 0.1}, ["correlated", "relative_noise"]),
+        ({"drift": WALK, "correlation": SHARED, "bias_uncertainty": UNKNOWN}, ["correlated", "unknown bias"]),
+        ({"bias_uncertainty": UNKNOWN, "moment_range": 0.5}, ["sample 0", "holding_moment"]),
+        ({"moment_range": 0.1}, ["sample 0", "holding_moment", 0.5]),
     ],
 )
-def test_what_the_likelihood_refuses_is_refused(further, message):
+def test_what_the_likelihood_refuses_is_refused(further, named):
     for method in ("log_likelihood", "log_density_left_out"):
-        with pytest.raises(ParameterError, match=message):
+        with refused(ParameterError, *named):
             getattr(cell(**further), method)(np.full((4, 3), 0.5), np.zeros((4, 3)))
 
 
 def test_shapes_and_scales_that_cannot_be_are_refused():
-    with pytest.raises(ParameterError, match=r"a noise_scale is -1\.0"):
+    with refused(ParameterError, "noise_scale", -1.0):
         NORMAL["random walk"].log_density_left_out(np.zeros((4, 3)), np.zeros((4, 3)), noise_scale=-1.0)
-    with pytest.raises(ParameterError, match="measured has shape"):
+    with refused(ParameterError, "measured", "shape"):
         NORMAL["random walk"].log_density_left_out(np.zeros((4, 3)), np.zeros((5, 3)))
     holes = np.zeros((4, 3))
     holes[2, 1] = np.nan
-    with pytest.raises(ParameterError, match="measured misses sample 2 of force_x"):
+    with refused(ParameterError, "sample 2", "force_x"):
         NORMAL["random walk"].log_density_left_out(holes, np.zeros((4, 3)))

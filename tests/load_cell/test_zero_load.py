@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, paper_profile
 from tactile_bayes.errors import DriftWarning, ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell, zero_load
@@ -224,7 +225,7 @@ def test_a_sweep_that_is_loaded_throughout_tells_nothing(samples):
     found = zero_load(record)
     assert not found.unloaded.any()
     assert np.isnan(found.bias).all()
-    with pytest.raises(RecordError, match=r"0 samples that are unloaded for certain.* record some before"):
+    with refused(RecordError, "0 samples"):
         LoadCell.from_zero_load(record)
 
 
@@ -309,7 +310,7 @@ def test_outliers_leave_the_events_where_they_are():
 def test_a_zero_that_moves_between_sweeps_is_told_and_counted():
     loads = ramp(15, 60, 15, 5.0)
     moved = record_of(noisy(loads, 1), noisy(loads, 2, bias=(3.0, 0.0, 0.0)), noisy(loads, 3, bias=(-3.0, 0.0, 0.0)))
-    with pytest.warns(DriftWarning, match="the zero of holding_moment moved from one unloaded stretch to another"):
+    with pytest.warns(DriftWarning, match="the zero of holding_moment"):
         found = zero_load(moved)
     assert found.same_bias_p_value[0] < 1e-10
     assert 2.0 < found.bias_uncertainty[0] < 4.0  # of 3, 0 and −3: √6 = 2.4 to 3
@@ -320,14 +321,14 @@ def test_a_zero_that_moves_between_sweeps_is_told_and_counted():
 def test_every_zero_that_moves_is_named():
     loads = ramp(15, 60, 15, 5.0)
     moved = record_of(noisy(loads, 1), noisy(loads, 2, bias=(3.0, 0.0, 1.0)))
-    with pytest.warns(DriftWarning, match=r"the zeros of holding_moment and force_y moved .*\(p = \S+ and \S+ if they"):
+    with pytest.warns(DriftWarning, match=r"holding_moment and force_y .*\(p = \S+ and \S+"):
         zero_load(moved)
 
 
 def test_a_zero_that_moves_during_contact_is_told_and_the_snap_off_stays():
     readings = ramp(15, 100, 15, 1.0)
     readings[115:] += (5.0, 0.0, 0.0)
-    with pytest.warns(DriftWarning, match="the zero of holding_moment moved"):
+    with pytest.warns(DriftWarning, match="the zero of holding_moment"):
         found = zero_load(record_of(noisy(readings, 1)))
     assert found.snap_off.values.tolist() == [[114, 115]]
 
@@ -381,7 +382,7 @@ def test_samples_of_sweeps_may_be_mixed():
 
 @pytest.mark.parametrize("false_alarm", [0.0, -1.0, 0.5, np.nan])
 def test_an_impossible_false_alarm_rate_is_refused(false_alarm):
-    with pytest.raises(ParameterError, match=r"false_alarm is .*: give a probability between 0 and 0.5"):
+    with refused(ParameterError, false_alarm=false_alarm):
         zero_load(record_of(np.zeros((20, 3))), false_alarm=false_alarm)
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from helpers import exact_rod
 from helpers.exact_rod import Shape
 from helpers.integration import contact_end, rod, shoot
+from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE, contact_from_wrench, wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
@@ -463,9 +464,9 @@ def test_derivatives_against_differences(side):
 
 @pytest.mark.parametrize("bad", [-1e-9, np.nextafter(MAX_FRICTION_ANGLE, 1), 1.5, np.nan, np.inf])
 def test_impossible_friction_is_refused(bad):
-    with pytest.raises(ParameterError, match="friction angle"):
+    with refused(ParameterError, "friction angle"):
         wrench_from_contact(0.2, 0.6, 0.1, [0.0, bad])
-    with pytest.raises(ParameterError, match="friction angle"):
+    with refused(ParameterError, "friction angle"):
         contact_from_wrench(2.0, 1.0, -0.5, 3.0, [0.0, bad])
     wrench_from_contact(0.2, 0.6, 0.1, [0.0, MAX_FRICTION_ANGLE])
 

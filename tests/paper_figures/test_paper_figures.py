@@ -10,6 +10,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from helpers.refusals import refused
+
 mpl.use("Agg")
 
 from matplotlib import pyplot as plt
@@ -97,27 +99,27 @@ def test_in_a_column_panels_are_below_one_another(width, columns):
 
 
 @pytest.mark.parametrize(
-    ("number", "options", "message"),
+    ("number", "options", "named"),
     [
-        (1, {}, "there is no figure 1: choose from 2 to 11"),
-        (True, {}, "there is no figure True"),
-        (3, {"distances": []}, "distances are \\[\\]: give rod lengths above 0"),
-        (3, {"distances": [0.3, -0.1]}, "give rod lengths above 0"),
-        (3, {"distances": ["near"]}, "give rod lengths above 0"),
-        (7, {"rods": 0}, "rods is 0"),
-        (7, {"width": 1.0}, "width is 1.0: give inches from 3 to 12"),
-        (11, {"load_cell": 0.05}, "load_cell is 0.05: give a LoadCell"),
-        (3, {"drive_step": 2.0}, "drive_step is 2.0"),
-        (2, {"distances": [0.3]}, "figure 2 shows tip contact, and profile II has none at q = 0.3"),
+        (1, {}, ["figure 1", "2 to 11"]),
+        (True, {}, ["figure True"]),
+        (3, {"distances": []}, ["distances", "[]"]),
+        (3, {"distances": [0.3, -0.1]}, ["distances", -0.1]),
+        (3, {"distances": ["near"]}, ["distances", "near"]),
+        (7, {"rods": 0}, ["rods", 0]),
+        (7, {"width": 1.0}, ["width", 1.0, "3 to 12"]),
+        (11, {"load_cell": 0.05}, ["load_cell", 0.05]),
+        (3, {"drive_step": 2.0}, ["drive_step", 2.0]),
+        (2, {"distances": [0.3]}, ["figure 2", "profile II", "q = 0.3"]),
     ],
 )
-def test_what_cannot_be_drawn_is_refused(number, options, message):
-    with pytest.raises(ParameterError, match=message):
+def test_what_cannot_be_drawn_is_refused(number, options, named):
+    with refused(ParameterError, *named):
         figure(number, **options)
 
 
 def test_a_distance_out_of_reach_names_profile_and_distance():
-    with pytest.raises(ReachError, match=r"profile I at the distance q = 1\.2: the contour is out of reach"):
+    with refused(ReachError, "profile I", "q = 1.2", "out of reach"):
         figure(3, distances=[0.5, 1.2])
 
 
@@ -339,16 +341,16 @@ def test_the_same_figure_is_the_same_file(tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "named"),
     [
-        ({"formats": ["gif"]}, "choose from pdf, svg, png"),
-        ({"formats": []}, "choose from pdf, svg, png"),
-        ({"only": [3, 12]}, "there is no figure 12"),
-        ({"style": "poster"}, "style is 'poster'"),
+        ({"formats": ["gif"]}, ["pdf, svg, png"]),
+        ({"formats": []}, ["pdf, svg, png"]),
+        ({"only": [3, 12]}, ["figure 12"]),
+        ({"style": "poster"}, ["style", "'poster'"]),
     ],
 )
-def test_nothing_is_written_where_something_is_wrong(tmp_path, options, message):
-    with pytest.raises(ParameterError, match=message):
+def test_nothing_is_written_where_something_is_wrong(tmp_path, options, named):
+    with refused(ParameterError, *named):
         draw_all(tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
 
@@ -364,7 +366,7 @@ def test_what_was_there_stays_when_a_figure_fails(tmp_path, monkeypatch):
 
 
 def test_a_distance_too_near_is_refused_by_the_contour():
-    with pytest.raises(ContourError, match="profile I at the distance q = 1e-09"):
+    with refused(ContourError, "profile I", "q = 1e-09"):
         figure(3, distances=[1e-9])
 
 

@@ -11,6 +11,7 @@ import xarray as xr
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, StudyError
 from tactile_bayes.planning import error_map as module
@@ -101,7 +102,7 @@ def test_the_folder_of_another_study_is_refused(tmp_path_factory, other):
     with module.open_results_store(module._words(task_of(SMALL)), folder, CELLS) as ledger:
         ledger.outcomes[0] = CellOutcome({"gap_width": 0.1}, "ok")
     before = (folder / "cells.json").read_bytes()
-    with pytest.raises(StudyError, match=r"cells of another experiment: .* there and .* here.*give another folder"):
+    with refused(StudyError, "another experiment", "there", "here"):
         error_map(**{**SMALL, **other}, out=folder)
     assert (folder / "cells.json").read_bytes() == before
 
@@ -120,10 +121,12 @@ def task_of(options):
     return kept["task"]
 
 
-def test_an_outcome_comes_back_from_its_row():
+def test_an_outcome_comes_back_from_its_row(tmp_path):
     outcome = CellOutcome({"gap_width": 0.1 + 0.2, "posterior_gap_width": np.nan}, "ok")
-    row = json.loads(json.dumps(CELLS.encode(outcome), allow_nan=False))
-    back = CELLS.decode(row)
+    with module.open_results_store({}, tmp_path, CELLS) as ledger:
+        ledger.outcomes[0] = outcome
+    with module.open_results_store({}, tmp_path, CELLS) as ledger:
+        back = ledger.outcomes[0]
     assert back.message == "ok"
     assert back.numbers["gap_width"] == 0.1 + 0.2
     assert np.isnan(back.numbers["posterior_gap_width"])
@@ -225,35 +228,41 @@ def test_posteriors_are_inferred_in_some_cells():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "match"),
+    "wrong",
     [
-        ({"distances": []}, r"distances is \[\]: give a list of positive numbers"),
-        ({"distances": 0.5}, "distances is 0.5: give a list of positive numbers"),
-        ({"distances": ["near"]}, "give a list of positive numbers"),
-        ({"distances": [[0.5]]}, "give a list of positive numbers"),
-        ({"distances": [0.5, -0.1]}, "give a list of positive numbers"),
-        ({"noise_factors": [0.0]}, "noise_factors is .* give a list of positive numbers"),
-        ({"noise_factors": [np.inf]}, "noise_factors is"),
-        ({"noise_factors": [1.0, 2.0, 1.0]}, "one of them is given twice"),
-        ({"contours": "II"}, "contours is 'II': give names of the paper's profiles, or contours by name"),
-        ({"contours": []}, "give names of the paper's profiles"),
-        ({"contours": {"x": 5}}, "5 is no contour"),
-        (
-            {"contours": {"x": tb.contours.from_points(np.arange(-3.0, 4.0), np.arange(-3.0, 4.0) ** 2)}},
-            "no family with parameters",
-        ),
-        ({"replicates": 0}, "replicates is 0: give a whole number from 1 up"),
-        ({"replicates": 2.0}, "replicates is 2.0"),
-        ({"posterior_cells": -1}, "posterior_cells is -1"),
-        ({"posterior_replicates": 0}, "posterior_replicates is 0"),
-        ({"seed": -1}, "seed is -1"),
-        ({"seed": True}, "seed is True"),
-        ({"probability": 1.0}, "probability is 1.0"),
-        ({"nuisances": "bias"}, r"nuisances is 'bias': give a list of names, like \['bias'\]"),
-        ({"load_cell": tb.LoadCell(force_noise=0.1)}, "no finite noise of holding_moment"),
+        {"distances": []},
+        {"distances": 0.5},
+        {"distances": ["near"]},
+        {"distances": [[0.5]]},
+        {"distances": [0.5, -0.1]},
+        {"noise_factors": [0.0]},
+        {"noise_factors": [np.inf]},
+        {"noise_factors": [1.0, 2.0, 1.0]},
+        {"contours": "II"},
+        {"contours": []},
+        {"replicates": 0},
+        {"replicates": 2.0},
+        {"posterior_cells": -1},
+        {"posterior_replicates": 0},
+        {"seed": -1},
+        {"probability": 1.0},
+        {"nuisances": "bias"},
     ],
-    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+    ids=str,
 )
-def test_bad_grids_are_refused(wrong, match):
-    with pytest.raises(ParameterError, match=match):
+def test_bad_grids_are_refused(wrong):
+    with refused(ParameterError, **wrong):
+        error_map(**{**SMALL, **wrong})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"contours": {"x": 5}}, "5"),
+        ({"contours": {"x": tb.contours.from_points(np.arange(-3.0, 4.0), np.arange(-3.0, 4.0) ** 2)}}, "family"),
+        ({"load_cell": tb.LoadCell(force_noise=0.1)}, "holding_moment"),
+    ],
+)
+def test_what_cannot_be_studied_is_refused(wrong, named):
+    with refused(ParameterError, named):
         error_map(**{**SMALL, **wrong})

@@ -10,8 +10,10 @@ import pytest
 from scipy import integrate, stats
 
 import tactile_bayes as tb
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ReachError
+from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
@@ -211,7 +213,7 @@ def test_a_contour_out_of_reach_is_refused():
     plan = between()
     far = plan.point.copy()
     far[plan.model.names.index("q")] = 1.5
-    with pytest.raises(ReachError, match="does not reach"):
+    with refused(ReachError, "reach"):
         record_information(plan.model, far)
 
 
@@ -401,10 +403,15 @@ SETTINGS = tb.SamplerSettings(ensembles=4, walkers=32, max_r_hat=1.01, min_ess=2
 
 
 def posterior_ratios(factor, seed):
-    """Posterior standard deviations over bounds with priors, by parameter, and their Monte-Carlo error."""
-    plan = DOUBLE.with_noise(factor)
+    """Posterior standard deviations over bounds with priors, by parameter.
+
+    Without friction, which lies at the end of its prior: a posterior that is cut off there is narrower than the bound.
+    """
+    plan = replace(DOUBLE.with_noise(factor), nuisances=[name for name in STANDARD if name != "friction"])
     measured = plan.cell.measure(plan.scan.record, seed=seed)
-    posterior = tb.infer_contour(measured, family=plan.family, load_cell=plan.cell, seed=seed, settings=SETTINGS)
+    posterior = tb.infer_contour(
+        measured, family=plan.family, load_cell=plan.cell, nuisances=plan.nuisances, seed=seed, settings=SETTINGS
+    )
     bounds = information(plan).bound_with_priors
     draws = posterior["posterior"].to_dataset()
     # The posterior is as wide as the noise that it finds, which is off by some 3 % in a record of 600 readings.

@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import SOURCES, amplification
@@ -131,11 +132,11 @@ def test_the_same_seed_gives_the_same_and_another_one_not():
 
 @pytest.mark.parametrize("samples", [1000, 1, 0, -4, 64.0, True, "64"])
 def test_samples_that_are_no_power_of_two_are_refused(samples):
-    with pytest.raises(ParameterError, match="give a power of two"):
+    with refused(ParameterError, samples=samples):
         noise_shares(QUIET, seed=1, samples=samples)
 
 
 @pytest.mark.parametrize("places", [1, 0, 2.0, True])
 def test_too_few_places_are_refused(places):
-    with pytest.raises(ParameterError, match="places is"):
+    with refused(ParameterError, places=places):
         noise_shares(QUIET, seed=1, samples=16, places=places)

@@ -9,13 +9,15 @@ import pytest
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, paper_profile
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.inference.experiment import usual_load_cell
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.error_covariance import whitening
 from tactile_bayes.planning.family_parameters import enlarged, family_parameters
-from tactile_bayes.planning.plan import Plan, usual_load_cell
+from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS
 
 PROFILE = paper_profile("II", q=0.5)
@@ -53,22 +55,18 @@ def test_an_enlarged_contour_has_all_lengths_enlarged(name, factor):
 
 
 @pytest.mark.parametrize(
-    ("contour", "match"),
+    ("contour", "named"),
     [
-        (tb.contours.from_points(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21) ** 2 + 0.5), "of no family"),
-        (Parabola([0.5, 0.6], 0.5), "give a single one"),
-        ("II", "'II' is no contour: give one of tb.contours"),
-        (None, "None is no contour"),
+        (tb.contours.from_points(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21) ** 2 + 0.5), "family"),
+        (tb.contours.from_function(lambda x: np.cosh(x) - 0.5, (-1.0, 1.0)), "power law"),
+        (Parabola([0.5, 0.6], 0.5), "single"),
+        ("II", "'II'"),
+        (None, None),
     ],
 )
-def test_what_has_no_parameters_is_refused_with_the_remedy(contour, match):
-    with pytest.raises(ParameterError, match=match):
+def test_what_has_no_parameters_is_refused_with_the_remedy(contour, named):
+    with refused(ParameterError, named):
         family_parameters(contour)
-
-
-def test_halves_without_a_common_family_are_refused():
-    with pytest.raises(ParameterError, match="give a parabola, circle, ellipse or power law, or two of these joined"):
-        family_parameters(tb.contours.from_function(lambda x: np.cosh(x) - 0.5, (-1.0, 1.0)))
 
 
 # ---- plans
@@ -151,35 +149,28 @@ def test_without_a_load_cell_there_is_the_usual_one():
     ],
 )
 def test_a_channel_without_noise_is_refused_by_name(cell, silent):
-    with pytest.raises(ParameterError, match=f"no finite noise of {silent}: .*give LoadCell"):
+    with refused(ParameterError, silent, "LoadCell"):
         Plan(PROFILE, cell)
 
 
-@pytest.mark.parametrize(
-    ("options", "match"),
-    [
-        ({"rod": 0.2}, "rod is 0.2: give a Rod"),
-        ({"load_cell": 0.05}, "load_cell is 0.05: give a LoadCell"),
-        ({"nuisances": "bias"}, r"nuisances is 'bias': give a list of names, like \['bias'\]"),
-    ],
-)
-def test_what_is_none_is_refused(options, match):
-    with pytest.raises(ParameterError, match=match):
+@pytest.mark.parametrize("options", [{"rod": 0.2}, {"load_cell": 0.05}, {"nuisances": "bias"}])
+def test_what_is_none_is_refused(options):
+    with refused(ParameterError, **options):
         Plan(PROFILE, **options)
 
 
 @pytest.mark.parametrize(
-    ("options", "match"),
+    ("options", "named"),
     [
-        ({"nuisances": ["rust"]}, "there is no nuisance parameter 'rust'"),
-        ({"priors": {"b": stats.norm()}}, "a prior of b, which is no parameter: there are a, q, x_c"),
-        ({"priors": {"a": 0.5}}, "the prior of a is 0.5: give a frozen distribution"),
-        ({"friction": 0.1, "nuisances": ["friction"]}, "to be inferred as well"),
+        ({"nuisances": ["rust"]}, ["'rust'"]),
+        ({"priors": {"b": stats.norm()}}, ["prior of b", "a, q, x_c"]),
+        ({"priors": {"a": 0.5}}, ["prior of a", 0.5]),
+        ({"friction": 0.1, "nuisances": ["friction"]}, ["friction", 0.1]),
     ],
 )
-def test_a_model_that_is_none_is_refused(options, match):
+def test_a_model_that_is_none_is_refused(options, named):
     plan = Plan(PROFILE, drive_step=0.1, **options)
-    with pytest.raises(ParameterError, match=match):
+    with refused(ParameterError, *named):
         _ = plan.model
 
 

@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 import tactile_bayes as tb
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import RandomWalk
@@ -93,20 +94,20 @@ def test_a_band_that_priors_give_needs_no_load_cell():
 def test_a_band_that_no_load_cell_gives_is_refused():
     """Because the zero of the cell is not known."""
     plan = replace(PLAN, load_cell=replace(CELL, bias_uncertainty=(0.02, 0.1, 0.1)))
-    with pytest.raises(ParameterError, match=r"a band of 1e-12 cannot be had with any noise.*give tighter priors"):
+    with refused(ParameterError, "1e-12", "priors"):
         required_noise(plan, [1e-3, 1e-12])
 
 
 @pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf, [0.1, 0.0], [[0.1]]])
 def test_widths_that_are_none_are_refused(width):
-    with pytest.raises(ParameterError, match="give a positive length"):
+    with refused(ParameterError, band_width=np.atleast_1d(width).tolist()):
         required_noise(PLAN, width)
 
 
 def test_a_gap_is_asked_for_where_there_is_one():
-    with pytest.raises(ParameterError, match="leave no gap: ask for the band where"):
+    with refused(ParameterError, "gap"):
         required_noise(replace(PLAN, direction="forward"), 0.01, where="gap")
-    with pytest.raises(ParameterError, match="choose 'everywhere', 'gap' or 'touched'"):
+    with refused(ParameterError, where="nowhere"):
         required_noise(PLAN, 0.01, where="nowhere")
 
 
@@ -190,14 +191,14 @@ def test_no_rod_will_do_and_progress_is_told_after_each():
 def test_a_rod_wants_a_load_cell_and_units():
     options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
     for plan in (PLAN, replace(METAL, load_cell=None), replace(METAL, rod=None)):
-        with pytest.raises(ParameterError, match="give a plan with a rod in SI, and a load_cell"):
+        with refused(ParameterError, "rod", "SI", "load_cell"):
             required_rod(plan, **options)
 
 
 @pytest.mark.parametrize("wrong", [{"lengths": []}, {"diameters": [0.0]}, {"lengths": [-0.1]}, {"diameters": [np.nan]}])
 def test_sizes_that_are_none_are_refused(wrong):
     options = {"lengths": [0.2], "diameters": [1e-3], "youngs_modulus": 2e11, "elastic_strain": 0.01}
-    with pytest.raises(ParameterError, match="give a list of positive numbers"):
+    with refused(ParameterError, *wrong):
         required_rod(METAL, **{**options, **wrong})
 
 

@@ -6,6 +6,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from helpers.refusals import refused
+
 mpl.use("Agg")
 
 from matplotlib import pyplot as plt
@@ -120,14 +122,14 @@ def test_families_that_were_not_sampled_have_no_difference():
 def test_axes_given_are_those_that_return():
     _, axes = plt.subplots(1, 2)
     assert list(plotting.families(made_up([0.5, 0.5], elpd=[0.0, -1.0]), axes=axes)) == list(axes)
-    with pytest.raises(ParameterError, match=r"axes have shape \(2,\), and \(1,\) is wanted: .* no leave-one-out"):
+    with refused(ParameterError, "axes", "(2,)", "(1,)"):
         plotting.families(made_up([0.5, 0.5]), axes=axes)
-    with pytest.raises(ParameterError, match=r"and \(2,\) is wanted: for probabilities and elpd differences"):
+    with refused(ParameterError, "axes", "(2,)", "elpd"):
         plotting.families(made_up([0.5, 0.5], elpd=[0.0, -1.0]), axes=axes[0])
 
 
 def test_what_is_no_comparison_is_refused():
-    with pytest.raises(ParameterError, match="this is no comparison of families: give what compare_families"):
+    with refused(ParameterError, "comparison"):
         plotting.families(made_up([0.5, 0.5]).drop_vars("fits"))
 
 
@@ -172,9 +174,9 @@ def test_a_prior_is_drawn_without_a_posterior_and_into_axes_given(posterior):
 
 
 def test_what_has_no_prior_is_refused(posterior):
-    with pytest.raises(ParameterError, match="there are no draws from a prior here: give the tree that infer_contour"):
+    with refused(ParameterError, "prior"):
         plotting.prior_contours(posterior["posterior"].to_dataset())
-    with pytest.raises(ParameterError, match="contours is 0: give a whole number from 1 up, like 40"):
+    with refused(ParameterError, contours=0):
         plotting.prior_contours(posterior, contours=0)
 
 
@@ -217,11 +219,11 @@ def test_a_posterior_is_drawn_without_its_prior_and_into_axes_given(posterior):
 
 @pytest.mark.parametrize("count", [0, True, 2.5])
 def test_a_count_that_is_none_is_refused(posterior, count):
-    with pytest.raises(ParameterError, match="give a whole number from 1 up, like 40"):
+    with refused(ParameterError, contours=count):
         plotting.posterior_contours(posterior, contours=count)
 
 
 def test_what_is_no_posterior_is_refused(posterior):
     for wrong in (posterior["posterior"].to_dataset(), posterior["prior"]):
-        with pytest.raises(ParameterError, match="this is no posterior of a contour"):
+        with refused(ParameterError, "posterior", "contour"):
             plotting.posterior_contours(wrong)

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from helpers.refusals import refused
+
 mpl.use("Agg")
 
 from matplotlib import colors
@@ -228,7 +230,7 @@ def test_single_sweep_has_a_single_style(si):
 
 
 def test_wrong_number_of_panels_is_refused(plain):
-    with pytest.raises(ParameterError, match="give three"):
+    with refused(ParameterError, "axes", "three"):
         plotting.observables(plain.record, axes=panels(2)[:, 0])
 
 
@@ -237,7 +239,7 @@ def test_predicted_interval_is_filled_where_there_is_one(noisy):
     axes = plotting.predictive(noisy, predicted)
     assert [len(ax.collections) for ax in axes] == [0, 2, 0]
     assert "predicted" in labels(axes[0])
-    with pytest.raises(ParameterError, match="every sample"):
+    with refused(ParameterError, "every sample"):
         plotting.predictive(noisy, predicted.isel(sample=slice(3)))
 
 
@@ -267,7 +269,7 @@ def test_a_figure_of_predictions_has_residuals_below_each_channel(noisy):
     assert [ax.get_ylabel().splitlines()[0] for ax in everything[1::2]] == ["residual"] * 3
     assert everything[-1].get_xlabel() == r"drive angle $\varphi_0$ [°]"
     assert not any(ax.get_xlabel() for ax in axes)
-    with pytest.raises(ParameterError, match="axes are given for the residuals only"):
+    with refused(ParameterError, "axes", "residuals"):
         plotting.predictive(noisy, predicted, residuals=panels(3)[:, 0])
 
 
@@ -306,7 +308,7 @@ def test_an_interval_goes_with_records_of_its_frame_only(noisy):
     interval = predictive_interval(tree)
     assert interval.attrs["load_cell_frame"] == "turning"
     assert len(plotting.predictive(in_frame(noisy, "turning"), interval)[1].collections) == 2
-    with pytest.raises(ParameterError, match=r"predicted in the turning frame, .* give in_frame\(record, 'turning'\)"):
+    with refused(ParameterError, "turning", "in_frame(record, 'turning')"):
         plotting.predictive(noisy, interval)
 
 
@@ -367,19 +369,19 @@ def test_rods_are_the_forward_ones_unless_told_otherwise(plain):
 
 def test_rods_refuse_what_is_not_there(plain):
     result = scan(plain.contour, direction="backward", drive_step=STEP)
-    with pytest.raises(ParameterError, match="no forward sweep: choose from backward"):
+    with refused(ParameterError, "forward", "backward"):
         plotting.rods(result)
-    with pytest.raises(ParameterError, match="at least one rod"):
+    with refused(ParameterError, "rod"):
         plotting.rods(plain, count=0)
     for sweep in (2, -1, 0.5):
-        with pytest.raises(ParameterError, match=rf"no sweep {sweep}: choose from\n0: forward from \(0, 0\)\n1: backw"):
+        with refused(ParameterError, f"sweep {sweep}", "0: forward from (0, 0)", "1: backward"):
             plotting.rods(plain, sweep=sweep)
-    with pytest.raises(ParameterError, match="direction='forward' and sweep=1 are given: one of them is enough"):
+    with refused(ParameterError, "direction='forward'", "sweep=1"):
         plotting.rods(plain, direction="forward", sweep=1)
     several = scan(plain.contour, base=[(0, 0), (0.25, 0)], drive_step=STEP)
-    with pytest.raises(ParameterError, match=r"2 backward sweeps: choose .*sweep=1, from\n(.*\n)*3: .* \(0\.25, 0\)$"):
+    with refused(ParameterError, "2 backward sweeps", "sweep=1", "(0.25, 0)"):
         plotting.rods(several, direction="backward")
-    with pytest.raises(ParameterError, match="2 forward sweeps"):
+    with refused(ParameterError, "2 forward sweeps"):
         plotting.rods(several)
 
 
@@ -480,24 +482,16 @@ def test_the_seventh_base_has_the_first_colour_and_another_line(plain):
 
 
 @pytest.mark.parametrize(
-    ("draw", "error", "message"),
+    ("draw", "error", "named"),
     [
-        (
-            lambda scanned: plotting.touched(scanned.record),
-            ParameterError,
-            r"touched draws what scan\(...\) returns, and",
-        ),
-        (lambda scanned: plotting.observables(scanned), RecordError, "not a Scan: take its record"),
-        (
-            lambda scanned: plotting.observables(xr.DataTree()),
-            RecordError,
-            "not a DataTree: build one with make_record",
-        ),
-        (lambda scanned: plotting.predictive(xr.Dataset(), xr.Dataset()), RecordError, "the record states no units"),
+        (lambda scanned: plotting.touched(scanned.record), ParameterError, ["touched", "scan("]),
+        (lambda scanned: plotting.observables(scanned), RecordError, ["Scan", "record"]),
+        (lambda scanned: plotting.observables(xr.DataTree()), RecordError, ["DataTree", "make_record"]),
+        (lambda scanned: plotting.predictive(xr.Dataset(), xr.Dataset()), RecordError, ["units"]),
     ],
 )
-def test_what_cannot_be_drawn_is_refused_in_words(plain, draw, error, message):
-    with pytest.raises(error, match=message):
+def test_what_cannot_be_drawn_is_refused_in_words(plain, draw, error, named):
+    with refused(error, *named):
         draw(plain)
 
 
@@ -627,7 +621,7 @@ def test_true_contour_ends_where_it_ends():
 
 @pytest.mark.parametrize("x", [0.5, [0.5, 0.5], [0.0, np.nan]])
 def test_contour_refuses_what_is_no_range(x):
-    with pytest.raises(ParameterError, match="span the range"):
+    with refused(ParameterError, "x", "range"):
         plotting.contour(x)
 
 
@@ -685,11 +679,11 @@ def test_odd_posteriors_are_drawn():
 
 def test_unknown_names_are_refused(posterior):
     for function in (plotting.trace, plotting.pairs):
-        with pytest.raises(ParameterError, match="no b: it has a, x_c"):
+        with refused(ParameterError, "b", "a, x_c"):
             function(posterior, names=["b"])
-        with pytest.raises(ParameterError, match="is wanted"):
+        with refused(ParameterError, "axes"):
             function(posterior, names=["a"], axes=panels(2, 2))
-    with pytest.raises(ParameterError, match="truth names b"):
+    with refused(ParameterError, "truth", "b"):
         plotting.pairs(posterior, truth={"b": 0.5})
 
 

@@ -9,12 +9,15 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from helpers.refusals import refused
+
 mpl.use("Agg")
 
 from matplotlib.figure import Figure
 
 from helpers.pictures import difference
 from tactile_bayes import plotting
+from tactile_bayes.checks import shown
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting import style
@@ -46,7 +49,7 @@ def test_settings_are_put_back_after_an_error():
 
 @pytest.mark.parametrize("name", ["poster", "", None])
 def test_another_style_is_refused(name):
-    with pytest.raises(ParameterError, match="choose 'print' or 'screen'"), style(name):
+    with refused(ParameterError, shown(name), "'print'", "'screen'"), style(name):
         pass
 
 

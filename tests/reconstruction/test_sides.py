@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.refusals import refused
 from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola, paper_profile
@@ -71,6 +72,15 @@ def test_a_label_that_the_moment_contradicts_is_not_believed(bias):
     wrong = measured.assign(direction=("sample", np.full(measured.sizes["sample"], "backward")))
     assert np.all(contact_sides(wrong, CELL) == 1.0)
     assert not doubtful_sweeps(wrong, CELL)
+
+
+@pytest.mark.parametrize("bias", [-2.0, -0.8, 0.8, 2.0])
+def test_a_zero_before_and_after_contact_is_one_however_far_off(bias):
+    """A load that does not change would not come back to the same level; contact is a third of the record here."""
+    record = scan(paper_profile("II", q=0.8), drive_angles=np.radians(np.arange(-30.0, 210.0, 2.0))).record
+    measured = LoadCell(force_noise=0.05, moment_noise=0.02, bias=(bias, 0.0, 0.0)).measure(record, seed=1)
+    np.testing.assert_array_equal(contact_sides(measured, CELL) > 0.0, measured.direction.values == "forward")
+    assert not doubtful_sweeps(measured, CELL)
 
 
 def test_a_drive_that_turns_back_in_contact_stays_on_its_side():
@@ -149,5 +159,5 @@ def test_in_doubt_evidence_decides_which_side_it_was():
 
 def test_a_side_that_is_none_is_refused():
     record = scan(Parabola(0.5, 0.5), direction="forward").record
-    with pytest.raises(ParameterError, match="there is no side 'left' of sweep 0"):
+    with refused(ParameterError, "'left'", "sweep 0"):
         with_sides(record, {0: "left"})

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
-
 import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from scipy.stats import binomtest
 
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
@@ -26,10 +25,6 @@ WIRE = Rod(length=0.2, flexural_rigidity=2.4e-3, diameter=0.7e-3)
 @pytest.fixture(scope="module")
 def swept():
     return scan(CONTOUR, drive_step=0.1).record
-
-
-def refused(error, message):
-    return pytest.raises(error, match=re.escape(message))
 
 
 def assert_contour_comes_back(record, contacts, contour, length=1.0):
@@ -257,26 +252,23 @@ def test_unloaded_samples_are_taken_for_loaded_as_rarely_as_stated(missing):
 def test_a_missing_channel_is_refused(swept, name):
     record = swept.copy(deep=True)
     record[name].values[:] = np.nan
-    message = (
-        f"a contact point takes all of holding_moment, force_x, force_y, and {name} was not measured: infer_contour"
-    )
-    with refused(RecordError, message):
+    with refused(RecordError, name):
         reconstruct(record)
 
 
 def test_an_unknown_method_is_refused(swept):
-    with refused(ParameterError, "method is 'exact': choose 'raw'"):
+    with refused(ParameterError, method="exact"):
         reconstruct(swept, method="exact")
 
 
 def test_what_is_no_record_is_refused(swept):
-    with refused(RecordError, "there is no column 'force_y'"):
+    with refused(RecordError, "'force_y'"):
         reconstruct(swept.drop_vars("force_y"))
 
 
 @pytest.mark.parametrize("friction", [1.0, -0.1, float("nan")])
 def test_impossible_friction_is_refused(swept, friction):
-    with refused(ParameterError, f"friction is {friction!r}: give Coulomb's coefficient, from 0 to 0.84"):
+    with refused(ParameterError, friction=friction):
         reconstruct(swept, friction=friction)
 
 
@@ -294,6 +286,5 @@ def test_a_rod_that_is_given_holds_against_the_one_stated():
 
 
 def test_a_rod_in_si_does_not_fit_a_dimensionless_record(swept):
-    message = f"the record is dimensionless, so {WIRE} does not fit it: leave the rod out, or use to_si"
-    with refused(ParameterError, message):
+    with refused(ParameterError, "dimensionless", WIRE):
         reconstruct(swept, rod=WIRE)

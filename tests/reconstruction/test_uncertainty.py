@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.stats import kstest
 
 from helpers.load_cells import GAIN, SHARED
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck, RandomWalk
@@ -48,10 +47,6 @@ def scenes(swept):
         "friction": (scan(paper_profile("II", q=0.5), drive_step=0.05, friction=0.3).record, 0.3),
         "SI": (scan(Parabola(2.5, 0.1), drive_step=0.05, rod=WIRE).record, 0.0),
     }
-
-
-def refused(message):
-    return pytest.raises(ParameterError, match=re.escape(message))
 
 
 def contacts_of(record, phase, direction="forward"):
@@ -359,7 +354,7 @@ def test_without_a_noise_level_there_are_no_standard_deviations(swept):
 
 @pytest.mark.parametrize("load_cell", [None, LoadCell(force_noise=0.05), LoadCell(moment_noise=0.02)])
 def test_the_constrained_method_needs_noise_on_every_channel(swept, load_cell):
-    with refused("the load cell has none on at least one: give LoadCell(force_noise=..., moment_noise=...)"):
+    with refused(ParameterError, "LoadCell(force_noise=..., moment_noise=...)"):
         reconstruct(swept, method="constrained", load_cell=load_cell)
 
 
@@ -367,7 +362,7 @@ def test_the_constrained_method_needs_noise_on_every_channel(swept, load_cell):
 def test_outliers_without_variance_have_no_weights(swept, nu):
     load_cell = LoadCell(force_noise=0.05, moment_noise=0.02, degrees_of_freedom=nu)
     measured = load_cell.measure(swept, seed=1)
-    with refused("use method='raw', or more degrees of freedom"):
+    with refused(ParameterError, "method='raw'", "degrees of freedom"):
         reconstruct(measured, method="constrained")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
+from helpers.refusals import refused
 from tactile_bayes.errors import RecordError
 from tactile_bayes.record import csv_rows, parsing, read_record
 from tactile_bayes.record.csv_format import read_csv
@@ -117,7 +118,7 @@ def test_a_column_that_turns_out_to_be_text_is_read_again_from_the_beginning(tmp
 
 @pytest.mark.parametrize("where", [0, 50, 100])
 def test_a_long_remark_among_many_short_ones(tmp_path, monkeypatch, where):
-    for name, value in (("_FIRST", 100), ("_CHUNK", 200), ("FREE", 500)):
+    for name, value in (("_FIRST", 100), ("_CHUNK", 200)):
         monkeypatch.setattr(csv_rows, name, value)
     path = tmp_path / "record.csv"
     notes = ["", "ab"] * 50
@@ -138,7 +139,7 @@ def test_a_refusal_far_down_names_its_line(tmp_path):
     rows[20_000] = '0,"forward",1.2,0.1,0.1,oops'
     rows[10:10] = ["", ""]
     path.write_text("\n".join(["# rig: bench", "sweep,direction,drive_angle,holding_moment,force_x,force_y", *rows]))
-    with pytest.raises(RecordError, match="line 20005, column 'force_y': 'oops' is not a number"):
+    with refused(RecordError, "line 20005", "'force_y'", "'oops'"):
         read_record(path)
 
 

@@ -11,7 +11,9 @@ import xarray as xr
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis.extra import numpy as hnp
 
-from helpers.record_tables import WIRE, columns, refused
+from helpers.record_tables import WIRE, columns
+from helpers.refusals import refused
+from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import (
     CHANNELS,
@@ -146,13 +148,13 @@ def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypa
         ("load_cell_serial: 4711", "needs a name that does not begin with 'load_cell_'"),
         (
             "load_cell_force_noise: -1",
-            "line 1, attribute 'load_cell_force_noise' is -1.0: give zero or a positive number",
+            "line 1, attribute 'load_cell_force_noise' is -1.0",
         ),
     ],
 )
 def test_a_load_cell_has_no_entries_but_its_own(tmp_path, line, message):
     path = write_text(tmp_path / "lab.csv", f"# {line}", HEADER, ROW)
-    with refused(message) as caught:
+    with refused(RecordError, message) as caught:
         read_record(path, rod=WIRE)
     assert str(caught.value).startswith(f"{path}: line 1, ")
 
@@ -182,19 +184,19 @@ def test_separators_at_the_end_of_every_line_make_no_columns(tmp_path, end):
     assert read_record(path).identical(plain)
     cells = end.replace(",", ",7", 1)
     write_text(path, HEADER + end, ROW + end, ROW + cells)
-    with refused("line 1: column 7 has no name: name it, or remove it (in line 3 it has '7"):
+    with refused(RecordError, "line 1: column 7 has no name: name it, or remove it (in line 3 it has '7"):
         read_record(path)
     write_text(path, HEADER + end, ROW)
-    with refused("columns (sweep, direction, drive_angle, holding_moment, force_x, force_y, (column 7)"):
+    with refused(RecordError, "columns (sweep, direction, drive_angle, holding_moment, force_x, force_y, (column 7)"):
         read_record(path)
 
 
 def test_names_that_are_only_values_make_no_line_of_names(tmp_path):
     """What is given for all samples stands in lines of samples too."""
     path = write_text(tmp_path / "rig.csv", "Angle,Sense", "1.25,forward")
-    with refused("there is no column 'holding_moment' (columns: Angle, Sense)"):
+    with refused(RecordError, "there is no column 'holding_moment' (columns: Angle, Sense)"):
         read_record(path, columns={"drive_angle": "1.25-Angle", "sweep": "0", "direction": "forward"})
-    with refused("there is no column 'drive_angle', but a column 'Angle': did you mean 'drive_angle'?"):
+    with refused(RecordError, "there is no column 'drive_angle', but a column 'Angle': did you mean 'drive_angle'?"):
         read_record(path, columns={"sweep": "0", "direction": "forward"})
 
 
@@ -267,18 +269,19 @@ def test_a_given_rod_completes_or_repeats_the_stated_one(tmp_path, suffix):
     path = tmp_path / f"record{suffix}"
     write_record(make_record(columns(), rod=WIRE), path)
     assert rod_of(read_record(path, rod=WIRE)) == WIRE
-    with refused(f"{path}: the SI record states {WIRE}, but {Rod(0.1, 1e-5)} was given"):
+    with refused(RecordError, f"{path}: the SI record states {WIRE}, but {Rod(0.1, 1e-5)} was given"):
         read_record(path, rod=Rod(0.1, 1e-5))
     write_record(make_record(columns()), path)
-    with refused(f"but {WIRE} was given: read it without a rod, and convert it with to_si(record, rod)"):
+    with refused(RecordError, f"but {WIRE} was given"):
         read_record(path, rod=WIRE)
 
 
 def test_si_without_a_rod_is_refused_or_completed(tmp_path):
     path = write_text(tmp_path / "lab.csv", "# units: SI", "# rod_length: 0.2 [m]", HEADER, ROW)
     with refused(
+        RecordError,
         f"{path}: the record is SI, but rod_flexural_rigidity of its rod is not stated: give rod=Rod(length=..., "
-        "flexural_rigidity=...), on the command line --length and --flexural-rigidity"
+        "flexural_rigidity=...), on the command line --length and --flexural-rigidity",
     ):
         read_record(path)
     assert rod_of(read_record(path, rod=WIRE)) == WIRE
@@ -291,7 +294,7 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         write_text(path, "sweep,direction,drive_angle,holding_moment", "0,forward,1.25,0.5")
     else:
         make_record(columns()).drop_vars(["force_x", "force_y"]).to_netcdf(path, engine="h5netcdf")
-    with refused("missing=('force_x',)"):
+    with refused(RecordError, "missing=('force_x',)"):
         read_record(path, missing=("force_y",))
     assert present_channels(read_record(path, missing=("force_x", "force_y"))) == ("holding_moment",)
 
@@ -309,11 +312,11 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         ([HEADER.replace(",", ";"), ROW], "line 2: there are 1 cells in 6 columns"),
         (
             [HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"],
-            "'0,5' is not a number: correct it, or remove the row; ",
+            "'0,5' is not a number",
         ),
         (
             [HEADER.replace(",", " "), ROW.replace(",", " ")],
-            "there is no column 'sweep' (columns: sweep direction drive",
+            "there is no column 'sweep' (columns: sweep direction drive_angle",
         ),
         (
             [HEADER.replace(",", ";"), "0;forward;1,25;1.000,5;0;0"],
@@ -322,11 +325,11 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it (in line 2 it has '0')"),
         (
             ["Rig 4", HEADER, ROW],
-            "line 1: this line was taken for the column names (Rig 4), but they are in line 2: put #",
+            "line 1: this line was taken for the column names (Rig 4), but they are in line 2",
         ),
         (
             ["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")],
-            "(Rig 4), but they are in line 3: put",
+            "(Rig 4), but they are in line 3",
         ),
         (
             ["# note", "Rig 4,,,,,", HEADER, ROW],
@@ -344,32 +347,30 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
             ["# units: SI", "# rod_length: 200 [mN]", HEADER, ROW],
             "line 2: rod_length is in [mN], but takes m, cm, mm or",
         ),
-        (["# units: SI", "# rod_length: long", HEADER, ROW], "line 2: rod_length is 'long': give a number [m]"),
+        (["# units: SI", "# rod_length: long", HEADER, ROW], "line 2: rod_length is 'long'"),
         (
             ["# units: dimensionless", "# load_cell_force_noise: 0.1 [N]", HEADER, ROW],
-            "line 2: load_cell_force_noise is in [N], but takes 1: convert it",
+            "line 2: load_cell_force_noise is in [N], but takes 1",
         ),
         (["# column time: clock [s]", HEADER, ROW], "line 1: 'clock' is no kind of column"),
         (["# column n: integer [1]", HEADER + ",n", ROW + ",1.5"], "line 3, column 'n': '1.5' is no integer"),
         (
             ["# column drive_angle: number [mm]", HEADER, ROW],
-            "line 1, column 'drive_angle' is in [mm], but takes rad, mrad, deg or °: correct the unit, or convert",
+            "line 1, column 'drive_angle' is in [mm], but takes rad, mrad, deg or °",
         ),
         (
             ["# units: dimensionless", "# column force_x: number [mN]", HEADER, ROW],
-            "line 2, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]: convert it, "
-            "or state units 'SI' and the rod",
+            "line 2, column 'force_x' is in [mN], but the record is dimensionless, so that it takes [1]",
         ),
-        (["# units: SI"], "there is no line of column names: add one, sweep,direction,"),
+        (["# units: SI"], "there is no line of column names"),
         ([HEADER], "there are no samples"),
         (
             [HEADER, ROW.replace("1.25", '"1,25"')],
-            "line 2, column 'drive_angle': '1,25' is not a number: correct it, or remove the row; where decimals have "
-            "commas, write ; between columns",
+            "line 2, column 'drive_angle': '1,25' is not a number",
         ),
         (
             [HEADER + ",a/b,a|b", ROW + ",1,2"],
-            "the name 'a/b' cannot be stored in every file, and as 'a|b' there is ano",
+            "the name 'a/b' cannot be stored in every file, and as 'a|b' there is another",
         ),
         (
             [HEADER.replace("drive_angle", "x") + ",a/b,a|b", ROW + ",1,2"],
@@ -380,31 +381,31 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
 )
 def test_what_is_wrong_in_a_csv_file_is_refused_with_its_line(tmp_path, lines, message):
     path = write_text(tmp_path / "bad.csv", *lines)
-    with refused(message) as caught:
+    with refused(RecordError, message) as caught:
         read_record(path)
     assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_files_that_are_something_else_are_refused(tmp_path):
     (tmp_path / "a.nc").write_bytes(b"not a file of this kind")
-    with refused("a.nc: the file cannot be read, it is damaged or cut short, or no NetCDF 4 file ("):
+    with refused(RecordError, "a.nc: the file cannot be read, it is damaged or cut short, or no NetCDF 4 file ("):
         read_record(tmp_path / "a.nc")
     for path in ("a.txt", "a"):
         (tmp_path / path).write_text(f"{HEADER}\n{ROW}\n")
-        with refused("a record is a .csv or a .nc file, not"):
+        with refused(RecordError, "a record is a .csv or a .nc file, not"):
             read_record(tmp_path / path)
-        with refused("a record is a .csv or a .nc file, not"):
+        with refused(RecordError, "a record is a .csv or a .nc file, not"):
             write_record(make_record(columns()), tmp_path / path)
     image = xr.Dataset({"image": ("pixel", [1.0]), "sweep": ("t", [0])})
     image.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
-    with refused("variable 'image' has dimensions ('pixel',)"):
+    with refused(RecordError, "variable 'image' has dimensions ('pixel',)"):
         read_record(tmp_path / "b.nc")
     for path in ("absent.csv", "absent.nc", "absent"):
         with pytest.raises(FileNotFoundError):
             read_record(tmp_path / path)
     for path in ("folder", "folder.csv"):
         (tmp_path / path).mkdir()
-        with refused(f"{tmp_path / path} is a folder: give the record itself, a .csv or a .nc file"):
+        with refused(RecordError, f"{tmp_path / path} is a folder"):
             read_record(tmp_path / path)
 
 
@@ -418,14 +419,14 @@ def test_files_that_are_something_else_are_refused(tmp_path):
         (b"\xfe\xff" + HEADER.encode("utf-16-be"), "the file is UTF-16 text"),
         (HEADER.encode("utf-32"), "the file is UTF-32 text"),
         (HEADER.encode("utf-16-le"), "the file is no UTF-8 text, but looks like UTF-16: save it as CSV in UTF-8"),
-        (b"\x89HDF\r\n\x1a\n", "this is no CSV file, but a NetCDF (HDF5) file: rename it to end in .nc"),
+        (b"\x89HDF\r\n\x1a\n", "this is no CSV file, but a NetCDF (HDF5) file"),
         (b"CDF\x01\x00", "this is no CSV file, but a NetCDF file of the classic kind: convert it to NetCDF-4"),
         (b"PK\x03\x04\x14", "this is no CSV file, but a workbook of a spreadsheet, or another zip archive: save it as"),
     ],
 )
 def test_a_file_that_is_no_csv_file_says_what_it_is(tmp_path, content, message):
     (tmp_path / "a.csv").write_bytes(content)
-    with refused(f"a.csv: {message}"):
+    with refused(RecordError, f"a.csv: {message}"):
         read_record(tmp_path / "a.csv")
 
 
@@ -436,7 +437,7 @@ def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
 
 
 def test_an_invalid_record_is_not_written(tmp_path):
-    with refused("there is no column 'force_x'"):
+    with refused(RecordError, "there is no column 'force_x'"):
         write_record(make_record(columns()).drop_vars("force_x"), tmp_path / "a.csv")
     assert list(tmp_path.iterdir()) == []
 
@@ -463,10 +464,10 @@ NINES = "9" * 5000
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ([HEADER, ROW.replace("0,", f"{NINES},", 1)], "line 2, column 'sweep': '999"),
+        ([HEADER, ROW.replace("0,", f"{NINES},", 1)], "line 2, column 'sweep'"),
         ([f"# rod_length: 1 [{'Gm9 ' * 40}]", HEADER, ROW], "line 1: rod_length is in [Gm9"),
-        ([f"{HEADER},note", f"{ROW},a\0b"], "line 2: there is a NUL character (0x00), which is no text: remove it"),
-        (["# note: a\0b", HEADER, ROW], "line 1: there is a NUL character (0x00), which is no text: remove it"),
+        ([f"{HEADER},note", f"{ROW},a\0b"], "line 2: there is a NUL character (0x00), which is no text"),
+        (["# note: a\0b", HEADER, ROW], "line 1: there is a NUL character (0x00), which is no text"),
         (
             [f"{HEADER},note", f"{ROW},a", f"{ROW},{'x' * 131_073}"],
             "line 3: the line cannot be read (field larger than",
@@ -481,24 +482,24 @@ NINES = "9" * 5000
         ),
         (
             ['# column note: text [m] "\\ud800"', f"{HEADER},note", f"{ROW},a"],
-            "line 1, column 'note' has an attribute 'long_name' that has half of a surrogate pair in it: remove it",
+            "line 1, column 'note' has an attribute 'long_name' that has half of a surrogate pair in it",
         ),
         (["# CLASS: 1", HEADER, ROW], "the name 'CLASS' cannot be stored in every file"),
         ([f"{HEADER},{'x' * 201}", f"{ROW},a"], "cannot be stored in every file"),
-        ([f"# tactile_bayes record, format {NINES}", HEADER, ROW], "line 1: the file has format 999"),
+        ([f"# tactile_bayes record, format {NINES}", HEADER, ROW], "line 1: the file has format"),
     ],
     ids=lambda value: None if isinstance(value, str) else "",
 )
 def test_what_no_file_could_store_is_refused_as_it_is_read(tmp_path, lines, message):
     path = write_text(tmp_path / "rig.csv", *lines)
-    with refused(message) as caught:
+    with refused(RecordError, message) as caught:
         read_record(path)
     assert len(str(caught.value)) < 2000
 
 
 @pytest.mark.parametrize("text", ["a\0b", "\ud800", "x" * 131_073])
 def test_text_that_no_file_could_store_is_not_written(tmp_path, text):
-    with refused("sample 1, column 'note': the text has "):
+    with refused(RecordError, "sample 1, column 'note': the text has "):
         make_record(columns(note=["", text, "", "", "", ""]))
 
 

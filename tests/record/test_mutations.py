@@ -140,6 +140,14 @@ def outcomes(cases, folder):
         yield outcome(mutated(content, rng), options, folder)
 
 
+def test_a_nul_in_a_unit_is_shown_as_such(tmp_path):
+    units = b"sweep,direction,drive_angle,holding_moment,force_x,force_y\n\0,,deg,N mm,mN,mN\n"
+    path = tmp_path / "record.csv"
+    path.write_bytes(units + b"0,forward,50,0.5,1,2\n")
+    with pytest.raises(RecordError, match=r"line 2, column 'sweep' is in \[\\0\], but takes 1"):
+        read_record(path, rod=WIRE)
+
+
 @pytest.mark.parametrize("cases", [40, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_files_are_refused_or_read_and_written_again(tmp_path, cases):
     found = Counter(outcomes(cases, tmp_path))

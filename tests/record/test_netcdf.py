@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 from helpers.record_tables import WIRE, columns
+from helpers.refusals import refused
 from tactile_bayes.errors import RecordError, TactileBayesError
 from tactile_bayes.inference.result import read_result, write_result
 from tactile_bayes.record import make_record, read_record, write_record
@@ -105,7 +106,7 @@ def test_every_byte_counts(tmp_path):
     content = path.read_bytes()
     for at in (0, 9, 40, 100, len(content) // 2, len(content) - 140, len(content) - 60, len(content) - 1):
         path.write_bytes(content[:at] + bytes([content[at] ^ 4]) + content[at + 1 :])
-        with pytest.raises(RecordError, match="a file is damaged, it is not as it was written"):
+        with refused(RecordError, "damaged"):
             read_netcdf(path, xr.open_dataset, lambda what: RecordError(f"a file {what}"))
 
 
@@ -128,7 +129,7 @@ def test_numbers_and_characters_have_checksums_that_hdf5_checks(tmp_path):
     xr.testing.assert_identical(read_netcdf(tmp_path / "a.nc", xr.open_dataset, ValueError), with_scalar)
     content = (tmp_path / "record.nc").read_bytes()
     (tmp_path / "record.nc").write_bytes(content[:place] + b"\1" + content[place + 1 : content.index(SEAL)])
-    with pytest.raises(RecordError, match=r"the file cannot be read, it is damaged .*: write it again, or put a copy"):
+    with refused(RecordError, "damaged"):
         read_record(tmp_path / "record.nc")
 
 

@@ -8,7 +8,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis.extra import numpy as hnp
 
-from helpers.record_tables import WIRE, columns, edited, refused
+from helpers.record_tables import WIRE, columns, edited
+from helpers.refusals import refused
+from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record, rod_of, to_dimensionless, to_si
 
@@ -53,15 +55,15 @@ def test_units_convert_there_and_back(values, length, rigidity, diameter):
 def test_a_record_in_si_stays_so_with_its_own_rod_only():
     si = make_record(columns(), rod=WIRE)
     assert to_si(si, WIRE) is si
-    with refused("the record is SI already, with Rod(length=0.2,"):
+    with refused(RecordError, "the record is SI already, with Rod(length=0.2,"):
         to_si(si, Rod(0.1, 1e-5))
 
 
 def test_a_rod_of_another_diameter_is_refused():
-    with refused("the record was made with a rod of diameter 0.0 (in rod lengths)"):
+    with refused(RecordError, "the record was made with a rod of diameter 0.0 (in rod lengths)"):
         to_si(make_record(columns()), WIRE)
 
 
 def test_a_conversion_that_overflows_is_refused():
-    with refused("sample 5, column 'force_y': the value is inf"):
+    with refused(RecordError, "sample 5, column 'force_y': the value is inf"):
         to_dimensionless(make_record(edited("force_y", 5, 1e308), rod=WIRE))

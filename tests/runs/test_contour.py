@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from helpers.contour_posteriors import QUICK
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.found_rig import contact_points
 from tactile_bayes.inference.result import read_result
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import to_dimensionless
 from tactile_bayes.runs import contour as module
 from tactile_bayes.runs.contour import analyse
@@ -87,7 +86,7 @@ def test_where_no_contour_is_found_wrong_units_are_suspected(measured, tmp_path,
 
     monkeypatch.setattr(module, "infer_contour", infer_nothing)
     wrong = measured.assign(force_x=1e3 * measured.force_x, force_y=1e3 * measured.force_y)
-    with pytest.raises(InferenceError, match=r"^no parabola was found\. Forces reach .* check the units of the loads"):
+    with pytest.raises(InferenceError, match=r"^no parabola was found\. .*Forces.* units"):
         analyse(wrong, tmp_path)
     with pytest.raises(InferenceError, match=r"^no parabola was found\.$"):
         analyse(measured, tmp_path)
@@ -153,7 +152,7 @@ def test_another_rod_is_that_of_all_results(measured, tmp_path):
     wrong = measured.assign_attrs(rod_length=0.21, rod_diameter=0.0)
     run = analyse(wrong, tmp_path, rod=ROD)
     assert run.posterior.attrs["rod_length"] == ROD.length
-    expected = reconstruct(measured, method="constrained")
+    expected = contact_points(measured, None, run.posterior)
     np.testing.assert_array_equal(run.contacts.contact_x, expected.contact_x)
 
 
@@ -178,15 +177,13 @@ def test_one_step_is_a_result_too(measured, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("probability", [0.0, 1.0, 95.0, float("nan")])
 def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_path, probability):
-    with pytest.raises(ParameterError, match=re.escape(f"probability is {probability!r}: give a number between 0 and")):
+    with refused(ParameterError, probability=probability):
         analyse(measured, tmp_path / "run", probability=probability)
     assert not (tmp_path / "run").exists()
 
 
 def test_an_unknown_family_is_refused(measured, tmp_path):
-    with pytest.raises(
-        ParameterError, match="there is no family 'blob': choose parabola, circle, ellipse, power-law, one"
-    ):
+    with refused(ParameterError, "'blob'", "parabola"):
         analyse(measured, tmp_path, family="blob")
 
 

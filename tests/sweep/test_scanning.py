@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from helpers import exact_rod
 from helpers.integration import shoot
 from helpers.legendre import equilibrium, tangential_arclength
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_function, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.mechanics.rod import Rod
@@ -375,46 +376,45 @@ II = paper_profile("II", 0.5)
 
 
 @pytest.mark.parametrize(
-    ("call", "error", "message"),
+    ("call", "error", "named"),
     [
-        (lambda: scan(paper_profile("II", 1.2)), ReachError, r"out of reach: .* 1\.2 from the pivot .*rod is 1 long"),
-        (lambda: scan(Parabola(5, 0.2), rod=SI), ReachError, r"0\.2 from the pivot.*rod is 0\.12 long"),
-        (lambda: scan(II, base=(0.0, 0.6)), ContourError, r"cuts the base: at x = 0 it is at y = 0\.5, not above"),
-        (lambda: scan(II, base=(0.0, 0.5)), ContourError, "cuts the base"),
-        (lambda: scan(II, base=(0.0, 0.495), rod=Rod(diameter=0.02)), ContourError, "cuts the base"),
-        (lambda: scan(Circle(0.2, 0.3, -0.6)), ContourError, "forward sweep .* beyond the contour's right end"),
-        (lambda: scan(Circle(0.2, 0.3, 0.6), direction="backward"), ContourError, "beyond the contour's left end"),
-        (lambda: scan(II, direction="sideways"), ParameterError, "'sideways': choose 'forward' or 'backward'"),
-        (lambda: equilibria(II, [0.1], direction="both"), ParameterError, "direction is 'both'"),
-        (lambda: scan(II, drive_step=-0.1), ParameterError, r"drive_step is -0\.1: give a positive angle"),
-        (lambda: scan(II, drive_step=1), ParameterError, r"drive_step is 1: .*in radians, at most 0\.5; .*np\.radians"),
-        (lambda: scan(II, drive_step="1"), ParameterError, "drive_step is '1'"),
-        (lambda: scan(II, drive_step=np.nan), ParameterError, "drive_step is nan"),
-        (lambda: scan(II, drive_angles=np.arange(0, 181)), ParameterError, "radians, at most a turn"),
-        (lambda: scan(II, drive_angles=[]), ParameterError, "drive_angles must be finite"),
-        (lambda: scan(II, drive_angles=[0.1, np.nan]), ParameterError, "drive_angles must be finite"),
-        (lambda: scan(Parabola(np.array([0.5, 0.6]), 0.5)), ParameterError, r"one contour.*shape \(2,\)"),
-        (lambda: equilibria(Parabola(np.array([0.5, 0.6]), 0.5), [0.1]), ParameterError, "one contour"),
-        (lambda: equilibria(II, [10.0]), ParameterError, r"slope_angles must be a list of angles in \(−π/2, π/2\)"),
-        (lambda: equilibria(II, [np.nan]), ParameterError, "slope_angles"),
-        (lambda: equilibria(II, [[0.1]]), ParameterError, "slope_angles"),
-        (lambda: equilibria(II, "steep"), ParameterError, "slope_angles must be a list of angles"),
-        (lambda: equilibria(II, [0.1], base=[(0, 0), (1, 0)]), ParameterError, r"base is .*equilibria takes one pivot"),
-        (lambda: equilibria(II, [0.1], base=(0, 0, 0)), ParameterError, r"base is \(0, 0, 0\): give a pivot \(x, y\)"),
-        (lambda: equilibria(II, [0.1], base=(np.nan, 0)), ParameterError, "base is .*nan.*: give a pivot"),
-        (lambda: scan(II, drive_angles="all"), ParameterError, "drive_angles must be finite"),
-        (lambda: scan(None), ParameterError, "the contour is None: give one, such as tb.contours.Parabola"),
-        (lambda: equilibria(np.square, [0.1]), ParameterError, "the contour is <ufunc 'square'>"),
-        (lambda: scan(II, rod=1.0), ParameterError, r"the rod is 1\.0: give a Rod, such as tb\.Rod\(length="),
-        (lambda: equilibria(II, [0.1], rod=0.0), ParameterError, r"the rod is 0\.0: give a Rod"),
-        (lambda: scan(II, friction="0.3"), ParameterError, r"friction is '0\.3': .*a number from 0 to 0\.84"),
-        (lambda: scan(II, friction=-0.1), ParameterError, r"friction is -0\.1: give Coulomb's coefficient"),
-        (lambda: scan(II, friction=np.nan), ParameterError, "friction is nan"),
-        (lambda: equilibria(II, [0.1], friction=0.85), ParameterError, r"friction is 0\.85: .* from 0 to 0\.84"),
+        (lambda: scan(paper_profile("II", 1.2)), ReachError, [1.2, "pivot", "1 long"]),
+        (lambda: scan(Parabola(5, 0.2), rod=SI), ReachError, [0.2, "pivot", "0.12 long"]),
+        (lambda: scan(II, base=(0.0, 0.6)), ContourError, ["x = 0", "y = 0.5", "y = 0.6"]),
+        (lambda: scan(II, base=(0.0, 0.5)), ContourError, ["base"]),
+        (lambda: scan(II, base=(0.0, 0.495), rod=Rod(diameter=0.02)), ContourError, ["base"]),
+        (lambda: scan(Circle(0.2, 0.3, -0.6)), ContourError, ["forward sweep", "right end"]),
+        (lambda: scan(Circle(0.2, 0.3, 0.6), direction="backward"), ContourError, ["left end"]),
+        (lambda: scan(II, direction="sideways"), ParameterError, ["direction", "'sideways'"]),
+        (lambda: equilibria(II, [0.1], direction="both"), ParameterError, ["direction", "'both'"]),
+        (lambda: scan(II, drive_step=-0.1), ParameterError, ["drive_step", -0.1]),
+        (lambda: scan(II, drive_step=1), ParameterError, ["drive_step", 1, 0.5, "np.radians"]),
+        (lambda: scan(II, drive_step="1"), ParameterError, ["drive_step", "'1'"]),
+        (lambda: scan(II, drive_step=np.nan), ParameterError, ["drive_step", "nan"]),
+        (lambda: scan(II, drive_angles=np.arange(0, 181)), ParameterError, ["drive_angles", "radians"]),
+        (lambda: scan(II, drive_angles=[]), ParameterError, ["drive_angles"]),
+        (lambda: scan(II, drive_angles=[0.1, np.nan]), ParameterError, ["drive_angles"]),
+        (lambda: scan(II, drive_angles="all"), ParameterError, ["drive_angles"]),
+        (lambda: scan(Parabola(np.array([0.5, 0.6]), 0.5)), ParameterError, ["one contour", "(2,)"]),
+        (lambda: equilibria(Parabola(np.array([0.5, 0.6]), 0.5), [0.1]), ParameterError, ["one contour"]),
+        (lambda: equilibria(II, [10.0]), ParameterError, ["slope_angles", "(−π/2, π/2)"]),
+        (lambda: equilibria(II, [np.nan]), ParameterError, ["slope_angles"]),
+        (lambda: equilibria(II, [[0.1]]), ParameterError, ["slope_angles"]),
+        (lambda: equilibria(II, "steep"), ParameterError, ["slope_angles"]),
+        (lambda: equilibria(II, [0.1], base=[(0, 0), (1, 0)]), ParameterError, ["base", "one pivot"]),
+        (lambda: equilibria(II, [0.1], base=(0, 0, 0)), ParameterError, ["base", (0, 0, 0)]),
+        (lambda: equilibria(II, [0.1], base=(np.nan, 0)), ParameterError, ["base", "nan"]),
+        (lambda: scan(None), ParameterError, ["contour", None]),
+        (lambda: equilibria(np.square, [0.1]), ParameterError, ["contour", np.square]),
+        (lambda: scan(II, rod=1.0), ParameterError, ["rod", 1.0]),
+        (lambda: equilibria(II, [0.1], rod=0.0), ParameterError, ["rod", 0.0]),
+        (lambda: scan(II, friction="0.3"), ParameterError, ["friction", "'0.3'"]),
+        (lambda: scan(II, friction=-0.1), ParameterError, ["friction", -0.1]),
+        (lambda: equilibria(II, [0.1], friction=0.85), ParameterError, ["friction", 0.85, 0.84]),
     ],
 )
-def test_refusals(call, error, message):
-    with pytest.raises(error, match=message):
+def test_refusals(call, error, named):
+    with refused(error, *named):
         call()
 
 
@@ -430,7 +430,7 @@ def test_a_pivot_just_below_the_contour():
         for sweep in scan(contour).events.values():
             assert np.isfinite(sweep.snap_off.drive_angle)
             assert abs(sweep.snap_off.drive_angle - sweep.first_contact.drive_angle) > 1
-    with pytest.raises(ContourError, match=r"comes within 0.002 of the pivot at \(0, 0\); .* from 0.004 on \(2%"):
+    with refused(ContourError, 0.002, "(0, 0)", 0.004):
         scan(Parabola(0.3, 0.002), rod=Rod(length=0.2, flexural_rigidity=1.0))
 
 

@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from helpers.refusals import refused
 from tactile_bayes import Rod, reconstruct, scan
+from tactile_bayes.checks import shown
 from tactile_bayes.contours import (
     Circle,
     Ellipse,
@@ -40,11 +42,9 @@ def test_several_bases_are_the_single_ones_in_one_record():
             for name in ("base_x", "base_y", "drive_angle", *LOADS, "truth_contact_x", "truth_contact_phase"):
                 np.testing.assert_array_equal(ours[name], theirs[name])
             assert several.sweeps[2 * number + sweep] == alone.events[direction] == alone.sweeps[sweep]
-    with pytest.raises(
-        ParameterError, match=r"no events of direction 'forward': there are several bases.*scan\.sweeps"
-    ):
+    with refused(ParameterError, "'forward'", "scan.sweeps"):
         several.events["forward"]
-    with pytest.raises(ParameterError, match="no events of direction 'backward': choose from 'forward'"):
+    with refused(ParameterError, "'backward'", "'forward'"):
         scan(contour, direction="forward").events["backward"]
 
 
@@ -65,7 +65,7 @@ def test_more_bases_close_the_gap_of_one(name, q):
 
 @pytest.mark.parametrize("base", ["here", (0.0,), [], [(0.0, np.nan)], (0.0, 0.0, 0.0), [(0, 0), (1,)]])
 def test_a_base_that_is_none_is_refused(base):
-    with pytest.raises(ParameterError, match=r"base is .*: give a pivot \(x, y\), or several: \[\(x, y\), \(x, y\)\]"):
+    with refused(ParameterError, base=base):
         scan(Parabola(0.5, 0.5), base=base)
 
 
@@ -73,54 +73,42 @@ HALF = np.linspace(0.1, 0.9, 30)
 
 
 @pytest.mark.parametrize(
-    ("contour", "base", "direction", "message"),
+    ("contour", "base", "direction", "named"),
     [
-        (
-            Circle(0.3, 0.3),
-            (0.6, 0.2),
-            "forward",
-            r"first touch beyond .* right end at \(0\.3, 0\.6\), where it stands up",
-        ),
-        (
-            Circle(0.3, 0.3),
-            (-0.6, 0.2),
-            "backward",
-            r"first touch beyond .* left end at \(-0\.3, 0\.6\), where it stands",
-        ),
-        (Ellipse(0.3, 0.2, 0.3), (0.6, 0.2), "forward", r"right end at \(0\.3, 0\.5\), where it stands upright"),
+        (Circle(0.3, 0.3), (0.6, 0.2), "forward", ["first touch", "right end", "(0.3, 0.6)", "upright"]),
+        (Circle(0.3, 0.3), (-0.6, 0.2), "backward", ["first touch", "left end", "(-0.3, 0.6)", "upright"]),
+        (Ellipse(0.3, 0.2, 0.3), (0.6, 0.2), "forward", ["right end", "(0.3, 0.5)", "upright"]),
         (
             from_function(lambda x: 0.3 + 0.5 * x**2, (-0.9, 0.5)),
             (0.0, 0.0),
             "forward",
-            r"beyond the contour's right end at \(0\.5, 0\.425\), the end of the function's domain",
+            ["right end", "(0.5, 0.425)", "domain"],
         ),
         (
             from_points(HALF, 0.3 + 0.5 * HALF**2),
             (0.0, 0.0),
             "forward",
-            r"still touch at the contour's left end at \(0\.1, 0\.305\), the first point measured, and nothing",
+            ["still touch", "left end", "(0.1, 0.305)", "first point"],
         ),
         (
             Joined(Circle(0.4, 0.3), Parabola(0.5, 0.3)),
             (-0.7, 0.25),
             "backward",
-            r"the contour's left end at \(-0\.4, 0\.7\), where it stands upright",
+            ["left end", "(-0.4, 0.7)", "upright"],
         ),
     ],
 )
-def test_contact_beyond_an_end_is_refused_with_its_name(contour, base, direction, message):
-    with pytest.raises(ContourError, match=message):
+def test_contact_beyond_an_end_is_refused_with_its_name(contour, base, direction, named):
+    with refused(ContourError, *named):
         scan(contour, base=base, direction=direction)
 
 
-@pytest.mark.parametrize(
-    ("left", "right", "what"), [(-0.9, 0.5, "would first touch beyond"), (0.2, 1.2, "would still touch at")]
-)
+@pytest.mark.parametrize(("left", "right", "what"), [(-0.9, 0.5, "first touch"), (0.2, 1.2, "still touch")])
 def test_of_several_bases_the_one_that_is_refused_is_named(left, right, what):
     contour = from_function(lambda x: 0.3 + 0.5 * x**2, (left, right))
     good = (-0.45, 0.15) if left < 0 else (0.6, 0.0)
     assert scan(contour, base=good, direction="forward").sweeps[0].base == good
-    with pytest.raises(ContourError, match=rf"in a forward sweep from the pivot at \(0, 0\.05\) the rod {what}"):
+    with refused(ContourError, "forward sweep", "(0, 0.05)", what):
         scan(contour, base=[good, (0.0, 0.05)], direction="forward")
 
 
@@ -133,9 +121,7 @@ def test_half_a_contour_will_do_if_the_rod_lets_go_before_its_end():
 def test_a_rod_that_would_be_stopped_again_is_said_so():
     """A tip slips over the sharp vertex of a nearly flat object, whose other flank is still in the rod's way."""
     contour = PowerLaw(0.06, 1.2, 0.5, 0.8)
-    with pytest.warns(
-        ClearanceWarning, match=r"forward sweep from \(0, 0\) the rod snaps at 1\.29428 rad, but straight"
-    ):
+    with pytest.warns(ClearanceWarning, match=r"forward .*\(0, 0\).* 1\.29428 rad"):
         result = scan(contour, direction="forward", drive_step=0.01)
     sweep = result.sweeps[0]
     assert not sweep.clear
@@ -151,7 +137,7 @@ def test_a_grid_after_a_snap_off_that_is_not_clear_is_refused():
     contour = PowerLaw(0.06, 1.2, 0.5, 0.8)
     with (
         pytest.warns(ClearanceWarning),
-        pytest.raises(ParameterError, match=r"drive_angles: all of them are after the snap-off, at 1\.29428 rad"),
+        refused(ParameterError, "drive_angles", "1.29428 rad"),
     ):
         scan(contour, direction="forward", drive_angles=[2.0, 3.0])
     with pytest.warns(ClearanceWarning):
@@ -209,14 +195,14 @@ def test_the_largest_strain_against_integration(direction, q):
 
 
 def test_a_rod_bent_beyond_its_limit_is_warned_of():
-    with pytest.warns(StrainWarning, match=r"strained by 0\.00\d+, more than the 0\.001 that it takes elastically"):
+    with pytest.warns(StrainWarning, match=r"0\.00\d+, .*0\.001"):
         scan(Parabola(2.5, 0.1), rod=Rod.circular(0.2, 0.5e-3, 206e9, elastic_strain=0.001), direction="forward")
     assert scan(Parabola(2.5, 0.1), rod=WIRE, direction="forward").sweeps[0].largest_strain < 0.02  # and no warning
     assert scan(Parabola(0.5, 0.5)).sweeps[0].largest_strain == 0.0
 
 
 def test_a_strain_beyond_the_model_is_warned_of_whatever_the_rod_bears():
-    with pytest.warns(StrainWarning, match=r"strained by 0\.6: beyond 0\.1 it is neither slender nor linearly elastic"):
+    with pytest.warns(StrainWarning, match=r"0\.6: .*0\.1"):
         scan(Parabola(0.5, 0.5), rod=Rod(diameter=0.2, elastic_strain=0.9), direction="forward")
 
 
@@ -230,19 +216,25 @@ def test_rods_are_equal_and_print_alike_if_they_bear_the_same():
 
 
 @pytest.mark.parametrize(
-    ("build", "message"),
+    "wrong",
     [
-        (lambda: Rod(elastic_strain=-0.1), r"the rod's elastic strain is -0\.1: give a positive number, or none"),
-        (lambda: Rod(elastic_strain=np.inf), r"the rod's elastic strain is inf"),
-        (lambda: Rod(length="0.1"), r"the rod's length is '0\.1': give a positive number \[m\]"),
-        (lambda: Rod(flexural_rigidity=None), r"the rod's flexural_rigidity is None: .*\[N m²\]"),
-        (lambda: Rod(diameter="thin"), r"the rod's diameter is 'thin': give zero or a positive number"),
-        (lambda: Rod.circular(0.1, 1e-3, "steel"), r"the rod's youngs_modulus is 'steel': give a positive number"),
+        {"elastic_strain": -0.1},
+        {"elastic_strain": np.inf},
+        {"elastic_strain": True},
+        {"length": "0.1"},
+        {"length": True},
+        {"flexural_rigidity": None},
+        {"diameter": "thin"},
+        {"diameter": False},
+        {"youngs_modulus": "steel"},
     ],
+    ids=str,
 )
-def test_what_is_no_rod_is_refused(build, message):
-    with pytest.raises(ParameterError, match=message):
-        build()
+def test_what_is_no_rod_is_refused(wrong):
+    ((name, value),) = wrong.items()
+    build, right = (Rod, {}) if name != "youngs_modulus" else (Rod.circular, {"length": 0.1, "diameter": 1e-3})
+    with refused(ParameterError, name.replace("elastic_strain", "elastic strain"), shown(value)):
+        build(**right, **wrong)
 
 
 @pytest.mark.slow

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from helpers.refusals import refused
 from helpers.tasks import alive, die, die_once, double, fail, fail_strangely, note_and_sleep, wait_until
+from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError, TaskError
 from tactile_bayes.tasks import run_tasks
 from tactile_bayes.tasks import workers as tasks
@@ -52,7 +54,7 @@ def test_no_task_is_no_work():
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, "2", True])
 def test_no_number_of_workers_is_refused(workers):
-    with pytest.raises(ParameterError, match="give a positive number"):
+    with refused(ParameterError, "workers", shown(workers)):
         list(run_tasks(double, [1], workers=workers))
 
 
@@ -65,7 +67,7 @@ def test_what_a_task_raises_is_raised(workers):
 
 
 def test_what_cannot_travel_is_told_in_words():
-    with pytest.raises(TaskError, match="StrangeError: strange 1"):
+    with refused(TaskError, "StrangeError", "strange 1"):
         list(run_tasks(fail_strangely, [1, 1], workers=2))
 
 
@@ -78,7 +80,7 @@ def test_the_task_of_a_killed_process_is_done_again(tmp_path):
 
 @on_linux
 def test_a_task_that_always_kills_is_given_up():
-    with pytest.raises(TaskError, match=r"died 4 times over task 1: .* Try fewer workers"):
+    with refused(TaskError, "4 times", "task 1"):
         list(run_tasks(die, [0, 1], workers=2))
 
 
@@ -132,7 +134,7 @@ def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address, monkeypat
     """Before there is a client, whose destructor would fail."""
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(distributed, "Client", None)
-    with pytest.raises(ParameterError, match=f"^'{address}' is no address of a Dask scheduler .*: give one like 'tcp"):
+    with refused(ParameterError, f"'{address}'", "tcp:"):
         list(run_tasks(double, [1, 2], scheduler=address))
 
 
@@ -141,7 +143,7 @@ def test_a_scheduler_that_does_not_answer_is_waited_for_no_longer_than_it_takes(
     pytest.importorskip("distributed")
     assert tasks._PATIENCE == "10s"
     monkeypatch.setattr(tasks, "_PATIENCE", "0.2s")
-    with pytest.raises(ParameterError, match=f"no Dask scheduler answers at '{address}': Timed out"):
+    with refused(ParameterError, f"'{address}'"):
         list(run_tasks(double, [1, 2], scheduler=address))
 
 

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from helpers.contour_posteriors import posterior
+from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import contours_of
@@ -116,13 +117,13 @@ def test_many_draws_are_thinned_evenly():
 
 @pytest.mark.parametrize("probability", [0.0, 1.0, -0.1, np.nan])
 def test_impossible_probabilities_are_refused(probability):
-    with pytest.raises(ParameterError, match="give a number between 0 and 1"):
+    with refused(ParameterError, probability=probability):
         contour_band(made(10), X, probability)
 
 
 @pytest.mark.parametrize("x", [[[0.0, 1.0]], [0.0, np.nan]])
 def test_impossible_places_are_refused(x):
-    with pytest.raises(ParameterError, match="x must be a list of finite numbers"):
+    with refused(ParameterError, "x"):
         contour_band(made(10), x)
 
 

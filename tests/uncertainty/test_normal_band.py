@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.families import FAMILIES, FLANKS
 from tactile_bayes.errors import ParameterError
@@ -142,10 +143,10 @@ def test_units_and_attributes():
 
 def test_wrong_arguments_are_refused():
     posterior = spread("parabola")
-    with pytest.raises(ParameterError, match="give a number between 0 and 1"):
+    with refused(ParameterError, probability=1.0):
         normal_band(posterior, X, 1.0)
-    with pytest.raises(ParameterError, match="x must be a list of finite numbers"):
+    with refused(ParameterError, "x"):
         normal_band(posterior, [np.nan])
     for reference in (Parabola([0.5, 0.6], q=0.3), "truth"):
-        with pytest.raises(ParameterError, match="give one contour"):
+        with refused(ParameterError, "one contour"):
             normal_band(posterior, X, reference=reference)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
+from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
@@ -27,5 +27,5 @@ def test_the_band_is_where_events_are(analysed):
     np.testing.assert_allclose(reach(posterior)[[0, -1]], expected, rtol=1e-13)
     for when in ("first", "snap_off"):
         events[f"{when}_contact_x"][:] = np.nan
-    with pytest.raises(InferenceError, match="touches none of the posterior's contours"):
+    with refused(InferenceError, "contours"):
         reach(posterior)

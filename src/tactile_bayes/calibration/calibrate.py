@@ -11,30 +11,29 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
+from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.summary import summary
 from tactile_bayes.calibration.world import World
 from tactile_bayes.checks import (
     check_choice,
-    check_mapping,
-    check_names,
     check_number,
     check_numbers,
     check_optional,
     check_path,
     check_pivots,
     check_seed,
-    check_switch,
     check_whole_number,
     refused,
 )
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import record_template
 from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
@@ -254,15 +253,12 @@ def experiment_of(
     settings: SamplerSettings | None = None,
     probability: float = 0.9,
     world: World | None = None,
-) -> Experiment:
+) -> SimulatedExperiment:
     """What `calibrate` is asked for, as it says, and by the same defaults."""
     check_optional("load_cell", load_cell, LoadCell)
     check_optional("rod", rod, Rod)
     check_optional("settings", settings, SamplerSettings)
     check_optional("world", world, World)
-    check_mapping("priors", priors, "give distributions by name, or None")
-    rod_taken = rod or Rod()
-    cell = load_cell or LoadCell(force_noise=0.05 * rod_taken.force_unit, moment_noise=0.02 * rod_taken.moment_unit)
     directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
     check_choice("direction", direction, directions)
     remedy = "give a list of at least 3 different finite numbers [rad]"
@@ -270,17 +266,22 @@ def experiment_of(
     angles = np.unique(check_numbers("drive_angles", given, remedy, shape=(None,)))
     if angles.size < 3:
         raise refused("drive_angles", drive_angles, remedy)
-    experiment = Experiment(
-        family=family,
-        load_cell=cell,
-        drive_angles=tuple(angles.tolist()),
-        rod=rod,
-        bases=tuple(check_pivots("base", base)),
-        directions=directions[direction],
-        priors=dict(priors or {}),
-        nuisances=tuple(check_names("nuisances", nuisances)),
-        friction=None if friction is None else check_number("friction", friction),
-        events=check_switch("events", events),
+    bases, cell = tuple(check_pivots("base", base)), load_cell or usual_load_cell(rod or Rod())
+    assumed = Experiment(
+        record_template(bases, directions[direction], angles, rod, cell),
+        family,
+        cell,
+        {} if priors is None else priors,
+        rod,
+        None if friction is None else check_number("friction", friction),
+        nuisances,
+        events,
+    )
+    experiment = SimulatedExperiment(
+        assumed,
+        tuple(angles.tolist()),
+        bases,
+        directions[direction],
         settings=settings or _SETTINGS,
         probability=probability,
         seed=check_seed(seed),

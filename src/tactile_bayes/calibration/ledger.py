@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from tactile_bayes.calibration.replicate import Outcome
@@ -14,7 +13,7 @@ __all__ = ["REPLICATES"]
 
 
 def _encode(outcome: Outcome) -> dict[str, Any]:
-    row = {"ranks": dict(outcome.ranks), "numbers": _without_nan(outcome.numbers), "message": outcome.message}
+    row = {"ranks": dict(outcome.ranks), "numbers": outcome.numbers, "message": outcome.message}
     return row | ({"traceback": outcome.traceback} if outcome.traceback else {})
 
 
@@ -25,10 +24,6 @@ def _decode(row: dict[str, Any]) -> Outcome:
         str(row["message"]),
         str(row.get("traceback", "")),  # of older ledgers none was kept
     )
-
-
-def _without_nan(numbers: Mapping[str, float]) -> dict[str, float | None]:
-    return {name: value if math.isfinite(value) else None for name, value in numbers.items()}
 
 
 REPLICATES = Kind("replicates", CalibrationError, _encode, _decode)

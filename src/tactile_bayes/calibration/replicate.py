@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.calibration.experiment import Experiment
+from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.calibration.world import World
 from tactile_bayes.diagnostics.record_check import check_record
@@ -82,17 +82,17 @@ class Replicate(NamedTuple):
     posterior: xr.DataTree | None
 
 
-def replicate(task: tuple[Experiment, int]) -> Outcome:
+def replicate(task: tuple[SimulatedExperiment, int]) -> Outcome:
     """Outcome of one replicate of an experiment; an error is an outcome as well."""
     return make_replicate(*task).outcome
 
 
-def make_replicate(experiment: Experiment, number: int, *, throw: bool = False) -> Replicate:
+def make_replicate(experiment: SimulatedExperiment, number: int, *, throw: bool = False) -> Replicate:
     """Simulate record `number` of an experiment, infer from it, and compare.
 
     Parameters
     ----------
-    experiment : Experiment
+    experiment : SimulatedExperiment
     number : int
     throw : bool
         Whether an error is raised; else it is the outcome. An interrupt always is.
@@ -127,7 +127,11 @@ def make_replicate(experiment: Experiment, number: int, *, throw: bool = False) 
 
 
 def _compared(
-    experiment: Experiment, simulation: Simulation, model: ContourModel, result: Sampled, rng: np.random.Generator
+    experiment: SimulatedExperiment,
+    simulation: Simulation,
+    model: ContourModel,
+    result: Sampled,
+    rng: np.random.Generator,
 ) -> Outcome:
     """A posterior beside the truth."""
     tree, draws = result.tree, result.draws
@@ -250,19 +254,23 @@ def _snap_offs(tree: xr.DataTree, simulation: Simulation, probability: float) ->
 
 
 def _contacts(
-    model: ContourModel, samples: Floats, simulation: Simulation, experiment: Experiment, rng: np.random.Generator
+    model: ContourModel,
+    samples: Floats,
+    simulation: Simulation,
+    experiment: SimulatedExperiment,
+    rng: np.random.Generator,
 ) -> dict[str, float]:
     """Share of the contacts looked at that lie in their region."""
     likelihood = experiment.model.likelihood
-    known = experiment.load_cell.misread(experiment.template.direction.values)
-    read = experiment.template.drive_angle.values - known
+    known = experiment.load_cell.misread(experiment.assumed.record.direction.values)
+    read = experiment.assumed.record.drive_angle.values - known
     true = contacts_of(likelihood, simulation.contour, simulation.rig, read)
     chosen: list[int] = []
     for stroke in likelihood.strokes:
         touching = stroke.samples[np.isfinite(true["contact_x"][0, stroke.samples])]
         if touching.size:
             chosen += [int(touching[round(share * (touching.size - 1))]) for share in _CONTACTS]
-    if not chosen or not experiment.events:  # without events the record that is inferred from has fewer samples
+    if not chosen or not experiment.assumed.events:  # without events the record that is inferred from has fewer samples
         return {}
     draws = samples.reshape(-1, samples.shape[-1])
     points = draws[rng.choice(len(draws), min(_CONTACT_DRAWS, len(draws)), replace=False)]
@@ -283,7 +291,7 @@ def _contacts(
     return {"contact_region": float(np.mean(held))}
 
 
-def _checks(tree: xr.DataTree, simulation: Simulation, experiment: Experiment) -> dict[str, float]:
+def _checks(tree: xr.DataTree, simulation: Simulation, experiment: SimulatedExperiment) -> dict[str, float]:
     """What the checks say that a user sees: of the posterior's predictions, and of the loads of single samples."""
     numbers = {"check_p_value": np.nan, "check_passed": np.nan, "misfit_probability": np.nan, "axial_score": np.nan}
     try:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.calibration.experiment import Experiment
+from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
@@ -38,7 +38,7 @@ class Simulation(NamedTuple):
     """First contact and snap-off by stroke, each of shape (strokes,)."""
 
 
-def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
+def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simulation:
     """Draw a truth, sweep along it and measure.
 
     Loads come to full accuracy from the arrays of `Paths`, not from the compiled code that inference asks.
@@ -78,7 +78,7 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulation:
     readings = measures.simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
     course = model.nuisances.way[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course
-    template = experiment.template
+    template = experiment.assumed.record
     # The template has the angles that are read but for noise and steps; what is misread is in those of the rod.
     direction = template.direction.values
     angles = corrupted_angles(cell, template.drive_angle.values - cell.misread(direction), direction, rng)

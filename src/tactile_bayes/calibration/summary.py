@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverage
-from tactile_bayes.calibration.experiment import Experiment
 from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniformity_p_value
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
+from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.verdict import (
     FEWEST,
     POWER,
@@ -47,7 +47,7 @@ class _Fault(NamedTuple):
     words: str
 
 
-def summary(experiment: Experiment, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
+def summary(experiment: SimulatedExperiment, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
     """The Dataset of a calibration; see `calibrate`."""
     numbers = sorted(outcomes)
     rows = [outcomes[number] for number in numbers]

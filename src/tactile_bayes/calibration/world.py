@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from tactile_bayes.checks import check_kind, check_number, check_numbers, check_optional
+from tactile_bayes.checks import check_number, check_numbers, check_optional
 from tactile_bayes.contours import Contour, ShapeFree
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import Rig
-from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
+from tactile_bayes.inference.priors import Prior, check_priors
 from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["NUMBERS", "World"]
@@ -102,8 +102,7 @@ class World:
         check_optional("load_cell of the world", self.load_cell, LoadCell)
         if self.family is not None:
             family_named(self.family)
-        check_kind("priors of the world", self.priors, Mapping, "give distributions by name")
-        refuse_wrong_priors(self.priors, self.priors)
+        check_priors("priors of the world", self.priors)
 
     def __repr__(self) -> str:
         return f"World({', '.join(f'{name}={value!r}' for name, value in self._given().items())})"

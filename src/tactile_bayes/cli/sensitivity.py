@@ -172,8 +172,8 @@ def _material(youngs_modulus: float | None, elastic_strain: float | None) -> Mat
 
 
 def _load_cell(rod: Rod | None, cell: LoadCell | None, drive_angle_noise: float) -> LoadCell | None:
+    from tactile_bayes.inference.experiment import usual_load_cell
     from tactile_bayes.mechanics.rod import Rod
-    from tactile_bayes.planning.plan import usual_load_cell
 
     if not drive_angle_noise:
         return cell

@@ -23,15 +23,16 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.contour_evidence import WIDTHS, ContourEvidence, contour_evidence
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import Assumptions, contour_problem
+from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, Seed, settings_of, spawn
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.matched_priors import matched_priors
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.record import record_hash, rod_of, validate, with_rod
+from tactile_bayes.record import record_hash, rod_of
 
 __all__ = ["SHAPES", "compare_families"]
 
@@ -152,9 +153,10 @@ def compare_families(
 
     Notes
     -----
-    So that no family is favoured by its prior, sizes have priors under which the expected mean curvature of a flank is
-    the same in all families (`matched_priors`); everything else has the defaults of `infer_contour`. The evidence is
-    that of contours within reach, computed by bridge sampling (Meng & Wong 1996) from the posterior's draws.
+    So that no family is favoured by its prior, sizes have priors under which the geometric mean radius of curvature of
+    a flank has the same median and spread in all families (`matched_priors`); everything else has the defaults of
+    `infer_contour`. The evidence is that of contours within reach, computed by bridge sampling (Meng & Wong 1996) from
+    the posterior's draws.
 
     Leave-one-out leaves out a sample with its three channels. If a load cell drifts or has an unknown bias, a sample's
     density is conditional on all other samples. Samples next to first contact and snap-off are predicted from a
@@ -178,15 +180,14 @@ def compare_families(
     check_probability("false_alarm", false_alarm, "give a probability between 0 and 1, such as 1e-3")
     check_function("progress", progress)
     names = _checked(families, priors)
-    measured = with_rod(validate(measured), rod)
-    length = rod_of(measured).length
+    experiment = Experiment(measured, SHAPE_FREE.name, load_cell, {}, rod, friction, nuisances)
+    length = rod_of(experiment.record).length
     seeds = dict(zip(names, spawn(seed, len(names)), strict=True))
     tried: dict[str, _Tried] = {}
-    assumed = Assumptions(SHAPE_FREE.name, load_cell, friction=friction, nuisances=nuisances)
     problems = {}
     for name in names:
         own = {**matched_priors(name, length), **(priors or {}).get(name, {})}
-        problems[name] = contour_problem(measured, replace(assumed, family=name, priors=own))
+        problems[name] = contour_problem(replace(experiment, family=name, priors=own))
     # The shape-free family fits any record and comes first, so that families far from fitting need not be sampled.
     for name, problem in sorted(problems.items(), key=lambda item: item[0] != SHAPE_FREE.name):
         best = max((one.evidence.log_evidence[_USUAL] for one in tried.values() if one.evidence), default=-np.inf)
@@ -209,7 +210,8 @@ def compare_families(
         p_value, passed = float(check.overall_p_value), bool(check.attrs["passed"])
         tried[name] = _Tried(ceiling, found.draws, evidence, predicted, p_value, passed)
     asked = {name: problem.about[name] for name in ("nuisances", "friction")}
-    return _labelled({name: tried[name] for name in names}, asked).assign_attrs(data_sha256=record_hash(measured))
+    comparison = _labelled({name: tried[name] for name in names}, asked)
+    return comparison.assign_attrs(data_sha256=record_hash(experiment.record))
 
 
 def _ceiling(model: ContourModel, walk: Walk) -> float:

@@ -16,7 +16,7 @@ from tactile_bayes.contours import Contour
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import InferenceError, ReachError
 from tactile_bayes.inference.contour_groups import drawn_groups, predicted_groups, prior_draws
-from tactile_bayes.inference.contour_problem import Assumptions, ContourProblem, contour_problem
+from tactile_bayes.inference.contour_problem import ContourProblem, contour_problem
 from tactile_bayes.inference.contour_start import Walk, walk_of
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles import (
@@ -30,6 +30,7 @@ from tactile_bayes.inference.ensembles import (
     settings_of,
     spawn,
 )
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
@@ -170,12 +171,14 @@ def infer_contour(
     >>> bool(result.attrs["converged"]), list(result["posterior"].data_vars)
     (True, ['a', 'q', 'x_c', 'noise_scale'])
     """
+    given = {} if priors is None else priors
+    experiment = Experiment(measured, family, load_cell, given, rod, friction, nuisances, events)
     settings = settings_of(settings)
     if checkpoint is not None:
         check_path("checkpoint", checkpoint, "give the path of a folder, or None")
     check_function("progress", progress)
     seed_sequence(seed)
-    problem = contour_problem(measured, Assumptions(family, load_cell, priors, rod, friction, nuisances, events))
+    problem = contour_problem(experiment)
     return sampled(problem, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress, keep=keep).tree
 
 

@@ -11,6 +11,7 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError
+from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optima_of, optimum_of
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -28,7 +29,6 @@ from tactile_bayes.inference.ensembles import (
     scatter_walkers,
 )
 from tactile_bayes.inference.flank_coordinates import FlankCoordinates
-from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.start import Cloud, gather
@@ -72,8 +72,8 @@ _X_C = 3
 """Column of x_c among the parameters of a power law."""
 
 _RARELY, _NEARBY = 0.01, 0.1
-"""Share of draws, and of the usual distance of the vertex from the pivot: where more of them are nearer, some vertices
-may lie on its other side, which the coordinates of a flank do not have."""
+"""Share of draws, and of the usual distance of the vertex from where the rod touches: where more of them are nearer,
+vertices may lie on the other side as well, which the coordinates of a flank do not have."""
 
 _POOR = 2.0
 """Mean square of what is left of a record, over its own roughness, from which on a search is worth its time."""
@@ -255,16 +255,17 @@ def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator
     usual = _mode_in(model, optimum, model.coordinates, optimum.covariance, rng, deadline, model.walked_ends)
     if usual.proposal.efficiency > _EFFICIENT or model.family.name != "power-law" or deadline.has_passed:
         return usual
-    pivot = float(np.mean([x for x, _ in bases_of(model.measured)]))
-    side = float(np.sign(pivot - optimum.point[_X_C]))
-    flank = FlankCoordinates(model.coordinates, pivot, side)
-    place = model.coordinates.of(optimum.point[None])[0]
+    at = optimum.point[None]
+    ends = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
+    touched = float(np.mean([ends["first_contact_x"], ends["snap_off_contact_x"]]))
+    flank = FlankCoordinates(model.coordinates, touched, float(np.sign(touched - optimum.point[_X_C])))
+    place = model.coordinates.of(at)[0]
     slopes = central_slopes(lambda places: flank.of(model.coordinates.parameters(places)[0]), place, 1e-6)
     covariance = slopes @ optimum.covariance @ slopes.T
-    if not np.isfinite(covariance).all():  # the vertex is above the pivot
+    if not np.isfinite(covariance).all():  # that is the vertex
         return usual
     mode = _mode_in(model, optimum, flank, covariance, rng, deadline)
-    distances = np.abs(flank.parameters(mode.proposal.draw(rng, _OF_SCALE)[0])[0][:, _X_C] - pivot)
+    distances = np.abs(flank.parameters(mode.proposal.draw(rng, _OF_SCALE)[0])[0][:, _X_C] - touched)
     reaches_vertex = np.quantile(distances, _RARELY) < _NEARBY * np.median(distances)
     return (
         usual if reaches_vertex or mode.proposal.efficiency < usual.proposal.efficiency else mode._replace(usual=usual)

@@ -8,11 +8,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from scipy import stats
 
-from tactile_bayes.checks import shown
+from tactile_bayes.checks import check_kind, check_mapping, shown
 from tactile_bayes.contours.family import Family, FamilyParameter
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["Prior", "default_priors", "own_priors", "refuse_wrong_priors", "support_of"]
+__all__ = ["Prior", "check_priors", "default_priors", "own_priors", "refuse_strangers", "support_of"]
 
 
 @runtime_checkable
@@ -24,12 +24,19 @@ class Prior(Protocol):
     def std(self) -> Any: ...
 
 
-def refuse_wrong_priors(priors: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
-    """Refuse priors that are no distributions with fixed parameters, or of what is no parameter."""
-    for name, prior in priors.items():
+def check_priors(name: str, priors: Any) -> None:
+    """Refuse what is no mapping of names to distributions with fixed parameters."""
+    remedy = "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}"
+    check_kind(name, priors, Mapping, remedy)
+    check_mapping(name, priors, remedy)
+    for parameter, prior in priors.items():
         if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
             remedy = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
-            raise ParameterError(f"the prior of {name} is {shown(prior)}: {remedy}")
+            raise ParameterError(f"the prior of {parameter} is {shown(prior)}: {remedy}")
+
+
+def refuse_strangers(priors: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
+    """Refuse priors of what is no parameter."""
     strangers = sorted(set(priors) - set(names))
     if strangers:
         raise ParameterError(

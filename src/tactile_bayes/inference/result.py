@@ -64,7 +64,7 @@ def sample_stats(draws: Draws) -> xr.Dataset:
             "evaluations": draws.evaluations,
             "seconds": draws.seconds,
             "stuck": draws.stuck,
-            "places": json.dumps([asdict(place) for place in draws.places]),
+            "places": json.dumps([asdict(mode) for mode in draws.modes]),
         },
     )
 

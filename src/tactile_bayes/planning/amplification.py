@@ -19,7 +19,6 @@ from tactile_bayes.mechanics.contact_coordinates import (
     place_by_wrench,
 )
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
 
 __all__ = ["METHODS", "SOURCES", "Method", "amplification"]
@@ -143,8 +142,7 @@ def amplification(plan: Plan) -> xr.Dataset:
 
 def _holds(plan: Plan, method: Method) -> NDArray[np.bool_]:
     """Which samples `reconstruct` finds no fault with."""
-    answer = reconstruct(plan.record, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction)
-    return np.asarray(answer.status.values == "ok")
+    return np.asarray(plan.reconstruct(plan.record, method).status.values == "ok")
 
 
 def _refined(plan: Plan) -> Plan:

@@ -74,7 +74,7 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     question, number = task
     candidate = question.candidates[number]
     known = question.known
-    model = known.model(known.blank([candidate.base], candidate.drive_step))
+    model = known.model_from([candidate.base], candidate.drive_step)
     wide = band_factor(question.probability)
     usable = model.likelihood.usable(model.contours(known.points), model.rig(known.points))
     rows: dict[str, list[float]] = {
@@ -174,7 +174,7 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
 def _gaps(question: Question, candidate: Candidate, usable: NDArray[np.bool_]) -> Floats:
     """Width of what neither the sweeps so far nor the candidate's touch, between the outermost first contacts."""
     known = question.known
-    model = known.model(known.blank([*known.bases, candidate.base], COARSE))
+    model = known.model_from([*known.bases, candidate.base], COARSE)
     points = known.points[usable]
     if not len(points):
         return np.array([np.nan])

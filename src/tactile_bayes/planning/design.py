@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
 from itertools import product
 from typing import Any, Literal
 
@@ -21,22 +26,31 @@ from tactile_bayes.checks import (
     check_whole_number,
     refused,
 )
-from tactile_bayes.errors import ParameterError, ReachError
+from tactile_bayes.errors import ParameterError, ReachError, StudyError
 from tactile_bayes.inference.contour_events import events_of
+from tactile_bayes.inference.experiment import Experiment, usual_load_cell
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.candidate import Candidate, Expected, Question, expected_of
-from tactile_bayes.planning.design_ledger import CANDIDATES, question_in_words
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes
-from tactile_bayes.planning.knowledge import COARSE, Base, Knowledge, known_from_posterior, known_from_prior
-from tactile_bayes.tasks import TaskProgress, keep_outcomes, open_results_store
+from tactile_bayes.planning.knowledge import (
+    COARSE,
+    Base,
+    Knowledge,
+    empty_record,
+    known_from_posterior,
+    known_from_prior,
+)
+from tactile_bayes.tasks import Kind, TaskProgress, keep_outcomes, open_results_store
 
 __all__ = ["CRITERIA", "design"]
 
 Criterion = Literal["band", "gap", "information"]
 CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
+
+_LIBRARIES = ("tactile-bayes", "numpy", "scipy")
 
 _PLACES = 25
 ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), np.array([-0.1, 0.0, 0.1])
@@ -109,7 +123,9 @@ def design(
         Over "candidate", with base_x, base_y [length] and drive_step [rad]:
 
         width, width_error
-            Mean width of the band over the span that is to be expected [length], and its standard error over draws.
+            Mean width of the band over the span that is to be expected [length], and its standard error over draws. Of
+            objects that the rod does not reach it is the width of what is known, and few of them decide the mean: with
+            more draws, and a look at `reached`, it is told whether they are there.
         gap, gap_error
             Width of what no sweep touches, those so far included, between the outermost contacts [length].
         information, information_error
@@ -155,17 +171,10 @@ def design(
     check_probability("probability", probability)
     rng = np.random.default_rng([int(seed), 1])
     if isinstance(known, str):
-        told = known_from_prior(
-            known,
-            draws=int(draws),
-            rng=rng,
-            load_cell=load_cell,
-            rod=rod,
-            friction=friction,
-            nuisances=nuisances,
-            priors=priors,
-            base=(0.0, 0.0),
-        )
+        cell, own = load_cell or usual_load_cell(rod or Rod()), {} if priors is None else priors
+        empty = empty_record([(0.0, 0.0)], COARSE, rod, cell)
+        experiment = Experiment(empty, known, cell, own, rod, friction, nuisances)
+        told = known_from_prior(experiment, draws=int(draws), rng=rng)
     else:
         given = {"load_cell": load_cell, "rod": rod, "priors": priors}
         taken = [name for name, value in given.items() if value is not None]
@@ -178,9 +187,8 @@ def design(
     candidates = tuple(Candidate(base, float(step)) for base, step in product(_bases(bases, told), steps))
     x = np.linspace(*_span(span, told), _PLACES)
     question = Question(told, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
-    with open_results_store(
-        question_in_words(question), None if out is None else check_path("out", out).resolve(), CANDIDATES
-    ) as ledger:
+    folder = None if out is None else check_path("out", out).resolve()
+    with open_results_store(_words(question), folder, CANDIDATES) as ledger:
         found = keep_outcomes(
             ledger, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
         )
@@ -191,20 +199,20 @@ def design(
 
 def _out_of_reach(question: Question) -> str:
     known, pivots = question.known, np.array([candidate.base for candidate in question.candidates])
-    unit = "" if known.rod is None or known.rod.is_dimensionless else " m"
+    unit = "" if known.rod.is_dimensionless else " m"
     (left, low), (right, high) = pivots.min(axis=0), pivots.max(axis=0)
     here = f"x = {left:g}" if left == right else f"x from {left:g} to {right:g}"
     there = f"y = {low:g}" if low == high else f"y from {low:g} to {high:g}"
     return (
-        f"from none of the candidates, at {here}{unit} and {there}{unit}, does the rod, {known.length:g}{unit or ' L'} "
-        "long, reach an object that may be there: give pivots nearer to it, in that unit"
+        f"from none of the candidates, at {here}{unit} and {there}{unit}, does the rod, {known.rod.length:g}"
+        f"{unit or ' L'} long, reach an object that may be there: give pivots nearer to it, in that unit"
     )
 
 
 def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:
     if bases is None:
         x, y = told.bases[0] if told.bases else (0.0, 0.0)
-        return [(float(x + told.length * dx), float(y + told.length * dy)) for dy in ABOVE for dx in ACROSS]
+        return [(float(x + told.rod.length * dx), float(y + told.rod.length * dy)) for dy in ABOVE for dx in ACROSS]
     pivots = check_numbers("bases", bases, "give a list of pivots, [(x, y), (x, y)]", shape=(None, 2))
     if len(np.unique(pivots, axis=0)) < len(pivots):
         raise refused("bases", bases, "one of them is given twice")
@@ -218,7 +226,7 @@ def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, flo
         if not left < right:
             raise refused("span", span, remedy)
         return left, right
-    model = told.model(told.blank(told.bases or [(0.0, 0.0)], COARSE))
+    model = told.experiment.model
     events = events_of(model.likelihood, model.contours(told.points), model.rig(told.points), exact=False)
     first = events["first_contact_x"]
     return float(np.nanmedian(np.nanmin(first, axis=1))), float(np.nanmedian(np.nanmax(first, axis=1)))
@@ -226,7 +234,7 @@ def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, flo
 
 def _labelled(question: Question, expected: Sequence[Expected], criterion: Criterion) -> xr.Dataset:
     known, candidates = question.known, question.candidates
-    metres = {"units": "1" if known.rod is None or known.rod.is_dimensionless else "m"}
+    metres = {"units": "1" if known.rod.is_dimensionless else "m"}
 
     def column(name: str, part: int, attrs: Mapping[str, Any]) -> tuple[str, Floats, Mapping[str, Any]]:
         return "candidate", np.array([getattr(row, name)[part] for row in expected]), attrs
@@ -255,14 +263,41 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
     return xr.Dataset(
         {**variables, "present_width": ((), _present_width(question), metres), "best": ((), best)},
         coords={"x": ("x", question.x, metres)},
-        attrs={"criterion": criterion, "probability": question.probability, "family": known.family},
+        attrs={"criterion": criterion, "probability": question.probability, "family": known.experiment.family},
     )
 
 
 def _present_width(question: Question) -> float:
     """Of the band without a further record."""
     known = question.known
-    model = known.model(known.blank(known.bases or [(0.0, 0.0)], COARSE))
     wide = band_factor(question.probability)
-    slopes = [height_slopes(model, point, question.x) for point in known.points]
+    slopes = [height_slopes(known.experiment.model, point, question.x) for point in known.points]
     return wide * float(np.mean([deviation_of_heights(of, known.precision).mean() for of in slopes]))
+
+
+def _words(question: Question) -> dict[str, str]:
+    """What the expectations follow from."""
+    known = question.known
+    return known.experiment.assumptions | {
+        "what is known": hashlib.sha256(known.points.tobytes()).hexdigest(),
+        "bases": json.dumps(known.bases),
+        "candidates": json.dumps([asdict(candidate) for candidate in question.candidates]),
+        "span": json.dumps([float(question.x[0]), float(question.x[-1])]),
+        "probability": repr(question.probability),
+        "nested": repr(question.nested),
+        "seed": repr(question.seed),
+        **{f"version of {name}": version(name) for name in _LIBRARIES},
+    }
+
+
+def _decode(row: dict[str, Any]) -> Expected:
+    def read(value: Any) -> Any:
+        if isinstance(value, list):
+            mean, error = value
+            return read(mean), read(error)
+        return math.nan if value is None else float(value)
+
+    return Expected(**{name: read(row[name]) for name in Expected._fields})
+
+
+CANDIDATES = Kind("candidates", StudyError, Expected._asdict, _decode)

@@ -14,13 +14,13 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ContourError, InferenceError, ReachError
-from tactile_bayes.inference.contour import infer_contour
+from tactile_bayes.inference.contour import sampled
+from tactile_bayes.inference.contour_problem import contour_problem
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.planning.amplification import METHODS, amplification
 from tactile_bayes.planning.expected_band import band_factor, deviation_of_heights, height_slopes, stretches
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.record_information import prior_precision, record_information
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.uncertainty.band import contour_band
 
 __all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
@@ -130,7 +130,7 @@ def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
         unanswered, every = 0, 0
         sizes: list[Floats] = []
         for one in measured:
-            found = reconstruct(one, method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction)
+            found = plan.reconstruct(one, method)
             x = found.contact_x.values[loaded] - record.truth_contact_x.values[loaded]
             y = found.contact_y.values[loaded] - record.truth_contact_y.values[loaded]
             ok = found.status.values[loaded] == "ok"
@@ -160,16 +160,11 @@ def _inferred(plan: Plan, measured: list[xr.Dataset], probability: float, seed: 
     failed = 0
     for k, one in enumerate(measured):
         try:
-            posterior = infer_contour(
-                one,
-                family=plan.family,
-                load_cell=plan.cell,
-                priors=plan.priors,
-                friction=plan.friction,
-                nuisances=plan.nuisances,
+            posterior = sampled(
+                contour_problem(replace(plan.experiment, record=one)),
                 settings=replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * len(plan.model.names))),
                 seed=seed + k,
-            )
+            ).tree
         except InferenceError:
             failed += 1
             continue

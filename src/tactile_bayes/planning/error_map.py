@@ -29,7 +29,7 @@ from tactile_bayes.checks import (
 )
 from tactile_bayes.contours import Contour, paper_profile
 from tactile_bayes.errors import StudyError
-from tactile_bayes.inference.contour_problem import prior_in_words
+from tactile_bayes.inference.experiment import priors_in_words
 from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
@@ -231,7 +231,7 @@ def _words(task: MapTask) -> dict[str, str]:
         "drive_step": repr(plan.drive_step),
         "friction": repr(plan.friction),
         "nuisances": json.dumps(list(plan.nuisances)),
-        "priors": json.dumps({name: prior_in_words(prior) for name, prior in plan.priors.items()}),
+        "priors": priors_in_words(plan.priors),
         "replicates": repr(task.replicates),
         "posteriors": json.dumps(dict(task.posteriors)),
         "probability": repr(task.probability),
@@ -281,14 +281,9 @@ def _labelled(
     )
 
 
-def _encode(outcome: CellOutcome) -> dict[str, Any]:
-    numbers = {name: value if math.isfinite(value) else None for name, value in outcome.numbers.items()}
-    return {"numbers": numbers, "message": outcome.message}
-
-
 def _decode(row: dict[str, Any]) -> CellOutcome:
     numbers = {name: math.nan if value is None else float(value) for name, value in row["numbers"].items()}
     return CellOutcome(numbers, str(row["message"]))
 
 
-CELLS = Kind("cells", StudyError, _encode, _decode)
+CELLS = Kind("cells", StudyError, CellOutcome._asdict, _decode)

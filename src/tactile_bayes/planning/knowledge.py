@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,18 +15,14 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import contour_priors
-from tactile_bayes.inference.noise import noise_of
-from tactile_bayes.inference.nuisances import nuisances_of
-from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
+from tactile_bayes.inference.experiment import Experiment
 from tactile_bayes.inference.result import posterior_draws, record_of
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.planning.plan import usual_load_cell
 from tactile_bayes.record import rod_of
 from tactile_bayes.sweep import record_template
 
-__all__ = ["COARSE", "Base", "Knowledge", "known_from_posterior", "known_from_prior"]
+__all__ = ["COARSE", "Base", "Knowledge", "empty_record", "known_from_posterior", "known_from_prior"]
 
 Base = tuple[float, float]
 
@@ -40,7 +36,8 @@ class Knowledge:
 
     Attributes
     ----------
-    family : str
+    experiment : Experiment
+        On an empty record from the pivots so far, or from the origin where there are none.
     points : ndarray, shape (n, d)
         Draws of the contour's parameters, the rig's and the noise's, in the order of the names of `model`.
     precision : ndarray, shape (d, d)
@@ -49,64 +46,48 @@ class Knowledge:
         From which the object was swept already.
     """
 
-    family: str
+    experiment: Experiment
     points: Floats
     precision: Floats
     bases: tuple[Base, ...]
-    rod: Rod | None
-    load_cell: LoadCell
-    friction: float | None
-    nuisances: tuple[str, ...]
-    priors: Mapping[str, Prior]
 
     @property
-    def length(self) -> float:
-        return 1.0 if self.rod is None else self.rod.length
+    def rod(self) -> Rod:
+        return rod_of(self.experiment.record)
 
-    def blank(self, bases: Sequence[Base], drive_step: float) -> xr.Dataset:
-        """A record from these pivots, each swept forward and backward, that is yet to be made."""
-        return record_template(bases, ("forward", "backward"), _angles(drive_step), self.rod, self.load_cell)
+    def model_from(self, bases: Sequence[Base], drive_step: float) -> ContourModel:
+        """Return the model of an empty record from these pivots."""
+        cell = self.experiment.noise.cell
+        return self.model(empty_record(bases, drive_step, self.experiment.rod, cell))
 
     def model(self, record: xr.Dataset) -> ContourModel:
-        """Of a record, blank or measured."""
-        family = family_named(self.family)
-        noise = noise_of(record, self.load_cell)
-        rig = nuisances_of(record, self.nuisances, self.priors, noise.cell, self.friction)
-        priors = {**contour_priors(record, family), **rig.priors, **noise.priors, **self.priors}
-        names = (*family.parameters, *rig.names, *noise.names)
-        return ContourModel(record, family, rig, noise, {name: priors[name] for name in names})
+        """Return the model of a record, empty or measured."""
+        return replace(self.experiment, record=record).model
 
 
-def known_from_prior(
-    family: str,
-    *,
-    draws: int,
-    rng: np.random.Generator,
-    load_cell: LoadCell | None,
-    rod: Rod | None,
-    friction: float | None,
-    nuisances: Sequence[str],
-    priors: Mapping[str, Prior] | None,
-    base: Base,
-) -> Knowledge:
-    """Truths drawn from the prior, of those that the rod reaches from a pivot.
+def empty_record(bases: Sequence[Base], drive_step: float, rod: Rod | None, load_cell: LoadCell) -> xr.Dataset:
+    """Return an empty record from these pivots, each swept forward and backward.
+
+    Sweeps go from before any first contact to after any snap-off, where the object lies above the pivot.
+    """
+    angles = np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)
+    return record_template(bases, ("forward", "backward"), angles, rod, load_cell)
+
+
+def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Generator) -> Knowledge:
+    """Truths drawn from an experiment's prior, of those that the rod reaches.
 
     Raises
     ------
     ParameterError
-        If the family is shape-free, or a prior is of no parameter.
+        If the family is shape-free.
     ReachError
         If the rod hardly ever reaches a contour of the prior.
     """
-    _refuse_shape_free(family)
-    cell = load_cell or usual_load_cell(rod or Rod())
-    empty = np.zeros((0, 0))
-    known = Knowledge(family, empty, empty, (), rod, cell, friction, tuple(nuisances), dict(priors or {}))
-    model = known.model(known.blank([base], COARSE))
-    refuse_wrong_priors(known.priors, model.names)
-    points, _ = model.draw_prior(rng, draws)
-    many, _ = model.draw_prior(rng, 1000)
-    return replace(known, points=points, precision=_precision(many))
+    _refuse_shape_free(experiment.family)
+    points, _ = experiment.model.draw_prior(rng, draws)
+    many, _ = experiment.model.draw_prior(rng, 1000)
+    return Knowledge(experiment, points, _precision(many), ())
 
 
 def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.Generator) -> Knowledge:
@@ -135,23 +116,14 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     if unknown:
         columns["noise_scale"] = np.ones(samples[next(iter(unknown))].size)
     nuisances = [name for name in json.loads(attrs.get("nuisances", "[]")) if not name.startswith("base_")]
-    known = Knowledge(
-        str(attrs["family"]),
-        np.zeros((0, 0)),
-        np.zeros((0, 0)),
-        tuple((float(x), float(y)) for x, y in pairs),
-        rod,
-        cell,
-        float(attrs["friction"]),
-        tuple(nuisances),
-        {},
-    )
-    model = known.model(known.blank(known.bases, COARSE))
-    every = np.stack([columns[name] for name in model.names], axis=1)
+    bases = tuple((float(x), float(y)) for x, y in pairs)
+    empty, friction = empty_record(bases, COARSE, rod, cell), float(attrs["friction"])
+    experiment = Experiment(empty, attrs["family"], cell, rod=rod, friction=friction, nuisances=nuisances)
+    every = np.stack([columns[name] for name in experiment.model.names], axis=1)
     if unknown:  # a scale that does not vary has no precision of its own
         every[:, -1] *= np.exp(0.05 * rng.standard_normal(len(every)))
     chosen = rng.choice(len(every), min(draws, len(every)), replace=False)
-    return replace(known, points=every[chosen], precision=_precision(every))
+    return Knowledge(experiment, every[chosen], _precision(every), bases)
 
 
 def _refuse_shape_free(family: str) -> None:
@@ -165,8 +137,3 @@ def _refuse_shape_free(family: str) -> None:
 def _precision(points: Floats) -> Floats:
     scale = points.std(axis=0)
     return np.asarray(np.linalg.inv(np.cov((points / scale).T)) / np.outer(scale, scale))
-
-
-def _angles(drive_step: float) -> Floats:
-    """From before any first contact to after any snap-off, where the object lies above the pivot."""
-    return np.arange(np.radians(-30.0), np.radians(210.0) + 1e-9, drive_step)

@@ -16,7 +16,6 @@ from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.planning.amplification import METHODS, SOURCES, Method
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.reconstruction import reconstruct
 
 __all__ = ["noise_shares"]
 
@@ -170,9 +169,7 @@ def _errors(quiet: xr.Dataset, plan: Plan, method: Method, noise: dict[str, Floa
     values: dict[str, Any] = {}
     for name, drawn in noise.items():
         values[name] = ("sample", many[name].values + np.tile(drawn, samples), many[name].attrs)
-    found = reconstruct(
-        many.assign(values), method=method, load_cell=plan.cell, rod=plan.rod, friction=plan.taken_friction
-    )
+    found = plan.reconstruct(many.assign(values), method)
     slope = many.truth_slope_angle.values
     x, y = (found[name].values - many[f"truth_{name}"].values for name in ("contact_x", "contact_y"))
     cos, sin = np.cos(slope), np.sin(slope)

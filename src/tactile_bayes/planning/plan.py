@@ -14,21 +14,20 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_mapping, check_names, check_optional
 from tactile_bayes.contours import Contour
-from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour_model import ContourModel
-from tactile_bayes.inference.contour_problem import contour_priors
-from tactile_bayes.inference.noise import noise_of
-from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
-from tactile_bayes.inference.priors import Prior, refuse_wrong_priors
+from tactile_bayes.inference.experiment import Experiment, usual_load_cell
+from tactile_bayes.inference.nuisances import STANDARD
+from tactile_bayes.inference.priors import Prior
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.data_sheet import CERTAIN
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.planning.family_parameters import family_parameters
+from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import Scan, scan
 
-__all__ = ["Plan", "usual_load_cell"]
+__all__ = ["Plan"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,19 +112,23 @@ class Plan:
         certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "frame")})
         return certain.measure(record, seed=0)
 
+    def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:
+        """Contact points of a record of this plan."""
+        return reconstruct(record, method=method, load_cell=self.cell, rod=self.rod, friction=self.taken_friction)
+
     @cached_property
     def family(self) -> str:
         return family_parameters(self.contour)[0]
 
     @cached_property
+    def experiment(self) -> Experiment:
+        """What is inferred from the record, of the contour's own family."""
+        return Experiment(self.record, self.family, self.cell, self.priors, self.rod, self.friction, self.nuisances)
+
+    @cached_property
     def model(self) -> ContourModel:
-        """Of the contour's own family, and to full accuracy."""
-        family = family_named(self.family)
-        noise = noise_of(self.record, self.cell)
-        rig = nuisances_of(self.record, self.nuisances, self.priors, noise.cell, self.friction)
-        priors = {**contour_priors(self.record, family), **rig.priors, **noise.priors}
-        refuse_wrong_priors(self.priors, priors)
-        model = ContourModel(self.record, family, rig, noise, {**priors, **self.priors})
+        """The model of the experiment, to full accuracy."""
+        model = self.experiment.model
         model.likelihood.exact = True
         return model
 
@@ -144,8 +147,3 @@ class Plan:
             moment_noise=factor * self.cell.moment_noise,
         )
         return replace(self, load_cell=noisier)
-
-
-def usual_load_cell(rod: Rod) -> LoadCell:
-    """Noise of 0.05 EI/L² and 0.02 EI/L, in the units of a rod."""
-    return LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)

@@ -74,7 +74,7 @@ def write_not_measured(ax: Axes, label: str) -> None:
 
 
 def tile_edges(values: Floats) -> Floats:
-    """Return the edges of tiles around increasing values: midway between neighbours."""
+    """Return the edges, shape (n + 1,), of tiles around increasing values, shape (n,): midway between neighbours."""
     if values.size == 1:
         return np.array([0.95, 1.05]) * values
     middle = 0.5 * (values[1:] + values[:-1])

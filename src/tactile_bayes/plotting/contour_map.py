@@ -57,7 +57,7 @@ def contour(
 
     Parameters
     ----------
-    x : array_like
+    x : array_like, shape (n,)
         The range drawn, from the smallest to the largest value, in the record's unit of length.
     truth : Contour, optional
         The true contour.

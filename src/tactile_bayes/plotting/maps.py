@@ -33,7 +33,7 @@ __all__ = [
 
 
 def limits_of(ax: Axes) -> Floats:
-    """Return the limits of a map in x and y, after setting equal scales."""
+    """Return the limits of a map in x and y, shape (4,), after setting equal scales."""
     ax.set_aspect("equal", adjustable="box")
     ax.autoscale_view()
     return np.array([*ax.get_xlim(), *ax.get_ylim()])
@@ -78,7 +78,7 @@ def set_below(upper: Axes, lower: Axes) -> None:
 
 
 def outline(contour: Contour, low: float, high: float) -> tuple[Floats, Floats]:
-    """Return points of a contour between two values of x, denser toward the ends, where it may be upright."""
+    """Return points of a contour between two values of x, shape (801,), denser toward the ends."""
     ends = [float(np.asarray(contour.locate(end).x)) if np.isfinite(end) else float(end) for end in contour.domain]
     low, high = max(low, ends[0]), min(high, ends[1])
     x = low + 0.5 * (high - low) * (1.0 - np.cos(np.linspace(0.0, np.pi, 801)))

@@ -36,7 +36,7 @@ and below which it is doubtful."""
 
 _UNLIKELY, _IMPOSSIBLE = 3.0, 5.0
 """Limits of an unknown zero, in standard deviations: a correct direction with a zero within the first is doubtful at
-most; beyond the second the value is a load and not a zero."""
+most; beyond the second the value is a load and not a zero, unless it stands both before and after contact."""
 
 _ZERO = 0.1
 """Standard deviation of an unknown zero [EI/L]."""
@@ -57,8 +57,9 @@ def contact_sides(record: xr.Dataset, load_cell: LoadCell | None = None) -> Floa
     It is the side of the sweep's direction unless the moment contradicts it, since a drive may also turn back in
     contact: then the moment in contact has the opposite sign by more than six standard errors. Its zero is the mean of
     the unloaded samples of the sweep, or else of the record, as `zero_load` finds them, or else 0 with a standard
-    deviation of 0.1 EI/L. Since seemingly unloaded samples may have a constant load, the moment must also have the
-    opposite sign for all zeros within three of these deviations. A record may state the sides of its sweeps
+    deviation of 0.1 EI/L. A zero beyond five of these deviations is accepted only if it stands both before and after
+    contact; otherwise it is a load. Since seemingly unloaded samples may have a constant load, the moment must also
+    have the opposite sign for all zeros within three of these deviations. A record may state the sides of its sweeps
     (`with_sides`).
 
     Parameters
@@ -172,14 +173,15 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
     readings = np.stack([record[name].values for name in present], axis=-1)
     readings /= np.maximum(np.abs(readings).max(axis=0), 1e-100 * unit)  # squares of large ones would overflow
     floor = np.full(len(present), _ROUNDING**2)
-    loaded, unloaded = [], []
+    loaded, unloaded, enclosed = [], [], []
     for rows in parts:
         bounds = contact_bounds(readings[rows], _FALSE_ALARM, floor)
         end = len(rows) - bounds.after
         loaded.append(rows[bounds.before : end] if bounds.found else rows)
         unloaded.append(np.concatenate([rows[: bounds.before], rows[end:]]))
+        enclosed.append(bounds.found and min(bounds.before, bounds.after) >= FEWEST)
     found = []
-    for rows, inside, own in zip(parts, loaded, unloaded, strict=True):
+    for rows, inside, own, is_enclosed in zip(parts, loaded, unloaded, enclosed, strict=True):
         noise = max(rough_noise(moment[rows]), known, _ROUNDING * float(np.abs(moment[rows]).max()), 1e-100 * unit)
         sign = -1.0 if record.direction.values[rows[0]] == "backward" else 1.0
 
@@ -192,7 +194,7 @@ def _judged(record: xr.Dataset, load_cell: LoadCell | None) -> list[_Judged]:
         absolute = score(inside, 0.0, unknown)
         zeros = moment[own if own.size >= FEWEST and inside.size < rows.size else np.concatenate(unloaded)]
         zero = float(zeros.mean()) if zeros.size >= FEWEST else np.inf
-        if abs(zero) < _IMPOSSIBLE * unknown:
+        if is_enclosed or abs(zero) < _IMPOSSIBLE * unknown:
             relative = score(inside, zero, noise / np.sqrt(zeros.size))
         else:
             absolute = relative = score(rows, 0.0, unknown)

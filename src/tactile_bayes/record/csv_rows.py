@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.record.cell import integer_in, is_integer_text, number_in
 from tactile_bayes.record.encoding import WITH_NUL, not_utf8
-from tactile_bayes.record.parsing import FREE, text_array
+from tactile_bayes.record.parsing import text_array
 from tactile_bayes.record.schema import Kind
 from tactile_bayes.record.storable import LONGEST_CELL
 from tactile_bayes.record.table import Source
@@ -82,19 +82,21 @@ def read_rows(file: BinaryIO, layout: Layout, source: Source) -> tuple[dict[str,
     known kind are integers, else numbers (empty cells are NaN), else text.
     """
     begin = file.tell()
+    most = 1 + sum(block.count(b"\n") + block.count(b"\r") for block in iter(lambda: file.read(_CHUNK), b""))
     while True:
         file.seek(begin)
         try:
-            return _read_once(_chunks(file), layout, source)
+            return _read_once(_chunks(file), layout, most, source)
         except _WrongGuessError:
             continue
 
 
 def _read_once(
-    chunks: Iterator[bytes], layout: Layout, source: Source
+    chunks: Iterator[bytes], layout: Layout, most: int, source: Source
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    parts: dict[str, list[NDArray[Any]]] = {name: [] for name in layout.names}
-    lines = [np.empty(0, np.int64)]
+    columns = {name: _Column(most) for name in layout.names}
+    lines = _Column(most)
+    lines.append(np.empty(0, np.int64))
     above = layout.line
     for chunk in chunks:
         cells = _read_fast(chunk, layout)
@@ -105,8 +107,8 @@ def _read_once(
             here, above = np.arange(above + 1, above + 1 + rows), above + rows
         lines.append(here)
         for name, values in cells.items():
-            parts[name].append(values)
-    return {name: _joined(parts.pop(name)) for name in layout.names}, np.concatenate(lines)
+            columns[name].append(values)
+    return {name: columns.pop(name).joined() for name in layout.names}, lines.joined()
 
 
 def _chunks(file: BinaryIO) -> Iterator[bytes]:
@@ -122,14 +124,33 @@ def _chunks(file: BinaryIO) -> Iterator[bytes]:
         yield rest
 
 
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    """Concatenate the parts of a column; text word by word if equal widths might waste memory."""
-    dtype = np.result_type(*parts) if parts else np.dtype(object)
-    if dtype.kind not in "UO" or (dtype.itemsize * sum(map(len, parts)) <= FREE and dtype.kind == "U"):
-        return np.concatenate(parts)
-    seen: dict[str, str] = {}
-    texts = [seen.setdefault(text, text) for part in parts for text in part.tolist()]
-    return text_array(texts) if texts else np.empty(0, object)
+class _Column:
+    """The values of a column one after the other. Numbers go into one array: memory that is never written to costs
+    nothing, and that of many small arrays would not be given back. A word that comes again is kept once.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most, self._size = most, 0
+        self._numbers: NDArray[Any] | None = None
+        self._texts: list[str] = []
+        self._seen: dict[str, str] = {}
+
+    def append(self, values: NDArray[Any]) -> None:
+        if values.dtype.kind in "UO":
+            self._texts.extend(self._seen.setdefault(text, text) for text in values.tolist())
+            return
+        before, end = self._numbers, self._size + len(values)
+        if before is None:
+            before = np.empty(self._most, values.dtype)
+        self._numbers = before.astype(np.result_type(before, values), copy=False)
+        self._numbers[self._size : end] = values
+        self._size = end
+
+    def joined(self) -> NDArray[Any]:
+        if self._numbers is None:
+            return text_array(self._texts) if self._texts else np.empty(0, object)
+        self._numbers.resize(self._size, refcheck=False)
+        return self._numbers
 
 
 # --- The fast reader --------------------------------------------------------------------------------------------

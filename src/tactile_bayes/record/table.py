@@ -59,6 +59,7 @@ class Source:
         """Make an error about the table."""
         if len(what) > _LONGEST:  # quoted content may be of any length; the correction is at the end
             what = f"{what[: _LONGEST // 2]} … {what[-_LONGEST // 2 :]}"
+        what = what.replace("\0", "\\0")  # terminals and logs show none
         return RecordError(f"{self.name}: {what}" if self.name else what)
 
     def line_error(self, line: int, what: str) -> RecordError:

@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from tactile_bayes.inference.contour_problem import default_priors, prior_in_words
+from tactile_bayes.inference.experiment import default_priors, prior_in_words
 from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["command_of", "hindrances", "python_lines"]

@@ -16,7 +16,7 @@ def outermost(choices: Iterable[tuple[NDArray[np.float64], float, str, str]]) ->
     Parameters
     ----------
     choices : iterable of tuple
-        The values that were tried, the best of them, and words for the smallest and for the largest.
+        The values that were tried, shape (n,), the best of them, and words for the smallest and for the largest.
 
     Examples
     --------

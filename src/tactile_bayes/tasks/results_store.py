@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -31,7 +32,7 @@ class Kind(NamedTuple):
     """Name of the outcomes, and of the file."""
     error: type[TactileBayesError]
     encode: Callable[[Any], dict[str, Any]]
-    """Maps an outcome to JSON values without NaN."""
+    """Maps an outcome to names and values; NaN becomes null, and a tuple a list."""
     decode: Callable[[dict[str, Any]], Any]
     """Inverse of `encode`; raises KeyError, TypeError, ValueError or AttributeError."""
 
@@ -69,7 +70,7 @@ class ResultsStore(Generic[Outcome]):
         rows = [{"number": number, **self._kind.encode(outcome)} for number, outcome in sorted(self.outcomes.items())]
         table = {"format": _FORMAT, "experiment": self._identity, self._kind.what: rows}
         with write_atomically(self._file) as temporary:
-            temporary.write_text(json.dumps(table, ensure_ascii=False, allow_nan=False), encoding="utf-8")
+            temporary.write_text(json.dumps(_storable(table), ensure_ascii=False, allow_nan=False), encoding="utf-8")
 
 
 @contextmanager
@@ -160,6 +161,15 @@ def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]
         more = f" and {len(differ) - 3} more" if len(differ) > 3 else ""
         raise kind.error(f"{file.parent} holds {kind.what} of another experiment: {named}{more}; {correction}")
     return outcomes
+
+
+def _storable(value: Any) -> Any:
+    """As JSON holds it: null for what is not finite, and lists for tuples."""
+    if isinstance(value, Mapping):
+        return {name: _storable(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_storable(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _short(value: Any) -> str:

@@ -11,6 +11,7 @@ import xarray as xr
 from arviz_stats.base.array import array_stats
 
 from helpers.contact_posteriors import CELL, EXACT_ANGLE, NAMES, ROD, SI_CELL, measured
+from helpers.refusals import refused
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import InferenceError, ParameterError, RecordError
 from tactile_bayes.inference.contact_posterior import infer_contacts
@@ -277,7 +278,7 @@ def test_what_samples_share_is_called_an_approximation():
 
 @pytest.mark.parametrize("draws", [0, -4, 2, 10, 4.0, True, "4"])
 def test_draws_are_a_multiple_of_four(draws):
-    with pytest.raises(ParameterError, match=r"draws is .*: give a multiple of 4, one share for each chain"):
+    with refused(ParameterError, draws=draws):
         infer(draws=draws)
 
 
@@ -288,14 +289,14 @@ def test_few_draws_will_do():
 
 
 def test_unknown_options_are_refused():
-    with pytest.raises(ParameterError, match="method is 'nuts': choose 'auto', 'importance' or 'emcee'"):
+    with refused(ParameterError, method="nuts"):
         infer(method="nuts")
-    with pytest.raises(ParameterError, match="prior is 'round': choose 'flat' or 'polar'"):
+    with refused(ParameterError, prior="round"):
         infer(prior="round")
-    with pytest.raises(ParameterError, match="seed is -1: give a whole number"):
+    with refused(ParameterError, seed=-1):
         infer(seed=-1)
     for friction in (-0.3, 2.0, np.nan):
-        with pytest.raises(ParameterError, match="the friction angle is"):
+        with refused(ParameterError, "friction angle"):
             infer(friction=friction)
 
 
@@ -308,33 +309,33 @@ def without(*names):
 
 
 def test_a_missing_channel_is_refused():
-    with pytest.raises(RecordError, match="force_y was not measured"):
+    with refused(RecordError, "force_y"):
         infer_contacts(without("force_y"), load_cell=CELL, seed=1)
 
 
 def test_a_record_without_a_load_cell_is_refused():
-    with pytest.raises(ParameterError, match="the record carries no data sheet of its load cell: give load_cell="):
+    with refused(ParameterError, "load_cell="):
         infer_contacts(without(), seed=1)
 
 
 @pytest.mark.parametrize("cell", [LoadCell(), LoadCell(moment_noise=0.02), LoadCell(force_noise=0.05)])
 def test_a_channel_without_noise_is_refused(cell):
-    with pytest.raises(ParameterError, match="is measured, but the load cell has no noise on it"):
+    with refused(ParameterError, "load cell", "noise"):
         infer_contacts(without(), load_cell=cell, seed=1)
 
 
 def test_a_record_without_load_is_refused():
-    with pytest.raises(InferenceError, match="no sample carries a load that noise does not explain"):
+    with refused(InferenceError, "no sample", "load"):
         infer(which=[0, 1, 2])
 
 
 def test_what_has_no_closed_form_is_refused():
     wanders = {"bias_uncertainty": (0.01, 0.01, 0.01)}
-    with pytest.raises(ParameterError, match="with outliers"):
+    with refused(ParameterError, "outliers"):
         infer(load_cell=replace(CELL, degrees_of_freedom=4.0, **wanders))
     cell = replace(CELL, moment_range=0.9, **wanders)
     record = cell.measure(scan(paper_profile("II", q=0.5), drive_step=0.1).record, seed=1)
-    with pytest.raises(ParameterError, match="is at the end of the load cell's range"):
+    with refused(ParameterError, "end of the load cell's range"):
         infer_contacts(record, load_cell=cell, seed=1)
 
 
@@ -386,7 +387,7 @@ def test_outliers_of_every_kind_have_posteriors(degrees_of_freedom):
 
 
 def test_ensembles_are_as_many_as_chains():
-    with pytest.raises(ParameterError, match="2 ensembles: give 4, one for each chain of the result"):
+    with refused(ParameterError, "2 ensembles", 4):
         infer(settings=SamplerSettings(ensembles=2))
 
 
@@ -397,5 +398,5 @@ def test_spawned_seeds_are_told_apart():
 
 
 def test_a_prior_that_is_no_number_is_refused():
-    with pytest.raises(ParameterError, match="the prior is not a number"):
+    with refused(ParameterError, "prior"):
         infer(which=[61], prior=lambda x, y, slope: np.where(x > 0.0, np.nan, 0.0) + 0.0 * np.log(np.abs(slope) + 1.0))

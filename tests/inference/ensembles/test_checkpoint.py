@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, SamplerSettings, block, checkpoint, sample
 from tactile_bayes.tasks import files
@@ -170,7 +171,7 @@ def test_a_process_that_is_killed_leaves_whole_blocks(tmp_path):
         while not list(folder.glob("block-*")):
             assert process.poll() is None
             time.sleep(1e-2)
-        with pytest.raises(InferenceError, match="another run is at work"):
+        with refused(InferenceError, "another run"):
             draw(folder)
         process.kill()
     assert process.returncode == -signal.SIGKILL
@@ -305,10 +306,10 @@ def test_the_states_are_those_of_emcee(tmp_path):
 # --- Refusals, which leave everything as it was -----------------------------------------------------------------------
 
 
-def refuse(folder, match, **options):
+def refuse(folder, *named, **options):
     before = content(folder)
     target = Counted()
-    with pytest.raises(InferenceError, match=match):
+    with refused(InferenceError, *named):
         draw(folder, target=target, **options)
     assert target.calls == 0
     assert content(folder) == before
@@ -322,21 +323,17 @@ def begun(tmp_path):
 
 def test_another_run_is_refused_with_what_differs(begun):
     same = {"data": "a" * 64, "model": "parabola"}
-    words = r"differs in model \(was 'parabola', now 'circle'\): give another folder, or what was given then"
-    refuse(begun, words, identity={**same, "model": "circle"})
-    refuse(begun, r"data \(was .*, now not stated\)", identity={"model": "parabola"})
-    refuse(begun, r"rod \(was not stated, now '1'\)", identity={**same, "rod": "1"})
-    refuse(
-        begun, r"differs in seed of the ensembles \(was '3, pool of 4', now '4, pool of 4'\):", identity=same, seed=4
-    )
+    refuse(begun, "model (was 'parabola', now 'circle')", identity={**same, "model": "circle"})
+    refuse(begun, "data", "now not stated", identity={"model": "parabola"})
+    refuse(begun, "rod (was not stated, now '1')", identity={**same, "rod": "1"})
+    refuse(begun, "seed of the ensembles (was '3, pool of 4', now '4, pool of 4')", identity=same, seed=4)
     child = np.random.SeedSequence(3, spawn_key=(1,))
-    refuse(begun, r"now '3, spawn key \(1,\), pool of 4'", identity=same, seed=child)
-    refuse(begun, r"differs in names of parameters \(was 'a, b', now 'a, c'\):", identity=same, names=("a", "c"))
-    refuse(begun, "differs in starting points", identity=same, scale=3.0)
+    refuse(begun, "now '3, spawn key (1,), pool of 4'", identity=same, seed=child)
+    refuse(begun, "names of parameters (was 'a, b', now 'a, c')", identity=same, names=("a", "c"))
+    refuse(begun, "starting points", identity=same, scale=3.0)
     refuse(begun, "block_steps", identity=same, settings=replace(SMALL, block_steps=20))
-    walkers = r"walkers of an ensemble \(was '8', now '10'\): give another"
-    refuse(begun, walkers, identity=same, settings=replace(SMALL, walkers=10))
-    refuse(begun, r"number of ensembles \(was '2', now '3'\)", identity=same, settings=replace(SMALL, ensembles=3))
+    refuse(begun, "walkers of an ensemble (was '8', now '10')", identity=same, settings=replace(SMALL, walkers=10))
+    refuse(begun, "number of ensembles (was '2', now '3')", identity=same, settings=replace(SMALL, ensembles=3))
     draw(begun, identity=same, seed=np.random.SeedSequence(3))
 
 
@@ -345,62 +342,60 @@ def test_a_long_entry_is_shown_where_it_differs(tmp_path):
     priors = "; ".join(f"parameter {i} uniform" for i in range(20))
     draw(tmp_path, settings=few, identity={"priors": priors})
     changed = priors.replace("11 uniform", "11 normal")
-    refuse(
-        tmp_path, r"…'[^']*11 uniform[^']*'…, now …'[^']*11 normal[^']*'…", settings=few, identity={"priors": changed}
-    )
+    refuse(tmp_path, "11 uniform", "11 normal", "…", settings=few, identity={"priors": changed})
 
 
 def test_another_version_of_emcee_is_refused(begun, monkeypatch):
     path = begun / "checkpoint.json"
     path.write_text(path.read_text(encoding="utf-8").replace(version("emcee"), "3.1.5"), encoding="utf-8")
-    refuse(begun, r"version of emcee \(was '3.1.5'", identity={"data": "a" * 64, "model": "parabola"})
+    refuse(begun, "version of emcee (was '3.1.5'", identity={"data": "a" * 64, "model": "parabola"})
 
 
 @pytest.mark.parametrize("identity", [{"a": 1}, {1: "a"}, {"starting points": "mine"}])
 def test_a_bad_identity_is_refused(tmp_path, identity):
-    with pytest.raises(ParameterError, match="the identity says"):
+    with refused(ParameterError, "identity"):
         draw(tmp_path / "run", identity=identity)
     assert not (tmp_path / "run").exists()
 
 
 def test_a_folder_of_other_things_is_refused(tmp_path):
     (tmp_path / "results.nc").write_bytes(b"years of work")
-    refuse(tmp_path, "holds 'results.nc' and no checkpoint.json")
+    refuse(tmp_path, "'results.nc'", "checkpoint.json")
 
 
 def test_a_file_is_refused(tmp_path):
     (tmp_path / "run").write_bytes(b"")
-    with pytest.raises(InferenceError, match="is a file: give a folder"):
+    with refused(InferenceError, tmp_path / "run"):
         draw(tmp_path / "run")
 
 
 @pytest.mark.parametrize(
-    ("text", "match"),
+    ("text", "named"),
     [
         ("", "damaged"),
         ("[]", "damaged"),
         ('{"step": 3}', "damaged"),
-        ('{"kind": "weights", "format": 1}', "is of kind 'weights'"),
-        ('{"kind": "ensembles of tactile-bayes", "format": 2, "more": 1}', "has format 2, and this version reads"),
+        ('{"kind": "weights", "format": 1}', "'weights'"),
+        ('{"kind": "ensembles of tactile-bayes", "format": 2, "more": 1}', "format 2"),
         ('{"kind": "ensembles of tactile-bayes", "format": 1, "judged": 0, "identity": []}', "damaged"),
         ('{"kind": "ensembles of tactile-bayes", "format": 1, "judged": 0, "identity": {}}', "was not stated"),
     ],
 )
-def test_a_description_that_is_none_is_refused(begun, text, match):
+def test_a_description_that_is_none_is_refused(begun, text, named):
     (begun / "checkpoint.json").write_text(text, encoding="utf-8")
-    refuse(begun, match)
+    refuse(begun, named)
 
 
 def test_a_lost_description_is_refused(begun):
     (begun / "checkpoint.json").unlink()
-    refuse(begun, "holds 'block-00000000-00000010.npz' and no checkpoint.json")
+    refuse(begun, "'block-00000000-00000010.npz'", "checkpoint.json")
 
 
 @pytest.mark.slow
 def test_a_gap_is_refused_and_its_remedy_works(tmp_path):
     draw(tmp_path)
     (tmp_path / "block-00000030-00000040.npz").unlink()
-    refuse(tmp_path, "no block that begins with step 30, but block-00000040-00000050.npz")
+    refuse(tmp_path, "step 30", "block-00000040-00000050.npz")
     for path in [*tmp_path.glob("block-00000040-*"), *tmp_path.glob("block-00000050-*")]:
         path.unlink()
     assert_same(draw(tmp_path), whole())
@@ -436,7 +431,7 @@ def test_a_block_of_another_shape_is_refused(begun):
 
 def test_one_folder_is_for_one_run_at_a_time(tmp_path):
     def other(_):
-        with pytest.raises(InferenceError, match="another run is at work"):
+        with refused(InferenceError, "another run"):
             draw(tmp_path)
         raise KeyboardInterrupt
 
@@ -452,7 +447,7 @@ def test_where_there_are_no_locks_a_second_run_writes_over_nothing(tmp_path, mon
     def other(_):
         draw(tmp_path)
 
-    with pytest.raises(InferenceError, match=r"another run .* block-00000010-00000020\.npz is there"):
+    with refused(InferenceError, "another run", "block-00000010-00000020.npz"):
         draw(tmp_path, progress=other)
     assert_same(draw(tmp_path), whole())
 

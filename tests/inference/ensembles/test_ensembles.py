@@ -9,6 +9,7 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from helpers.interrupts import interrupted_at
+from helpers.refusals import refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles import Draws, Progress, SamplerSettings, diagnosis, sample, scatter_walkers
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time, walker_major
@@ -276,14 +277,14 @@ def test_a_log_probability_that_is_no_number_is_refused_with_the_point(bad, caps
 
     settings = SamplerSettings(ensembles=2, walkers=8)
     start = np.clip(normal_start(2, settings, scale=0.4), -0.9, 0.9)
-    with pytest.raises(InferenceError, match=r"x0 = \S+, x1 = 1\."):
+    with refused(InferenceError, "x0 =", "x1 = 1."):
         sample(log_probability, start, names=["x0", "x1"], seed=1, settings=settings)
     printed = capsys.readouterr()
     assert printed.out == printed.err == ""
 
 
 def test_a_log_probability_of_the_wrong_shape_is_refused():
-    with pytest.raises(InferenceError, match="shape"):
+    with refused(InferenceError, "shape"):
         draw_from(lambda x: standard(x)[:, None], 2, settings=SMALL)
 
 
@@ -296,53 +297,53 @@ def test_bad_starts_are_refused():
         return np.where(x[:, 0] > 0.0, standard(x), -np.inf)
 
     outside = int(np.count_nonzero(start[..., 0] <= 0.0))
-    with pytest.raises(InferenceError, match=rf"{outside} of 16 walkers .* scatter_walkers"):
+    with refused(InferenceError, f"{outside} of 16 walkers", "scatter_walkers"):
         sample(half, start, names=names, seed=1, settings=settings)
-    with pytest.raises(InferenceError, match="not finite"):
+    with refused(InferenceError, "finite"):
         sample(standard, np.where(start > 0.0, start, np.nan), names=names, seed=1, settings=settings)
     plane = start.copy()
     plane[1, :, 1] = 2.0 * plane[1, :, 0]
-    with pytest.raises(InferenceError, match="ensemble 1"):
+    with refused(InferenceError, "ensemble 1"):
         sample(standard, plane, names=names, seed=1, settings=settings)
     for shape in [(2, 8, 3), (3, 8, 2), (2, 6, 2), (16, 2)]:
-        with pytest.raises(ParameterError, match="start has"):
+        with refused(ParameterError, "start"):
             sample(standard, np.zeros(shape), names=names, seed=1, settings=settings)
     free = SamplerSettings(ensembles=2)
-    with pytest.raises(ParameterError, match="even"):
+    with refused(ParameterError, "even"):
         sample(standard, normal_start(2, free)[:, :7], names=names, seed=1, settings=free)
-    with pytest.raises(ParameterError, match="at least 6"):
+    with refused(ParameterError, 6):
         sample(standard, np.zeros((2, 4, 3)), names=["a", "b", "c"], seed=1, settings=free)
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, None, True])
 def test_bad_seeds_are_refused(seed):
-    with pytest.raises(ParameterError, match="seed"):
+    with refused(ParameterError, seed=seed):
         draw_from(standard, 2, settings=SMALL, seed=seed)
 
 
 def test_names_have_to_differ():
-    with pytest.raises(ParameterError, match="name of its own"):
+    with refused(ParameterError, "name"):
         sample(standard, normal_start(2, SMALL), names=["a", "a"], seed=1, settings=SMALL)
 
 
 @pytest.mark.parametrize(
-    ("setting", "value", "word"),
+    ("setting", "value", "limit"),
     [
-        ("ensembles", 1, "independent"),
-        ("ensembles", 2.0, "whole number"),
+        ("ensembles", 1, 2),
+        ("ensembles", 2.0, 2),
         ("walkers", 7, "even"),
-        ("walkers", 2, "at least 4"),
-        ("block_steps", 0, "at least 1"),
-        ("max_steps", 0, "at least 1"),
-        ("max_r_hat", 1.0, "1.01"),
-        ("max_r_hat", np.nan, "1.01"),
+        ("walkers", 2, 4),
+        ("block_steps", 0, 1),
+        ("max_steps", 0, 1),
+        ("max_r_hat", 1.0, 1.01),
+        ("max_r_hat", np.nan, 1.01),
         ("min_ess", 0.0, "positive"),
         ("min_ess", np.inf, "positive"),
         ("max_seconds", 0.0, "positive"),
     ],
 )
-def test_bad_settings_are_refused(setting, value, word):
-    with pytest.raises(ParameterError, match=word):
+def test_bad_settings_are_refused(setting, value, limit):
+    with refused(ParameterError, limit, **{setting: value}):
         SamplerSettings(**{setting: value})
 
 
@@ -350,7 +351,7 @@ def test_walkers_of_a_target():
     assert SamplerSettings().walkers_for(2) == 48
     assert SamplerSettings().walkers_for(15) == 90
     assert SamplerSettings(walkers=20).walkers_for(10) == 20
-    with pytest.raises(ParameterError, match="at least 22"):
+    with refused(ParameterError, 22):
         SamplerSettings(walkers=20).walkers_for(11)
 
 
@@ -369,5 +370,5 @@ def test_scattered_walkers_lie_inside_and_differ():
     np.testing.assert_array_equal(
         start, scatter_walkers(log_probability, wide, parameters=2, seed=1, settings=settings)
     )
-    with pytest.raises(InferenceError, match="0 of 1000 random starting points"):
+    with refused(InferenceError, "0 of 1000"):
         scatter_walkers(lambda x: np.full(len(x), -np.inf), wide, parameters=2, seed=1, settings=settings)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import emcee
 import numpy as np
 import pytest
 
 from tactile_bayes.inference.ensembles.block import WalkingEnsembles
 from tactile_bayes.inference.ensembles.moves import FittedMove, FixedMove, NormalMove, standard_moves, whitened_moves
-from tactile_bayes.inference.ensembles.proposal import Proposal
+from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 from tactile_bayes.inference.ensembles.walkers import first_random_state
 
 WALKERS = 40
@@ -126,7 +124,7 @@ def test_proposals_from_elsewhere_leave_a_target_invariant(parameters, wall):
     proposal = Proposal(target.mean + 0.5 * target.deviation, np.diag(1.2 * target.deviation))
     error, standard = moments(target, lambda: [(FixedMove(proposal), 1.0)], ensembles=64, steps=60)
     assert np.all(np.abs(error) < 4.0 * standard)
-    moves = standard_moves(replace(proposal, efficiency=0.2))
+    moves = standard_moves(Mixture((proposal,)).with_efficiency(0.2))
     assert sum(share for _, share in moves) == pytest.approx(1.0)
     error, standard = moments(target, lambda: moves, ensembles=64, steps=60)
     assert np.all(np.abs(error) < 4.0 * standard)

@@ -14,8 +14,8 @@ from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import contact_fit
-from tactile_bayes.inference.contour_problem import default_priors
 from tactile_bayes.inference.ensembles import SamplerSettings
+from tactile_bayes.inference.experiment import default_priors
 from tactile_bayes.inference.noise import noise_of
 from tactile_bayes.inference.nuisances import STANDARD, nuisances_of
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at

@@ -75,7 +75,7 @@ def outliers(reading: Floats, sweeps: list[Index], stretches: list[Index], step:
 
 
 def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: float) -> float:
-    """Return the probability that two unloaded readings are equal because of the limited resolution."""
+    """Return the probability that two unloaded readings, shape (n_samples,), are equal by limited resolution."""
     by_steps = min(1.0, step / (2.0 * math.sqrt(math.pi) * noise)) if noise > 0.0 else 1.0
     values = np.concatenate([reading[rows][np.append(True, np.diff(reading[rows]) != 0.0)] for rows in stretches])
     if values.size < 2:
@@ -86,13 +86,13 @@ def repeat_chance(reading: Floats, stretches: list[Index], step: float, noise: f
 
 
 def runs_of_equals(reading: Floats, rows: Index) -> list[Index]:
-    """Return runs of two and more equal consecutive readings of a sweep, as rows."""
+    """Return runs of two and more equal consecutive readings of a sweep, as rows of readings, shape (n_samples,)."""
     parts = np.split(rows, np.flatnonzero(np.diff(reading[rows]) != 0.0) + 1)
     return [part for part in parts if part.size > 1]
 
 
 def stuck(reading: Floats, sweeps: list[Index], chance: float, *, false_alarm: float) -> Flags:
-    """Flag readings that stay equal for longer than the limited resolution explains."""
+    """Flag readings, shape (n_samples,), that stay equal for longer than the limited resolution explains."""
     flags = np.zeros(reading.size, dtype=bool)
     for rows in sweeps:
         for run in runs_of_equals(reading, rows):
@@ -113,7 +113,7 @@ def repeated(readings: Floats, sweeps: list[Index], chances: Floats, *, false_al
 
 
 def uneven_steps(angle: Floats, rows: Index, sense: int) -> Flags:
-    """Flag samples of a sweep whose preceding step differs from the usual one; none if many steps do."""
+    """Flag rows of a sweep, shape (rows,), whose preceding step of the angle [rad] is unusual; none if many are."""
     flags = np.zeros(rows.size, dtype=bool)
     step = sense * np.diff(angle[rows])
     if step.size < _FEWEST:

@@ -25,13 +25,13 @@ class Autocorrelation(NamedTuple):
 
 
 def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
-    """Return the rows of each sweep, in the order of the sweeps' numbers."""
+    """Return the rows of each sweep, from sweep numbers of shape (samples,), in the order of these numbers."""
     order = np.argsort(sweep, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
 def unloaded_stretches(sweeps: list[Index], unloaded: NDArray[np.bool_]) -> list[Index]:
-    """Return the rows of every stretch of consecutive unloaded samples in a sweep."""
+    """Return the rows of every stretch of consecutive unloaded samples; `unloaded` has shape (samples,)."""
     stretches = []
     for rows in sweeps:
         flags = unloaded[rows]
@@ -41,7 +41,7 @@ def unloaded_stretches(sweeps: list[Index], unloaded: NDArray[np.bool_]) -> list
 
 
 def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
-    """Return readings less the median of their stretch, and their robust standard deviation."""
+    """Return unloaded readings less the median of their stretch, shape (n,), and their robust standard deviation."""
     residuals = [reading[rows] - np.median(reading[rows]) for rows in stretches]
     together = np.concatenate(residuals) if residuals else np.zeros(0)
     spread = 1.4826 * float(np.median(np.abs(together))) if together.size else 0.0
@@ -49,7 +49,7 @@ def centred(reading: Floats, stretches: list[Index]) -> tuple[Floats, float]:
 
 
 def autocorrelation(reading: Floats, stretches: list[Index]) -> Autocorrelation:
-    """Return the autocorrelation of neighbouring samples over all stretches; NaN if most readings are equal."""
+    """Return the autocorrelation of readings, shape (samples,), in all stretches; NaN if most readings are equal."""
     _, spread = centred(reading, stretches)
     if spread == 0.0:
         return Autocorrelation(np.nan, np.nan)

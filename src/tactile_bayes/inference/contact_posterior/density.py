@@ -27,9 +27,9 @@ class Evaluated(NamedTuple):
     """Contacts with the logarithm of their posterior density."""
 
     log_density: Floats
-    """By force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)."""
+    """Density over force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)."""
     place: Floats
-    """Contact point of the rod's centreline, slope angle, arc length; forward, shape (4, ..., n)."""
+    """Contact point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n)."""
 
 
 class ContactDensity:
@@ -41,16 +41,22 @@ class ContactDensity:
     Parameters
     ----------
     samples : Samples
-        From a record with all channels; see `samples_of`. Of its covariance only proposals are made.
+        Samples of a record with all channels, from `samples_of`. Their covariance serves for proposals only.
     readings : LoneSamples
-        The same samples as the load cell gave them, dimensionless.
+        The same samples as read by the load cell, dimensionless.
     base : ndarray, shape (n, 2)
-        The pivots, in the record's unit.
+        The pivots, in the record's unit of length.
     turning : bool
-        Whether the cell turns with the drive.
+        True if the cell turns with the drive.
     delta : float
-        Friction angle.
+        Friction angle [rad].
     prior : "flat", "polar" or callable
+        Prior of contact point and slope angle; see `infer_contacts`.
+
+    Raises
+    ------
+    ParameterError
+        If the prior is none of these, or a function returns no log-density.
     """
 
     def __init__(
@@ -77,18 +83,18 @@ class ContactDensity:
 
     @property
     def has_free_angle(self) -> bool:
-        """Whether the drive angle is uncertain."""
+        """True if the drive angle is uncertain."""
         return bool(np.any(self.samples.reading.angle_deviation))
 
     def take(self, where: NDArray[np.intp]) -> ContactDensity:
-        """The density of some of the samples."""
+        """Return the density of some of the samples."""
         some, readings, base = self.samples.take(where), self._readings.take(where), self.base[where]
         return ContactDensity(some, readings, base, turning=self._turning, delta=self.delta, prior=self._prior)
 
     def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
-        """Contacts by coordinates, shape (..., n, 4), and phase, shape (..., n); −inf where none is possible.
+        """Evaluate contacts by coordinates, shape (..., n, 4), and phase, shape (..., n); −inf where impossible.
 
-        The density is that of the coordinates which are free in the phase.
+        The density is that of the coordinates that are free in the phase.
         """
         shape = coordinates.shape[:-1]
         flat = coordinates.reshape(-1, 4)
@@ -99,8 +105,8 @@ class ContactDensity:
         loads = np.stack([side * moment, side * force_x, force_y], axis=-1)
         angle = coordinates[..., DRIVE_ANGLE]
         if self._turning:
-            world = np.where(side < 0.0, np.pi - angle, angle)
-            loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], world)
+            in_lab_frame = np.where(side < 0.0, np.pi - angle, angle)
+            loads[..., 1], loads[..., 2] = turned(loads[..., 1], loads[..., 2], in_lab_frame)
         alpha, arclength = rod.place[2:]
         with np.errstate(divide="ignore", invalid="ignore"):
             volume = np.log(np.where(tip, rod.volume_tip, rod.volume_tangential))
@@ -114,12 +120,12 @@ class ContactDensity:
         return Evaluated(density, rod.place.reshape(4, *shape))
 
     def places(self, coordinates: Floats) -> Floats:
-        """Places of contacts by coordinates, shape (..., n, 4), as `to_lab_frame` has them."""
+        """Return contacts by coordinates, shape (..., n, 4), in the form of `to_lab_frame`."""
         place = contact_states(coordinates.reshape(-1, 4), self.delta).place
         return self.to_lab_frame(place.reshape(4, *coordinates.shape[:-1]))
 
     def to_lab_frame(self, place: Floats) -> Floats:
-        """Places on the object's surface, in the record's unit and the axes of the world, shape (4, ..., n)."""
+        """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""
         rod, side = self.samples.rod, self.samples.side
         x, y, alpha, arclength = place
         radius, length = 0.5 * rod.diameter, rod.length_unit
@@ -143,9 +149,9 @@ class ContactDensity:
         return values
 
     def unfold(self, points: Floats) -> tuple[Floats, NDArray[np.int8]]:
-        """Coordinates and phase from points (way, force[, drive angle]), shape (..., n, 2 or 3).
+        """Return coordinates and phase from points (way, force[, drive angle]), shape (..., n, 2 or 3).
 
-        The way leads over both sheets: ψ1 + δ in tip contact, s1 − 1 in tangential contact, which is negative.
+        The way is one coordinate for both sheets: ψ1 + δ ≥ 0 in tip contact, s1 − 1 < 0 in tangential contact.
         """
         way = points[..., 0]
         z = np.empty((*points.shape[:-1], 4))

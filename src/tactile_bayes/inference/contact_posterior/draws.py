@@ -21,27 +21,27 @@ Method = Literal["auto", "importance", "emcee"]
 CHAINS = 4
 
 IMPORTANCE, EMCEE = 1, 2
-"""Codes of who drew."""
+"""Codes of the method that made the draws."""
 
 EMCEE_SETTINGS = SamplerSettings(walkers=24, min_ess=400.0, max_steps=4000)
 
 _PROPOSALS = 4
-"""Proposals for each draw that is kept."""
+"""Number of proposals for each draw that is kept."""
 
 _START = 1000
-"""Proposals among which emcee's walkers start, at least."""
+"""Smallest number of proposals among which emcee's walkers start."""
 
 _BLOCK = 64
-"""Samples worked on at a time."""
+"""Number of samples that are processed at a time."""
 
 
 class ContactDraws(NamedTuple):
-    """Draws for each of n samples, and how they fared."""
+    """Draws for each of n samples, with their diagnostics."""
 
     points: Floats
     """Way, force and, if it is uncertain, drive angle, shape (chains, draws, n, 2 or 3)."""
     engine: NDArray[np.int8]
-    """`IMPORTANCE` or `EMCEE`, shape (n,); so are the others."""
+    """`IMPORTANCE` or `EMCEE`, shape (n,), like all further entries."""
     converged: NDArray[np.bool_]
     tangential: Floats
     """Probability of tangential contact."""
@@ -50,8 +50,9 @@ class ContactDraws(NamedTuple):
     pareto_k: Floats
     effective_draws: Floats
     r_hat: Floats
-    """Of emcee, like the next; else NaN."""
+    """R̂ of emcee; NaN with importance sampling."""
     ess: Floats
+    """Effective sample size of emcee; NaN with importance sampling."""
 
 
 def draw_contacts(
@@ -62,7 +63,7 @@ def draw_contacts(
     settings: SamplerSettings | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> ContactDraws:
-    """Draws for all samples of a density, `draws` of each in all chains; see `infer_contacts`."""
+    """Draw contacts for all samples of a density, `draws` of each in all chains together; see `infer_contacts`."""
     count = density.samples.side.size
     of_blocks, of_samples = spawn(seed, 2)
     seeds, own = spawn(of_blocks, -(-count // _BLOCK)), spawn(of_samples, count)
@@ -115,11 +116,11 @@ def _draw_block(
 
 
 def _resampled(weights: ContactWeights, draws: int, rng: np.random.Generator) -> Floats:
-    """Points drawn by their weights, shape (chains, draws, n, 2 or 3); a chain has proposals of its own."""
+    """Resample points by their weights, shape (chains, draws, n, 2 or 3); each chain has its own proposals."""
     each = draws // CHAINS
     points = np.empty((CHAINS, each, *weights.points.shape[1:]))
     for chain in range(CHAINS):
-        part = slice(chain, None, CHAINS)  # proposals stand in the order of their phases
+        part = slice(chain, None, CHAINS)  # proposals are in the order of their phases
         count = len(weights.points[part])
         for i in range(points.shape[2]):
             weight = np.exp(weights.log_weight[part, i] - weights.log_weight[part, i].max())
@@ -137,7 +138,7 @@ def _walk(
     seed: np.random.SeedSequence,
     settings: SamplerSettings,
 ) -> tuple[Floats, float, float, bool]:
-    """Draws of a density's one sample by emcee, over both branches at once, with R̂ and effective sample size."""
+    """Draw one sample's contact by emcee, over both branches at once, with R̂ and effective sample size."""
     proposed = weights.points[:, i]
     weight = np.exp(weights.log_weight[:, i] - weights.log_weight[:, i].max())
     names = ("way", "force", "drive angle")[: proposed.shape[-1]]
@@ -155,7 +156,7 @@ def _walk(
         start = scatter_walkers(
             log_probability, draw, parameters=len(names), seed=for_start, settings=settings, max_rounds=1000
         )
-    except InferenceError:  # no contact at all is possible there
+    except InferenceError:  # no contact is possible for this sample
         return np.full((CHAINS, draws // CHAINS, len(names)), np.nan), np.nan, 0.0, False
     found = sample(log_probability, start, names=names, seed=for_walk, settings=settings)
     kept = np.linspace(0, found.samples.shape[1] - 1, draws // CHAINS).astype(int)

@@ -1,4 +1,4 @@
-"""Posteriors of many single contacts at once, by importance sampling that certifies itself."""
+"""Posteriors of many single contacts at once, by importance sampling with Pareto's k̂ as certificate."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 __all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
 
 LARGEST_K = 0.7
-"""Pareto k̂ above which weights are not to be trusted (Vehtari et al. 2024, JMLR 25(72))."""
+"""Pareto k̂ above which weights must not be trusted (Vehtari et al. 2024, JMLR 25(72))."""
 
 LEAST_DRAWS = 400.0
-"""Effective draws below which there are too few."""
+"""Smallest number of effective draws."""
 
 _NOTHING = 600.0
-"""Logarithm of a ratio of weights at which the smaller counts for nothing."""
+"""Logarithm of a ratio of weights at which the smaller is negligible."""
 
 _PILOTS = ((600, 0.25), (600, 0.15))
-"""Proposals of each pilot run, and the share that the less probable phase then has at least in the next run: the edge
-between the phases cuts off narrow layers of the posterior, which take more than one look."""
+"""Number of proposals of each pilot run, and the smallest share of the less probable phase in the next run: the edge
+between the phases cuts off narrow layers of the posterior, which need more than one pilot."""
 
 _GOOD = 0.4
-"""Effective share of a phase's proposals above which its approximation is left alone: moments of what an edge cuts off
-would not improve it."""
+"""Effective share of a phase's proposals above which its approximation is kept: moments of a truncated posterior would
+not improve it."""
 
 
 class ContactWeights(NamedTuple):
@@ -42,11 +42,11 @@ class ContactWeights(NamedTuple):
     points: Floats
     """Way, force and, if it is uncertain, drive angle, shape (draws, n, 2 or 3)."""
     place: Floats
-    """Contact point, slope angle and arc length, forward and dimensionless, shape (4, draws, n)."""
+    """Contact point, slope angle and arc length, in the sweep frame and dimensionless, shape (4, draws, n)."""
     log_weight: Floats
-    """Smoothed, with sum one, shape (draws, n)."""
+    """Logarithms of smoothed weights with sum one, shape (draws, n)."""
     pareto_k: Floats
-    """Shape (n,); infinite where nothing could be proposed."""
+    """Shape (n,); infinite if no proposal is possible."""
     effective_draws: Floats
     """Shape (n,)."""
     log_evidence: Floats
@@ -54,19 +54,21 @@ class ContactWeights(NamedTuple):
 
     @property
     def certified(self) -> NDArray[np.bool_]:
-        """Where the weights stand for the posterior."""
+        """True for samples whose weights represent the posterior, shape (n,)."""
         return np.asarray((self.pareto_k <= LARGEST_K) & (self.effective_draws >= LEAST_DRAWS))
 
 
 def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequence) -> ContactWeights:
-    """Proposals and their weights; 7 numbers a proposal, so that many samples are better weighed by and by.
+    """Return proposals and their importance weights.
+
+    A proposal takes 7 numbers of memory, so that many samples are better processed in blocks.
 
     Parameters
     ----------
     density : ContactDensity
-        Of n samples.
+        Density of n samples.
     draws : int
-        Proposals for each of them.
+        Number of proposals for each of them.
     seed : SeedSequence
     """
     rng = np.random.default_rng(seed)
@@ -82,10 +84,10 @@ def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequ
     lost = ~np.isfinite(log_evidence)
     log_weight[:, lost] = 0.0
     smoothed, k = log_weight.copy(), np.full(lost.size, np.inf)
-    # Where nearly all weights are nothing there is no tail to smooth.
+    # If nearly all weights are negligible there is no tail to smooth.
     many = np.count_nonzero(log_weight > log_weight.max(axis=0) - _NOTHING, axis=0) >= 0.25 * draws
     for i in np.flatnonzero(many & ~lost).tolist():
-        smoothed[:, i], k[i] = array_stats.psislw(-log_weight[:, i])  # it takes the logarithm of what to divide by
+        smoothed[:, i], k[i] = array_stats.psislw(-log_weight[:, i])  # weights are exp(−argument)
     smoothed = smoothed - logsumexp(smoothed, axis=0)
     effective = np.exp(-logsumexp(2.0 * smoothed, axis=0))
     return ContactWeights(points, place, smoothed, k, np.where(lost, 0.0, effective), log_evidence)
@@ -100,12 +102,12 @@ def _evaluated(
 
 
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
-    """Normal approximations on both sheets: means of points (2, n, k), covariances, and the share of tip contact."""
+    """Return normal approximations on both sheets: means (2, n, k), covariances, and the share of tip contact."""
     reading, delta = density.samples.reading, np.full(density.samples.side.size, density.delta)
-    tip, lying = fit_sheet(reading, delta, TIP), fit_sheet(reading, delta, TANGENTIAL)
+    tip, tangential = fit_sheet(reading, delta, TIP), fit_sheet(reading, delta, TANGENTIAL)
     free = [DRIVE_ANGLE] if density.has_free_angle else []
     means, covariances, usable = [], [], []
-    for sheet, way, shift in ((tip, PSI1, density.delta), (lying, ARCLENGTH, -1.0)):
+    for sheet, way, shift in ((tip, PSI1, density.delta), (tangential, ARCLENGTH, -1.0)):
         order = [way, FORCE, *free]
         mean = sheet.coordinates[:, order]
         mean[:, 0] += shift
@@ -124,7 +126,7 @@ def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
 def _refined(
     points: Floats, log_weight: Floats, mean: Floats, covariance: Floats, share: Floats, least: float
 ) -> tuple[Floats, Floats, Floats]:
-    """The approximation as a pilot run corrects it."""
+    """Return the approximation corrected by a pilot run."""
     mean, covariance, share = mean.copy(), covariance.copy(), share.copy()
     with np.errstate(invalid="ignore"):
         weight = np.exp(log_weight - np.max(log_weight, axis=0))

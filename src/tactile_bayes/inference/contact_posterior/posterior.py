@@ -59,43 +59,44 @@ def infer_contacts(
     settings: SamplerSettings | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.DataTree:
-    """Posterior of contact point and slope angle for every loaded sample, from that sample alone.
+    """Infer the posterior of contact point and slope angle for every loaded sample, from that sample alone.
 
-    A contact has three degrees of freedom, contact point and slope angle; whether the tip touches or the rod lies along
-    the object follows from them. Both phases are branches of one posterior, whose masses come out of it. Where errors
-    are small it is the normal distribution that `reconstruct` with method="constrained" gives; near first contact,
-    the change between the phases and snap-off it is not.
+    A contact has three degrees of freedom, contact point and slope angle, which determine whether the contact is a tip
+    or a tangential one. Both phases are branches of one posterior, which yields their probabilities. If errors are
+    small, it is the normal distribution that `reconstruct` with method="constrained" gives; near first contact, phase
+    changes and snap-off it is not normal.
 
     Parameters
     ----------
     measured : xr.Dataset
         A record with all three load channels.
     load_cell : LoadCell, optional
-        The sensor, in the record's units; by default the data sheet that the record carries. Its likelihood is used in
-        full: outliers and steps, too. What samples share, unknown bias and drift, counts as noise of each (and cannot
-        be combined with outliers). A sample
-        with a reading at the end of its range is left out: the load was larger, by an amount that one sample cannot
-        tell.
+        The sensor, in the record's units; by default the data sheet of the record. Its full likelihood is used,
+        including outliers and resolution. Unknown bias and drift, which samples share, count as noise of each sample
+        (and cannot be combined with outliers). A sample with a reading at the end of its range is left out: one sample
+        does not determine by how much the load was larger.
     prior : {"flat", "polar"} or callable
-        Over contact point and slope angle, within the rod's reach and |slope_angle| < π/2; see Notes. A function takes
-        arrays contact_x, contact_y (on the object's surface, in the world's axes and the record's unit) and slope_angle
-        [rad], and returns the logarithm of a density, an array of their shape, −inf where there is no contact; it need
-        not be normalised. Flat is lambda x, y, slope: 0 * x.
+        Prior over contact point and slope angle, within the rod's reach and |slope_angle| < π/2; see Notes. A function
+        takes arrays contact_x, contact_y (on the object's surface, in the laboratory frame and the record's unit) and
+        slope_angle [rad], and returns the logarithm of a density, an array of their shape, −inf where there is no
+        contact; it need not be normalised. Flat is lambda x, y, slope: 0 * x.
     seed : int or numpy.random.SeedSequence
-        The same seed, the same draws of the same samples; a sample more, or less, changes those of others, too.
+        Seed of all random numbers; the same seed gives the same draws of the same samples. One sample more, or less,
+        changes the draws of others, too.
     rod : Rod, optional
-        In place of the rod that an SI record states.
+        Rod that replaces the rod of an SI record.
     friction : float
-        Coulomb's coefficient μ, taken as known.
+        Coulomb's coefficient μ, assumed to be known.
     draws : int
-        For each sample; a multiple of 4, since there are four independent chains.
+        Number of draws for each sample; a multiple of 4, since there are four independent chains.
     method : {"auto", "importance", "emcee"}
-        How to draw. Importance sampling draws from normal approximations on both branches, weighs, and draws again from
-        the weighted; its own diagnostic, Pareto's k̂, certifies it, and where it does not, emcee takes over ("auto").
+        Sampling method. Importance sampling draws from normal approximations on both branches and resamples by weight;
+        its diagnostic, Pareto's k̂ (Vehtari et al. 2024, JMLR 25(72)), certifies it. With "auto", emcee samples those
+        contacts for which it does not.
     settings : SamplerSettings, optional
-        For emcee; by default 4 ensembles of 24 walkers until an effective sample size of 400.
+        Settings of emcee; by default 4 ensembles of 24 walkers until an effective sample size of 400.
     progress : callable, optional
-        Is given the number of samples that are done, and of all that are loaded.
+        Called with the number of samples done, and the number of loaded samples.
 
     Returns
     -------
@@ -104,37 +105,37 @@ def infer_contacts(
         contact_x, contact_y (on the object's surface), slope_angle, contact_arclength, drive_angle where the encoder is
         not exact, all in the record's units, and tangential (1 in tangential contact, 0 in tip contact). Draws of
         different samples are independent. Group `sample_stats`, by sample: tangential_probability, log_evidence (of the
-        dimensionless sample under the prior as it stands; NaN with emcee), pareto_k, effective_draws (of the weights),
-        r_hat and ess (of emcee), engine (0 none, 1 importance sampling, 2 emcee) and converged (0 also without a
-        contact). Groups `observed_data` and `constant_data`: the record. Attributes: a `message` in words, and
-        misfit_probability, as `reconstruct` with method="constrained" states it: near 0 where the loads are not those
-        of the rod, and all of this does not hold.
+        dimensionless sample under the given prior; NaN with emcee), pareto_k, effective_draws (of the weights), r_hat
+        and ess (of emcee), engine (0 none, 1 importance sampling, 2 emcee) and converged (0 also without a contact).
+        Groups `observed_data` and `constant_data`: the record. Attributes: a `message`, and misfit_probability, as
+        `reconstruct` with method="constrained" states it: near 0 if the loads are not those of the rod, so that the
+        result does not hold.
 
     Raises
     ------
     RecordError
-        If `measured` is no record, or misses a load channel.
+        If `measured` is not a valid record, or lacks a load channel.
     ParameterError
-        If an option is impossible, or the load cell has no noise on a channel.
+        If an option is not valid, or the load cell has no noise on a channel.
     InferenceError
         If no sample carries a load that noise does not explain.
 
     Notes
     -----
-    "flat" is flat in contact_x, contact_y and slope_angle: before the sample is seen, no place within reach and no
-    slope is preferred. One sample determines all three, and where the load is at least ten standard deviations of its
-    noise, the posterior moves by less than a tenth of a standard deviation between this prior and "polar", which is
-    flat in distance from the pivot, direction and slope. It is not harmless near first contact: contacts with loads
-    near zero lie within a thin shell at the end of the rod's reach, a flat prior gives that shell little room, and the
-    posterior of a weak contact leans to larger loads, that is inwards. Give your own density there if you know more.
+    "flat" is uniform in contact_x, contact_y and slope_angle: no point within reach and no slope is preferred a priori.
+    One sample determines all three, and if the load is at least ten standard deviations of its noise, the posterior
+    moves by less than a tenth of a standard deviation between this prior and "polar", which is uniform in distance from
+    the pivot, direction and slope. The choice matters near first contact: contacts with loads near zero lie within a
+    thin shell at the end of the rod's reach, a flat prior gives that shell little mass, and the posterior of a weak
+    contact shifts to larger loads, that is inwards. Give your own density there if you know more.
 
-    tangential_probability is what the sample says under that prior, sample by sample. It is no frequency along a sweep:
-    where a rod dwells in tip contact, as it does along parabolas, most of the samples that leave the phase open are in
-    tip contact, whatever their probabilities. The regions of contact points hold all the same.
+    tangential_probability is the posterior probability of each sample under that prior, not a frequency along a sweep:
+    if a rod dwells in tip contact, as it does along parabolas, most of the samples that leave the phase open are in
+    tip contact, whatever their probabilities. The regions of contact points hold nevertheless.
 
     The densities are those of coordinates on the two branches (force and direction of the tip; force and arc length)
-    times the volume in (contact_x, contact_y, slope_angle) that they span. With an exact drive angle the posterior is
-    one on a surface, to which the flat prior is carried as the limit of small encoder errors.
+    times the volume in (contact_x, contact_y, slope_angle) that they span. If the drive angle is exact, the posterior
+    is a density on a surface, with the flat prior as the limit of small encoder errors.
 
     Examples
     --------
@@ -175,7 +176,7 @@ def infer_contacts(
 
 
 def _chance_of_misfit(measured: xr.Dataset, cell: LoadCell, friction: float) -> float:
-    """How probable noise makes the misfit of all samples, as `reconstruct` says; NaN where it cannot."""
+    """Return the probability of the misfit of all samples under noise, from `reconstruct`; NaN without variances."""
     if cell.degrees_of_freedom <= 2.0:
         return float("nan")
     return float(
@@ -196,7 +197,7 @@ def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -
 def _density(
     measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactPrior
 ) -> tuple[ContactDensity, NDArray[np.intp]]:
-    """The density of the loaded samples, and which they are."""
+    """Return the density of the loaded samples, and their numbers."""
     samples = samples_of(measured, cell)
     if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
         about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))

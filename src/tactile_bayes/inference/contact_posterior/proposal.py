@@ -1,4 +1,4 @@
-"""What contacts are proposed to importance sampling: for each sample and phase, normal densities cut at the edge."""
+"""Proposals for importance sampling of contacts: for each sample and phase, normal densities truncated at the edge."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _WIDTHS = np.array([1.15, 3.0])
 _SHARES = np.array([0.75, 0.25])
 
 _FARTHEST = 30.0
-"""Standard deviations beyond the edge at which a mean is kept, so that probabilities remain numbers."""
+"""Largest distance of a mean beyond the edge, in standard deviations, so that probabilities stay positive."""
 
 
 class Proposed(NamedTuple):
-    """Points (way, force[, drive angle]) with the logarithm of the density that they were drawn from."""
+    """Points (way, force[, drive angle]) with the logarithm of their proposal density."""
 
     points: Floats
     """Shape (draws, n, 2 or 3)."""
@@ -31,17 +31,18 @@ class Proposed(NamedTuple):
 
 
 class ContactProposal:
-    """A mixture for each of n samples.
+    """A mixture distribution for each of n samples.
 
     Parameters
     ----------
     mean : ndarray, shape (2, n, k)
-        Of way, force and, if k is 3, drive angle, in tip (first) and tangential contact.
+        Mean of way, force and, if k is 3, drive angle, in tip (first) and tangential contact.
     covariance : ndarray, shape (2, n, k, k)
+        Covariance of the same.
     share : ndarray, shape (n,)
-        Of tip contact; 0 or 1 where the other phase has no approximation.
+        Share of tip contact; 0 or 1 if the other phase has no approximation.
     longest : float
-        Greatest way in tip contact; in tangential contact it is above −1.
+        Largest way in tip contact [rad]; in tangential contact the way is above −1.
     """
 
     def __init__(self, mean: Floats, covariance: Floats, share: Floats, longest: float) -> None:
@@ -54,9 +55,9 @@ class ContactProposal:
         self._mean[..., 0] = np.clip(mean[..., 0], self._low - _FARTHEST * spread, self._high + _FARTHEST * spread)
 
     def draw(self, count: int, rng: np.random.Generator) -> Proposed:
-        """`count` independent points for every sample; both phases have their share of them."""
+        """Draw `count` independent points for every sample, with both phases in their shares."""
         size, k = self._share.size, self._mean.shape[-1]
-        # Stratified: the shares come out to one draw.
+        # The draws are stratified: shares are exact to one draw.
         order = (np.arange(count)[:, None] + rng.random((count, size))) / count
         phase = (order >= self._share).astype(np.intp)
         wide = (rng.random((count, size)) >= _SHARES[0]).astype(np.intp)
@@ -101,7 +102,7 @@ class ContactProposal:
 
 
 def _between(low: Floats, high: Floats, uniform: Floats) -> Floats:
-    """Standard normal numbers between two bounds; in the tail that keeps its digits."""
+    """Return standard normal numbers between two bounds, computed in the tail that keeps its digits."""
     flip = low > 0.0
     a, b = np.where(flip, -high, low), np.where(flip, -low, high)
     below, above = ndtr(a), ndtr(b)
@@ -112,7 +113,7 @@ def _between(low: Floats, high: Floats, uniform: Floats) -> Floats:
 
 
 def _log_mass(low: Floats, high: Floats) -> Floats:
-    """Logarithm of the normal probability between two bounds."""
+    """Return the logarithm of the normal probability between two bounds."""
     flip = low > 0.0
     a, b = np.where(flip, -high, low), np.where(flip, -low, high)
     top = log_ndtr(b)

@@ -1,4 +1,4 @@
-"""Consecutive steps of all ensembles, and the number of steps after which the run is judged."""
+"""Consecutive steps of all ensembles, and the numbers of steps at which a run is diagnosed."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ __all__ = ["Block", "WalkingEnsembles", "next_look"]
 
 
 _GROWTH = 1.25
-"""Steps at one diagnosis over steps at the one before: all diagnoses together then cost five times the last."""
+"""Ratio of the steps at two successive diagnoses: all diagnoses together then cost five times the last."""
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Consecutive steps of all ensembles, and the random numbers by which they go on."""
+    """Consecutive steps of all ensembles, and the random states with which they continue."""
 
     samples: Floats
-    """(chain, step, walker, parameter)."""
+    """Shape (chain, step, walker, parameter)."""
     log_probability: Floats
-    """(chain, step, walker)."""
+    """Shape (chain, step, walker)."""
     random_states: tuple[RandomState, ...]
-    """Of each ensemble after the last step; with that step's samples, all that the next step depends on."""
+    """Random state of each ensemble after the last step; with that step's samples it determines the next step."""
     whole: bool = True
-    """Whether no interrupt came, after which the ensembles do not go on."""
+    """False if an interrupt ended the block; the ensembles then do not continue."""
 
     @property
     def steps(self) -> int:
@@ -42,19 +42,19 @@ class Block:
 
 
 class WalkingEnsembles:
-    """All ensembles, in step."""
+    """All ensembles, sampled in step."""
 
     def __init__(
         self, target: LogProbability, moves: Moves, points: Floats, values: Floats, randoms: Sequence[RandomState]
     ) -> None:
-        """`points`: (chain, walker, parameter), where they go on; `values`: (chain, walker), the target there."""
+        """Start from points, shape (chain, walker, parameter), with target values, shape (chain, walker)."""
         self._shape = chains, walkers, parameters = points.shape
         self._moves = Abreast([moves() for _ in randoms], [random.numbers() for random in randoms])
         sampler: Any = emcee.EnsembleSampler(
             chains * walkers, parameters, target, moves=[(self._moves, 1.0)], vectorize=True
         )
         sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
-        # Starting points are checked before; those of a run that goes on are where it was, whatever emcee thinks.
+        # Starting points are checked before; those of a resumed run are kept, even if emcee would refuse them.
         self._states = sampler.sample(
             emcee.State(points.reshape(-1, parameters), log_prob=values.ravel(), copy=True),
             iterations=None,
@@ -63,8 +63,9 @@ class WalkingEnsembles:
         )
 
     def make_block(self, steps: int, deadline: float = math.inf) -> Block:
-        """Make steps; at least one, but fewer than asked for once the clock passes the deadline, or if an interrupt
-        comes, after which there are no more.
+        """Make steps: at least one, but fewer than asked for after the deadline [s, monotonic clock] or an interrupt.
+
+        After an interrupt the ensembles make no further steps.
         """
         chains, walkers, parameters = self._shape
         samples, values = np.empty((chains, steps, walkers, parameters)), np.empty((chains, steps, walkers))
@@ -82,7 +83,7 @@ class WalkingEnsembles:
 
 
 def next_look(steps: int, block_steps: int) -> int:
-    """The number of steps at which a run that has made `steps` is judged next, however it came there."""
+    """Return the number of steps at which a run that has made `steps` is diagnosed next."""
     look = block_steps
     while look <= steps:
         look += max(block_steps, math.ceil((_GROWTH - 1.0) * look))

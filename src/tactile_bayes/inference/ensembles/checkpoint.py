@@ -1,4 +1,4 @@
-"""A run on disk, a file a block, from which it goes on after having been killed at any moment."""
+"""The checkpoint of a run, a file a block, from which it resumes after it was killed at any moment."""
 
 from __future__ import annotations
 
@@ -36,28 +36,28 @@ _BLOCK = re.compile(r"block-(\d{8,})-(\d{8,})\.npz")
 class Checkpoint:
     """The blocks of one run in a folder.
 
-    Each file is written whole and holds all that the next step depends on, so that the last of them is where the run
-    stands. No block is ever written twice.
+    Each file is written whole and holds all that the next step depends on, so that the last file is the state of the
+    run. No block is written twice.
     """
 
     def __init__(self, folder: Path, identity: Mapping[str, str], shape: tuple[int, int, int]) -> None:
-        """`shape`: (chains, walkers, parameters)."""
+        """Open the folder for a run of this identity and shape, (chains, walkers, parameters)."""
         self._folder = folder
         self._identity = dict(identity)
         self._shape = shape
         self.judged = 0
-        """Steps after which the run was last ended and judged, be it by time or between two looks; 0 if never."""
+        """Steps after which the run last ended and was diagnosed, also by time between two diagnoses; 0 if never."""
         self._ends = self._found()
         self.seconds = 0.0
-        """Time that the steps up to the last block that was read or written took [s]."""
+        """Sampling time up to the last block that was read or written [s]."""
 
     @property
     def steps(self) -> int:
-        """Steps of each ensemble that are there."""
+        """Number of stored steps of each ensemble."""
         return self._ends[-1] if self._ends else 0
 
     def read(self, since: int) -> Iterator[Block]:
-        """The steps from `since` on, block by block."""
+        """Yield the steps from `since` on, block by block."""
         for begin, end in pairwise([0, *self._ends]):
             if end > since:
                 block, dropped = self._read(begin, end), max(0, since - begin)
@@ -66,7 +66,7 @@ class Checkpoint:
                 )
 
     def write(self, block: Block, seconds: float) -> None:
-        """Append a block, made after `seconds` [s] of the whole run."""
+        """Append a block that was finished after `seconds` [s] of the whole run."""
         if not self._ends:
             self._describe()
         end = self.steps + block.steps
@@ -89,7 +89,7 @@ class Checkpoint:
         self.seconds = seconds
 
     def note_end(self) -> None:
-        """Note that the run was judged after the last block and ended there."""
+        """Note that the run was diagnosed after the last block and ended there."""
         if self.judged != self.steps:
             self.judged = self.steps
             self._describe()
@@ -101,7 +101,7 @@ class Checkpoint:
             temporary.write_text(text + "\n", encoding="utf-8")
 
     def _found(self) -> list[int]:
-        """Ends of the blocks that are there, in steps; they have to be this run's and without gaps."""
+        """Return the ends of the stored blocks, in steps; refuse blocks of another run, or with gaps."""
         files = sorted(path.name for path in self._folder.iterdir() if not is_temporary(path))
         if _DESCRIPTION in files:
             self.judged = self._description()
@@ -122,7 +122,7 @@ class Checkpoint:
         return ends
 
     def _description(self) -> int:
-        """Steps after which the run was last judged, if the description is of this run."""
+        """Return the steps after which the run was last diagnosed; refuse the description of another run."""
         path = self._folder / _DESCRIPTION
         try:
             table = json.loads(path.read_text(encoding="utf-8"))
@@ -181,7 +181,13 @@ def _name(begin: int, end: int) -> str:
 def open_checkpoint(
     path: str | os.PathLike[str], identity: Mapping[str, str], shape: tuple[int, int, int]
 ) -> Iterator[Checkpoint]:
-    """The checkpoint in a folder, made if it is not there, for this run alone."""
+    """Open the checkpoint in a folder, created if missing, and lock it for this run.
+
+    Raises
+    ------
+    InferenceError
+        If the path is a file, or the folder is in use, damaged, of another run, or holds other files.
+    """
     folder = Path(path).resolve()
     if folder.exists() and not folder.is_dir():
         raise InferenceError(f"{folder} is a file: give a folder as checkpoint")

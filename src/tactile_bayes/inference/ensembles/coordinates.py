@@ -1,4 +1,4 @@
-"""Other coordinates than the parameters, for walkers to walk in."""
+"""Coordinates in which parameters are sampled."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ __all__ = ["Coordinates", "Logarithms", "Plain", "Proposing", "in_coordinates"]
 
 
 class Coordinates(Protocol):
-    """As many as there are parameters, each of which they determine."""
+    """A change of variables between coordinates and as many parameters."""
 
     @property
     def digest(self) -> str:
-        """What tells them from others."""
+        """Identity of the coordinates, as text."""
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
-        """Parameters, (n, parameters), and the logarithm of by how much a volume grows on the way to them, (n,)."""
+        """Return parameters, (n, parameters), and the log of the Jacobian determinant of the map to them, (n,)."""
 
     def of(self, points: Floats) -> Floats:
-        """Coordinates of parameters, (n, parameters)."""
+        """Return the coordinates of parameters, (n, parameters)."""
 
     def moves(self) -> list[tuple[Any, float]]:
-        """Moves of one ensemble and their shares, new ones at each call."""
+        """Return the moves of one ensemble with their shares, new ones at each call."""
 
 
 class Proposing(Coordinates, Protocol):
@@ -58,13 +58,13 @@ class Plain:
 
 
 class Logarithms(Plain):
-    """The logarithms of some parameters, which are positive, and the others themselves.
+    """The logarithms of some positive parameters, and the other parameters themselves.
 
-    Where a record tells a ratio of powers of two sizes, and hardly the sizes, their logarithms lie along a line.
+    If a record determines a ratio of powers of two sizes, but hardly the sizes, their logarithms lie along a line.
     """
 
     def __init__(self, positive: NDArray[np.bool_], proposal: Mixture | None = None) -> None:
-        """What is known to come near the posterior, of the coordinates, may be proposed to walkers."""
+        """Take logarithms where `positive` is True; `proposal`, in the coordinates, approximates the target."""
         self.positive = positive
         self.proposal = proposal
         self.digest = f"logarithms of parameters {', '.join(map(str, np.flatnonzero(positive)))}"
@@ -76,12 +76,12 @@ class Logarithms(Plain):
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
         points = coordinates.copy()
-        with np.errstate(over="ignore"):  # what is beyond all numbers is impossible
+        with np.errstate(over="ignore"):  # infinite parameters are impossible
             points[:, self.positive] = np.exp(coordinates[:, self.positive])
         return points, np.sum(coordinates[:, self.positive], axis=1)
 
     def of(self, points: Floats) -> Floats:
-        """Coordinates of points, shape (..., parameters)."""
+        """Return the coordinates of points, shape (..., parameters)."""
         coordinates = points.copy()
         coordinates[..., self.positive] = np.log(points[..., self.positive])
         return coordinates
@@ -91,7 +91,7 @@ class Logarithms(Plain):
 
 
 def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) -> LogProbability:
-    """The density of the coordinates, from that of the parameters."""
+    """Return the log-density of the coordinates, from that of the parameters."""
 
     def of_coordinates(points: Floats) -> Floats:
         parameters, growth = coordinates.parameters(points)

@@ -1,4 +1,4 @@
-"""What the draws of a run say about themselves: R̂ across ensembles, effective sample sizes, autocorrelation."""
+"""Convergence diagnostics of a run: R̂ across ensembles, effective sample sizes, autocorrelation, lost walkers."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ __all__ = ["Diagnosis", "autocorrelation_time", "lost_walkers", "walker_major"]
 
 
 _TAIL = (0.05, 0.95)
-"""Quantiles whose effective sample size is the tail's."""
+"""Quantiles that define the effective sample size of the tails."""
 
 
 _LOST = 10.0
-"""Log-probability that a walker's best draw lies below the median of all when it has not found to the others."""
+"""Distance of a lost walker's best log-probability below the median of all."""
 
 
 def lost_walkers(values: Floats) -> int:
-    """Number of walkers that are nowhere near as probable as the rest, from log-probabilities (chain, step, walker).
+    """Count walkers far less probable than the rest, from log-probabilities of shape (chain, step, walker).
 
-    R̂ and effective sample size do not see one of them among a hundred, and the tails of the result would be theirs.
-    Draws of one posterior differ by that much less than once in thousands, a walker's best of many practically never.
+    R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails of the
+    result. Draws of one posterior differ by that much less than once in thousands, a walker's best of many practically
+    never.
     """
     if not values.shape[1]:
         return 0
@@ -33,14 +34,14 @@ def lost_walkers(values: Floats) -> int:
 
 
 _WINDOW = 5.0
-"""Autocorrelation times up to which correlations are summed."""
+"""Window of the sum of autocorrelations, in autocorrelation times, as in emcee."""
 
 
 class Diagnosis:
-    """What the second half of a run says about itself."""
+    """Convergence diagnostics of the second half of a run."""
 
     def __init__(self, samples: Floats) -> None:
-        """`samples`: (chain, step, walker, parameter)."""
+        """Diagnose samples, shape (chain, step, walker, parameter)."""
         half = samples.shape[1] // 2
         halves = np.concatenate([samples[:, :half], samples[:, half : 2 * half]])
         self.r_hat = _each(array_stats.rhat, walker_major(halves), method="rank")
@@ -63,7 +64,7 @@ class Diagnosis:
     def satisfies(self, max_r_hat: float, min_ess: float) -> bool:
         return bool(np.all(self.r_hat < max_r_hat) and np.all(self.ess >= min_ess))
 
-    def in_words(self, names: Sequence[str]) -> str:
+    def message(self, names: Sequence[str]) -> str:
         i, j = self.worst_r_hat, self.worst_ess
         return (
             f"largest R̂ {self.r_hat[i]:.4f} ({names[i]}), smallest effective sample size {self.ess[j]:.0f} ({names[j]})"
@@ -71,7 +72,7 @@ class Diagnosis:
 
 
 def _each(statistic: Callable[..., Floats], draws: Floats, **options: object) -> Floats:
-    """A statistic of ArviZ per parameter of (chain, draw, parameter); NaN where there are too few draws for it."""
+    """Return a statistic of ArviZ for each parameter of (chain, draw, parameter); NaN with too few draws."""
     if draws.shape[1] < 8:
         return np.full(draws.shape[-1], np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -79,15 +80,15 @@ def _each(statistic: Callable[..., Floats], draws: Floats, **options: object) ->
 
 
 def walker_major(samples: Floats) -> Floats:
-    """(chain, step, walker, …) → (chain, walker · step, …)."""
+    """Lay out samples (chain, step, walker, …) as (chain, walker · step, …)."""
     swapped = np.swapaxes(samples, 1, 2)
     return np.ascontiguousarray(swapped).reshape(swapped.shape[0], -1, *swapped.shape[3:])
 
 
 def autocorrelation_time(samples: Floats) -> Floats:
-    """emcee's τ [steps] of (chain, step, walker, parameter), averaged over chains.
+    """Return emcee's τ [steps] of samples (chain, step, walker, parameter), averaged over chains.
 
-    Of all walkers at once: `emcee.autocorr.integrated_time` takes them one by one, which is as slow as a short run.
+    All walkers are computed at once: `emcee.autocorr.integrated_time` takes them one by one, as slow as a short run.
     """
     chains, steps, _, parameters = samples.shape
     if steps < 2:

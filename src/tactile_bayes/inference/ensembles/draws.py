@@ -1,4 +1,4 @@
-"""Draws from a posterior, and how far to trust them."""
+"""Draws from a posterior, with their convergence diagnostics."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles.places import Place
+from tactile_bayes.inference.ensembles.modes import Mode
 
 __all__ = ["Draws"]
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Draws from a posterior, and how far to trust them."""
+    """Draws from a posterior, with their convergence diagnostics."""
 
     samples: Floats
-    """(chain, draw, parameter): a chain is an ensemble, its draws lie walker-major."""
+    """Shape (chain, draw, parameter): a chain is an ensemble, with its draws walker-major."""
     log_probability: Floats
-    """(chain, draw)."""
+    """Shape (chain, draw)."""
     names: tuple[str, ...]
     walkers: int
     steps_kept: int
-    """Steps of each walker that are in `samples`: of the second half of those it made, every `every`-th."""
+    """Number of steps of each walker in `samples`: every `every`-th of the second half of its steps."""
     steps_run: int
     r_hat: Floats
-    """Rank-normalised R̂ per parameter across ensembles, each cut in early and late steps: a common drift shows too."""
+    """Rank-normalised R̂ of each parameter across ensembles, each split in early and late steps to detect drift."""
     ess_bulk: Floats
     """Effective sample size of the bulk, per parameter."""
     ess_tail: Floats
@@ -37,34 +37,34 @@ class Draws:
     autocorrelation_time: Floats
     """emcee's integrated autocorrelation time [steps] per parameter, mean over ensembles.
 
-    Infinite where a walker is stuck. emcee takes each walker's own mean off, so over few autocorrelation times it
-    comes out too small.
+    It is infinite if a walker is stuck. emcee subtracts each walker's own mean, so that the estimate is too small over
+    few autocorrelation times.
     """
     evaluations: int
-    """Points at which the log-probability was computed; with a checkpoint, those of earlier calls counted in."""
+    """Number of points at which the log-probability was computed, including earlier calls with a checkpoint."""
     seconds: float
-    """Time that it took [s]; with a checkpoint, that of the steps made in earlier calls counted in."""
+    """Sampling time [s], including the steps of earlier calls with a checkpoint."""
     converged: bool
     message: str
-    """In words, how the run ended."""
+    """Message on the end of the run."""
     stuck: int
     """Number of walkers that did not move in all the steps kept."""
-    places: tuple[Place, ...] = ()
-    """Where ensembles sit if each has come to rest but not all in one place; else empty."""
+    modes: tuple[Mode, ...] = ()
+    """Modes of the ensembles, if each ensemble is at rest but they disagree; else empty."""
     every: int = 1
-    """1, or a power of two where the second half of the steps is more than memory should hold."""
+    """Thinning: 1, or a power of two if the second half of the steps would take too much memory."""
 
     def refuse_interrupted(self, what: str) -> None:
-        """Pass an interrupt on that ended the run: for what cannot use a part of it."""
+        """Raise the interrupt that ended the run, for callers that cannot use a part of it."""
         if "interrupted" in self.message:
-            raise KeyboardInterrupt(f"interrupted while sampling {what}: nothing comes of it")
+            raise KeyboardInterrupt(f"interrupted while sampling {what}: there is no result")
 
     def evenly(self, most: int) -> NDArray[np.intp]:
-        """Places of draws of each chain, at most so many, evenly spread."""
+        """Return the indices of at most so many draws of each chain, evenly spread."""
         count = self.samples.shape[1]
         return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 
     def by_walker(self) -> Floats:
-        """The samples as (chain, walker, step, parameter)."""
+        """Return the samples as (chain, walker, step, parameter)."""
         chains, _, parameters = self.samples.shape
         return self.samples.reshape(chains, self.walkers, self.steps_kept, parameters)

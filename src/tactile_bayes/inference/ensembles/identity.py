@@ -1,4 +1,4 @@
-"""What a run is about, as names and strings, so that one run does not go on with the steps of another."""
+"""The identity of a run, as names and strings, so that no run resumes with the steps of another."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ __all__ = ["changes", "identity_of_run"]
 
 
 _START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
-"""They follow from the rest, if that is all told."""
+"""Entries that follow from the others, if those are complete."""
 
 _LONGEST = 60
-"""Characters of an entry that a refusal shows."""
+"""Largest number of characters of an entry in an error message."""
 
 
 def identity_of_run(
@@ -32,12 +32,12 @@ def identity_of_run(
     settings: SamplerSettings,
     coordinates: Coordinates,
 ) -> dict[str, str]:
-    """What the draws follow from: what the caller says of the log-probability, and the rest.
+    """Return all that determines the draws: the caller's identity of the log-probability, and the sampler's entries.
 
     Raises
     ------
     ParameterError
-        If the caller says something else than strings, or under a name that the rest has.
+        If the caller's identity holds anything but strings, or a name of the sampler.
     """
     chains, walkers, _ = start.shape
     entries = {} if identity is None else dict(identity)
@@ -66,7 +66,7 @@ def _seed_in_words(seed: Seed) -> str:
 
 
 def changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """What differs, an entry a string: which, from what, to what."""
+    """Return the entries that differ, each as text with its old and new value."""
     found = []
     differing = [name for name in {**now, **before} if before.get(name) != now.get(name)]
     for name in [name for name in differing if name not in _CONSEQUENCES] or differing:
@@ -82,7 +82,7 @@ def _first_difference(one: str, other: str) -> int:
 
 
 def _shown(text: str | None, at: int) -> str:
-    """An entry, shortened to what surrounds a place in it."""
+    """Return an entry, shortened to the surroundings of a position."""
     if text is None:
         return "not stated"
     if len(text) <= _LONGEST:

@@ -1,4 +1,4 @@
-"""The steps of a run that are kept: its second half, thinned where that is more than memory should hold."""
+"""The steps of a run that are kept: its second half, thinned if it would take too much memory."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ __all__ = ["KeptSteps"]
 
 
 _MOST = 4_000_000
-"""Numbers of all ensembles, above which only every second step is kept, and so on: 32 MB, and 6 s for a diagnosis."""
+"""Largest count of numbers kept of all ensembles, beyond which steps are thinned: 32 MB, and 6 s for a diagnosis."""
 
 
 class _Part(NamedTuple):
-    """Consecutive steps."""
+    """Consecutive steps, of which some are kept."""
 
     first: int
-    """The number of the first one, counted from 1."""
+    """Number of the first step, counted from 1."""
     numbers: NDArray[np.intp]
-    """Of those whose samples are kept."""
+    """Numbers of the steps whose samples are kept."""
     samples: Floats
-    """(chain, step, walker, parameter), of those kept."""
+    """Samples of the steps kept, shape (chain, step, walker, parameter)."""
     values: Floats
-    """Their log-probability."""
+    """Their log-probability, shape (chain, step, walker)."""
     moved: NDArray[np.bool_]
-    """(chain, step, walker): whether a walker moved in a step, of all steps."""
+    """True if a walker moved in a step, for all steps, shape (chain, step, walker)."""
 
     def since(self, steps: int, every: int) -> _Part:
-        """What comes after so many steps of the run, of it every so manieth step."""
+        """Return the part after so many steps of the run, with every `every`-th step."""
         first = max(self.first, steps + 1)
         kept = (self.numbers >= first) & (self.numbers % every == 0)
         return _Part(
@@ -46,19 +46,21 @@ class _Part(NamedTuple):
 
 
 class KeptSteps:
-    """The second half of the steps that were made, every `every`-th of them, as parameters.
+    """The second half of the steps made, every `every`-th of them, as parameters.
 
-    `every` is a power of two that follows from the number of steps and the shape alone, so that a run that goes on from
-    a checkpoint keeps the same as one that was never stopped.
+    `every` is a power of two that follows from the number of steps and the shape alone, so that a run that resumes from
+    a checkpoint keeps the same steps as an uninterrupted one.
 
     Parameters
     ----------
     coordinates : Coordinates
-        In which walkers walk.
+        Coordinates in which the parameters are sampled.
     last : ndarray, shape (chain, walker, parameter)
         The coordinates before the first step that is appended.
     steps : int
-        Steps that were made before it, of which `made` have been made in all when they are judged next.
+        Number of steps before the first step that is appended.
+    made : int
+        Number of steps at the next diagnosis, if known.
     """
 
     def __init__(self, coordinates: Coordinates, last: Floats, steps: int = 0, made: int = 0) -> None:
@@ -67,7 +69,7 @@ class KeptSteps:
         self._parts: list[_Part] = []
 
     def append(self, block: Block) -> None:
-        """Keep what a block adds; all of it, or, if an interrupt comes, nothing."""
+        """Append a block; if an interrupt comes, nothing is appended."""
         if not block.steps:
             return
         numbers = self._steps + 1 + np.arange(block.steps)
@@ -85,7 +87,7 @@ class KeptSteps:
         self._parts, self._last, self._steps = [*self._parts, part], block.samples[:, -1], self._steps + block.steps
 
     def second_half(self) -> tuple[Floats, Floats]:
-        """Samples, (chain, step, walker, parameter), and their log-probability; what came before is dropped."""
+        """Return samples, (chain, step, walker, parameter), and log-probability; earlier steps are dropped."""
         self.every = self._thinning(self._steps)
         parts = [part.since(self._steps // 2, self.every) for part in self._parts]
         joined = (np.concatenate(columns, axis=1) for columns in zip(*(part[2:] for part in parts), strict=True))
@@ -95,9 +97,7 @@ class KeptSteps:
 
     @property
     def moved(self) -> NDArray[np.bool_]:
-        """(chain, step, walker): whether a walker moved in the steps that `second_half` began with, but for the first,
-        whether they are kept or not.
-        """
+        """True if a walker moved in a step of the second half except its first, kept or not; (chain, step, walker)."""
         return self._parts[0].moved[:, 1:]
 
     def _thinning(self, steps: int) -> int:

@@ -15,34 +15,35 @@ from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 __all__ = ["Abreast", "FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
 
 Moves = Callable[[], list[tuple[Any, float]]]
-"""Makes the moves of one ensemble, with their shares."""
+"""Function that makes the moves of one ensemble, with their shares."""
 
 _LEAST_NEW = 0.2
-"""Share that is new in the shortest step of `NormalMove`."""
+"""Smallest share of the new normal draw in a step of `NormalMove`."""
 
 _SMALL = 0.25
-"""Of the usual scale of differences, where what is likely lies along bent ridges or between walls."""
+"""Scale of short differences over the usual one, for targets along bent ridges or between bounds."""
 
 _MOST_FIXED, _EFFICIENT = 0.8, 0.5
-"""Share of proposals from a distribution of that efficiency or a better one."""
+"""Largest share of proposals from a fixed distribution, and the efficiency from which it is used."""
 
 
 class Abreast(emcee.moves.Move):
-    """Moves of several ensembles, whose walkers come one ensemble after the other.
+    """Moves of several ensembles, whose walkers follow one ensemble after the other.
 
-    Each moves by halves, as emcee's moves do (Foreman-Mackey et al. 2013, doi 10.1086/670067), with moves and random
-    numbers of its own, and so as if it were alone; but the target, which likes many points, is asked for all at once.
+    Each ensemble moves by halves, as emcee's moves do (Foreman-Mackey et al. 2013, doi 10.1086/670067), with moves and
+    random numbers of its own, as if it were alone; but the target, efficient for many points, is evaluated for all at
+    once.
     """
 
     def __init__(self, moves: Sequence[Sequence[tuple[Any, float]]], randoms: Sequence[np.random.RandomState]) -> None:
-        """`moves`: of each ensemble, with their shares."""
+        """Combine the moves of each ensemble, with their shares, and its random numbers."""
         self._moves = [[move for move, _ in each] for each in moves]
         shares = [np.array([share for _, share in each]) for each in moves]
         self._shares = [each / each.sum() for each in shares]
         self.randoms = randoms
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, NDArray[np.bool_]]:
-        """The state after a step of every ensemble, and which walkers moved."""
+        """Return the state after a step of every ensemble, and True for walkers that moved."""
         count, size = len(self.randoms), state.coords.shape[1]
         points, values = state.coords.reshape(count, -1, size), state.log_prob.reshape(count, -1)
         accepted = np.zeros(values.shape, dtype=bool)
@@ -70,9 +71,10 @@ class Abreast(emcee.moves.Move):
 
 
 class FixedMove(emcee.moves.RedBlueMove):
-    """Proposals from one and the same distribution, whatever the walkers do.
+    """Proposals from a fixed distribution, independent of the walkers (independence sampler).
 
-    The nearer it is to the target the more of them are accepted, and a walker has forgotten where it was.
+    The nearer it is to the target, the more proposals are accepted; an accepted one is independent of the walker's
+    past.
     """
 
     def __init__(self, proposal: Mixture) -> None:
@@ -82,7 +84,7 @@ class FixedMove(emcee.moves.RedBlueMove):
     def get_proposal(
         self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
-        """Places proposed to walkers, (n, parameters), and log of the density back over that of going there, (n,)."""
+        """Return proposals, (n, parameters), and the log of the backward over the forward proposal density, (n,)."""
         there, density = self._proposal.draw(random, len(sample))
         return there, self._proposal.log_density(sample) - density
 
@@ -90,23 +92,23 @@ class FixedMove(emcee.moves.RedBlueMove):
 class FittedMove(emcee.moves.RedBlueMove):
     """Proposals from Student's t distribution, fitted to the half of the ensemble that does not move meanwhile.
 
-    Where a posterior is nearly normal, a walker forgets where it was in a few steps. The proposal depends on nothing
-    that the moving half does, so that the target stays invariant however badly the fit is. Where the other half lies in
-    a plane, nothing can be fitted, and nothing moves.
+    If a posterior is nearly normal, a walker forgets its position in a few steps. The proposal does not depend on the
+    moving half, so that the target stays invariant however bad the fit is. If the other half lies in a plane, no
+    distribution can be fitted, and no walker moves.
 
-    Proposals of this kind beside those of differential evolution are from Boehl (2022), doi 10.2139/ssrn.4250395, who
-    adapts them to the whole run instead.
+    Proposals of this kind beside differential evolution are due to Boehl (2022), doi 10.2139/ssrn.4250395, who adapts
+    them to the whole run instead.
     """
 
     def __init__(self, columns: slice = slice(None)) -> None:
-        """Of the parameters in `columns`, the others staying as they are."""
+        """Move the parameters in `columns` alone."""
         super().__init__()
         self._columns = columns
 
     def get_proposal(
         self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
-        """Places proposed to walkers, (n, parameters), and log of the density back over that of going there, (n,)."""
+        """Return proposals, (n, parameters), and the log of the backward over the forward proposal density, (n,)."""
         moving, others = sample[:, self._columns], np.concatenate(complement)[:, self._columns]
         proposed = sample.copy()
         try:
@@ -118,21 +120,22 @@ class FittedMove(emcee.moves.RedBlueMove):
 
 
 class NormalMove(emcee.moves.RedBlueMove):
-    """Steps that leave a standard normal distribution invariant, of coordinates that the target makes nearly that.
+    """Steps that leave a standard normal distribution invariant, for coordinates with nearly that distribution.
 
-    A step of random length keeps a share of where the walker is and draws the rest anew (Neal 1999; Cotter, Roberts,
-    Stuart & White 2013, doi 10.1214/13-STS421); what the target adds to a standard normal one decides alone.
+    A step of random length combines a share of the walker's position with a new normal draw (Neal 1999; Cotter,
+    Roberts, Stuart & White 2013, doi 10.1214/13-STS421); the acceptance depends only on the target relative to that
+    normal.
     """
 
     def __init__(self, columns: slice) -> None:
-        """Of the parameters in `columns`, the others staying as they are."""
+        """Move the parameters in `columns` alone."""
         super().__init__()
         self._columns = columns
 
     def get_proposal(
         self, sample: Floats, complement: Sequence[Floats], random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
-        """Places proposed to walkers, (n, parameters), and log of the density back over that of going there, (n,)."""
+        """Return proposals, (n, parameters), and the log of the backward over the forward proposal density, (n,)."""
         moving = sample[:, self._columns]
         new = random.uniform(_LEAST_NEW, 1.0, len(moving))[:, None]
         there = np.sqrt(1.0 - new**2) * moving + new * random.standard_normal(moving.shape)
@@ -142,12 +145,12 @@ class NormalMove(emcee.moves.RedBlueMove):
 
 
 def standard_moves(proposal: Mixture | None = None) -> list[tuple[Any, float]]:
-    """Moves of one ensemble and their shares, new ones for each ensemble, since a move keeps its scale between calls.
+    """Return the moves of one ensemble and their shares, new ones at each call, since a move keeps its scale.
 
-    Proposals fitted to the walkers where the posterior is nearly normal; differences of two other walkers, scaled and
-    now and then unscaled, where it is not. Where there is a proposal that comes near the posterior anyway, it is used
-    most, the more efficient it is; what it misses, one fitted to walkers would miss as well, and differences of other
-    walkers, scaled far down, do not. All cut the ensemble in two halves, as `Abreast` does.
+    Proposals fitted to the walkers suit a nearly normal posterior; differences of two other walkers, scaled and now and
+    then unscaled, suit others. A given proposal near the posterior is used most, the more the more efficient it is;
+    what it misses, a proposal fitted to walkers would miss as well, but short differences of other walkers reach it.
+    All moves split the ensemble in two halves, as `Abreast` does.
     """
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
@@ -164,7 +167,7 @@ def standard_moves(proposal: Mixture | None = None) -> list[tuple[Any, float]]:
 
 
 def whitened_moves(bent: int) -> list[tuple[Any, float]]:
-    """Those of an ensemble in coordinates that are nearly standard normal and independent, but for the first ones."""
+    """Return the moves for coordinates that are nearly independent and standard normal, except the first `bent`."""
     first, rest = slice(0, bent), slice(bent, None)
     return [
         (FittedMove(first), 0.35),

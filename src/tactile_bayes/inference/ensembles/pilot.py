@@ -1,4 +1,4 @@
-"""A short run of walkers that learns in which coordinates a posterior is nearly normal, and a proposal in them."""
+"""A short pilot run that learns coordinates in which a posterior is nearly normal, and a proposal in them."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from tactile_bayes.inference.ensembles.walkers import first_random_state
 __all__ = ["learned"]
 
 _STEPS = (60, 120, 240, 480, 960)
-"""Of the stages, in each of which walkers walk in the best coordinates so far."""
+"""Number of steps of each stage, which samples in the best coordinates so far."""
 
 _KEPT = 3000
-"""Draws of a stage, at most, from each half of the walkers, to which coordinates are fitted."""
+"""Largest number of draws of a stage from each half of the walkers, to which coordinates are fitted."""
 
 _GOOD = 0.25
-"""Quality at which there is nothing more to be learned; 0.4 is that of a posterior which is normal."""
+"""Quality at which learning stops; that of a normal posterior is 0.4."""
 
 _JUDGED = 400
-"""Draws of the posterior, and of the proposal, by which it is judged."""
+"""Number of draws of the posterior, and of the proposal, by which the proposal is judged."""
 
 _LEAST = 0.02
-"""Share of proposals that is as good as taken anywhere, as there are other moves beside them."""
+"""Lower bound of the acceptance from any point, since there are other moves."""
 
 
 def learned(
@@ -43,24 +43,24 @@ def learned(
     rng: np.random.Generator,
     deadline: Deadline = NEVER,
 ) -> Proposing:
-    """Coordinates with a proposal in them, found by walkers who walk in the best so far.
+    """Return coordinates with a proposal in them, learned in stages that sample in the best coordinates so far.
 
-    A proposal that is judged by its own draws looks good if it is so narrow that they do not meet what it misses; here
-    it is judged by where walkers have been.
+    A proposal judged by its own draws looks good if it is so narrow that they miss a part of the target; here it is
+    judged by positions of the walkers.
 
     Parameters
     ----------
     log_probability : callable
-        Of parameters.
+        Log-density of parameters, (n, d) to (n,).
     base : Logarithms
-        Coordinates with a proposal, as far as one is known.
+        Coordinates, with a proposal if one is known.
     start : ndarray, shape (walkers, d)
-        Parameters where walkers begin; an even number of walkers.
+        Starting points of an even number of walkers, in parameters.
     scale : ndarray, shape (d,)
-        On which each of the base's coordinates varies a priori.
+        Prior scale of each of the base's coordinates.
     rng : np.random.Generator
     deadline : Deadline
-        Past it, the walkers make one step more, and there is no further stage.
+        After it, the walkers make one more step, and there is no further stage.
     """
     best: Proposing = base
     points = start
@@ -95,13 +95,13 @@ def learned(
 
 
 def _straightened(base: Proposing, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0) -> Straightened:
-    """Coordinates fitted to draws, a share of which are independent, and a proposal in them."""
+    """Return coordinates fitted to draws, of which a share is independent, and a proposal in them."""
     found = Straightened.fitted(base, draws, scale, share * len(draws))
     return replace(found, proposal=Mixture((replace(Proposal.fitted(found.of(draws)), efficiency=efficiency),)))
 
 
 def _quality(log_probability: LogProbability, coordinates: Proposing, draws: Floats, rng: np.random.Generator) -> float:
-    """One over the number of proposals after which a walker moves on, on average over draws of the posterior."""
+    """Return one over the mean number of proposals until one is accepted, averaged over draws of the posterior."""
     target, proposal = in_coordinates(log_probability, coordinates), coordinates.proposal
     assert proposal is not None
     proposed, density = proposal.draw(rng, _JUDGED)

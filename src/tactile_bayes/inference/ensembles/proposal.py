@@ -1,4 +1,4 @@
-"""A distribution from which places are proposed to walkers, and how near it is to that which they are to draw from."""
+"""Proposal distributions for walkers, and their efficiency for a target."""
 
 from __future__ import annotations
 
@@ -20,35 +20,34 @@ from tactile_bayes.inference.ensembles.target import LogProbability
 __all__ = ["ANYTHING", "GOOD", "Ends", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
 
 _DEGREES_OF_FREEDOM = 10.0
-"""Of the t distribution: tails heavier than a normal posterior's, at little cost where it is one."""
+"""Degrees of freedom of the t distribution: its tails are heavier than normal ones, at little cost."""
 
 _WIDENING = 1.1
-"""Scale over that of the points it is fitted to: too wide a proposal costs less than too narrow a one."""
+"""Scale over that of the fitted points: too wide a proposal costs less than too narrow a one."""
 
 _ROUNDS = 8
 _DRAWS = 60
-"""For each parameter, in each round."""
+"""Number of draws for each parameter in each round."""
 
 GOOD = 0.6
-"""Efficiency that is not worth another round."""
+"""Efficiency from which no further round is made."""
 
 _TRIES = 40
-"""How often what lies beyond the ends is drawn again."""
+"""Number of times that points beyond the ends are drawn again."""
 
 _CUTS = np.linspace(-4.0, 1.0, 101)
-"""Where a normal distribution may be cut off, in standard deviations from its mean: farther below it is not felt, and
-farther above most draws would be lost."""
+"""Truncation points of a normal distribution, in standard deviations from its mean: truncation farther below has no
+effect, and farther above most draws would be lost."""
 
 _COUNTED = 4000
-"""Draws by which it is told how much of a proposal lies between the ends."""
+"""Number of draws for the share of a proposal between the ends."""
 
 _HELD = 5
-"""Effective draws for each parameter that a covariance is fitted to, at least; weights are made more equal until they
-are as many."""
+"""Smallest number of effective draws per parameter for a covariance; weights are made more equal to reach it."""
 
 
 class Random(Protocol):
-    """NumPy's new generators and its old ones."""
+    """Common methods of NumPy's generators, new and legacy."""
 
     def standard_normal(self, size: tuple[int, int], /) -> Floats: ...
 
@@ -61,17 +60,17 @@ class Random(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Between what each coordinate of a target can be, shape (parameters,) each, or () for all."""
+    """Bounds of each coordinate of a target, shape (parameters,) each, or () for all coordinates."""
 
     low: Floats
     high: Floats
 
     def hold(self, points: Floats) -> NDArray[np.bool_]:
-        """Which of points, shape (n, parameters), lie between."""
+        """Return True for points, shape (n, parameters), within the bounds."""
         return np.asarray(((points > self.low) & (points < self.high)).all(axis=1))
 
     def drawn(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Draws between the ends: others are drawn again, but for the few that would take too often."""
+        """Return draws within the bounds: others are drawn again, except a few after too many tries."""
         points = draw(count)
         for _ in range(_TRIES):
             out = np.flatnonzero(~self.hold(points))
@@ -86,18 +85,20 @@ ANYTHING = Ends(np.array(-np.inf), np.array(np.inf))
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Student's t distribution in several dimensions, cut off where the target ends.
+    """Multivariate Student's t distribution, truncated at the bounds of the target.
 
     Parameters
     ----------
     mean : ndarray, shape (parameters,)
+        Centre.
     root : ndarray, shape (parameters, parameters)
-        Lower triangle; times its transpose the scale matrix.
+        Lower-triangular Cholesky factor of the scale matrix.
     efficiency : float
-        Effective share of independent draws, weighted by the target: 1 if it is the target's own distribution.
+        Effective share of draws when weighted by the target: 1 if it is the target's own distribution.
     log_mass : float
-        Logarithm of the target's integral over what it covers, up to a constant of the number of parameters.
+        Logarithm of the target's integral over the covered region, up to a constant of the number of parameters.
     ends : Ends
+        Bounds of the target.
     """
 
     mean: Floats
@@ -108,13 +109,14 @@ class Proposal:
 
     @classmethod
     def fitted(cls, points: Floats, weights: Floats | None = None, ends: Ends = ANYTHING) -> Proposal:
-        """To points, shape (n, parameters), with weights of sum one, whatever the units of the parameters; as if they
-        were of a normal distribution that is cut off at the ends.
+        """Fit a proposal to points, shape (n, parameters), with weights of sum one, in any units of the parameters.
+
+        The points are taken for those of a normal distribution that is truncated at the lower bounds.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            If they lie in a plane.
+            If the points lie in a plane.
         """
         weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
         mean = weights @ points
@@ -134,26 +136,26 @@ class Proposal:
 
     @property
     def digest(self) -> str:
-        """What tells it from others."""
+        """Identity of the proposal, as text."""
         return hashlib.sha256(self.mean.tobytes() + self.root.tobytes() + repr(self.efficiency).encode()).hexdigest()
 
     def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
-        """Points, shape (count, parameters), and the logarithm of their density, up to the constant of `log_density`"""
+        """Return points, shape (count, parameters), and their log-density, up to the constant of `log_density`."""
         points = self.ends.drawn(lambda count: self.anywhere(random, count), count)
         return points, self.log_density(points)
 
     def anywhere(self, random: Random, count: int) -> Floats:
-        """Points of the whole distribution, shape (count, parameters)."""
+        """Return points of the distribution without bounds, shape (count, parameters)."""
         normal = random.standard_normal((count, self.mean.size))
         steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, count) / _DEGREES_OF_FREEDOM)[:, None]
         return np.asarray(self.mean + steps @ self.root.T)
 
     def log_density(self, points: Floats) -> Floats:
-        """Of the whole distribution at points, shape (n, parameters), up to a constant of the number of parameters."""
+        """Return the log-density without bounds at points, (n, parameters), up to a constant of their number."""
         return _log_density(self.steps(points)) - self._log_volume
 
     def steps(self, points: Floats) -> Floats:
-        """Points, shape (n, parameters), as seen from the mean, in units of the scale."""
+        """Return the standardised points, shape (n, parameters): relative to the mean, in units of the scale."""
         return np.asarray((points - self.mean) @ self._inverse.T)
 
     @cached_property
@@ -183,18 +185,18 @@ class Mixture:
 
     @cached_property
     def shares(self) -> Floats:
-        """Of the parts, in proportion to the target's integral; equal where that is not known of any."""
+        """Shares of the parts, in proportion to the target's integral; equal if no integral is known."""
         masses = np.array([part.log_mass for part in self.parts])
         return normalised(masses if np.any(np.isfinite(masses)) else np.zeros(masses.size))
 
     @property
     def efficiency(self) -> float:
-        """Of the parts together, as if each kept to its own mode."""
+        """Efficiency of the mixture, as if each part covered its own mode alone."""
         each = np.array([part.efficiency for part in self.parts])
         return float(1.0 / np.sum(self.shares / each)) if np.all(each > 0.0) else 0.0
 
     def with_efficiency(self, efficiency: float) -> Mixture:
-        """The same, with what is known of its efficiency otherwise."""
+        """Return the mixture with another efficiency for all parts."""
         return Mixture(tuple(replace(part, efficiency=efficiency) for part in self.parts))
 
     @property
@@ -202,19 +204,19 @@ class Mixture:
         return hashlib.sha256("".join(part.digest for part in self.parts).encode()).hexdigest()
 
     def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
-        """As `Proposal.draw`."""
+        """Draw as `Proposal.draw` does."""
         points = self.parts[0].ends.drawn(lambda count: self.anywhere(random, count), count)
         return points, self.log_density(points)
 
     def anywhere(self, random: Random, count: int) -> Floats:
-        """As `Proposal.anywhere`."""
+        """Draw without bounds, as `Proposal.anywhere` does."""
         counts = random.multinomial(count, self.shares)
         parts = [part.anywhere(random, int(each)) for part, each in zip(self.parts, counts, strict=True)]
         return np.concatenate(parts)[random.permutation(count)]
 
     def log_density(self, points: Floats) -> Floats:
-        """As `Proposal.log_density`."""
-        with np.errstate(divide="ignore"):  # a part of no mass counts for nothing
+        """Return the log-density as `Proposal.log_density` does."""
+        with np.errstate(divide="ignore"):  # a part without mass has no share
             shares = np.log(self.shares)
         each = [share + part.log_density(points) for share, part in zip(shares, self.parts, strict=True)]
         return np.asarray(np.logaddexp.reduce(each))
@@ -228,11 +230,12 @@ def approximate(
     deadline: Deadline = NEVER,
     ends: Ends = ANYTHING,
 ) -> Proposal:
-    """The proposal nearest to a target that some rounds of importance sampling find, by a guess at mean and covariance.
+    """Approximate a target by rounds of adaptive importance sampling, from a guess at mean and covariance.
 
-    Draws of one round, weighted by the target, say what the next one draws from; of all rounds that counts which was
-    the most efficient (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
-    10.1198/106186004X12803). Past the deadline there is no further round.
+    The mean has shape (parameters,), the covariance (parameters, parameters), in the parameters' own units.
+    The proposal of a round is fitted to the draws of the round before, weighted by the target; the most efficient round
+    gives the result (Oh & Berger 1992, doi 10.1080/00949659208810407; Cappé, Guillin, Marin & Robert 2004, doi
+    10.1198/106186004X12803). After the deadline there is no further round.
     """
     proposal = Proposal(centre, _WIDENING * np.asarray(np.linalg.cholesky(covariance)), ends=ends)
     best = proposal
@@ -259,7 +262,7 @@ def approximate(
 
 
 def flattened(surplus: Floats, least: float) -> Floats:
-    """Weights from their logarithms, made more equal until their effective number is at least that."""
+    """Return weights from their logarithms, shape (n,), made more equal until `least` of them are effective."""
     power = 1.0
     while effective(weights := normalised(power * surplus)) < least:
         power *= 0.8
@@ -267,28 +270,30 @@ def flattened(surplus: Floats, least: float) -> Floats:
 
 
 def normalised(surplus: Floats) -> Floats:
-    with np.errstate(invalid="ignore"):  # −inf less the largest is −inf still
+    """Return weights of sum one from their logarithms, shape (n,)."""
+    with np.errstate(invalid="ignore"):  # −inf less the largest remains −inf
         weights = np.exp(surplus - surplus.max())
     return np.asarray(weights / weights.sum())
 
 
 def _whole(above: float, variance: float) -> tuple[float, float]:
-    """By how much the mean and the variance change, in standard deviations, where a normal distribution is not cut off
-    any more at an end that lies so far below its mean.
+    """Return the changes of mean and variance, in standard deviations, that undo the truncation of a normal
+    distribution whose bound lies `above` below its truncated mean.
     """
-    tilt = np.exp(-0.5 * _CUTS**2) / (np.sqrt(2.0 * np.pi) * ndtr(-_CUTS))
-    narrow = np.sqrt(1.0 - tilt * (tilt - _CUTS))
-    cut = np.interp(-above, -(tilt - _CUTS) / narrow, _CUTS)
+    mills = np.exp(-0.5 * _CUTS**2) / (np.sqrt(2.0 * np.pi) * ndtr(-_CUTS))
+    narrow = np.sqrt(1.0 - mills * (mills - _CUTS))
+    cut = np.interp(-above, -(mills - _CUTS) / narrow, _CUTS)
     scale = 1.0 / np.interp(cut, _CUTS, narrow)
     return float(-above - cut * scale), float(variance * (scale**2 - 1.0))
 
 
 def effective(weights: Floats) -> float:
+    """Return the effective number of weights of sum one, shape (n,)."""
     return float(1.0 / np.sum(weights**2))
 
 
 def _log_density(steps: Floats) -> Floats:
-    """Of the t distribution with mean 0 and unit scale, up to a constant."""
+    """Return the log-density of the t distribution with mean 0 and unit scale, up to a constant."""
     squares = np.sum(steps**2, axis=1)
     density: Floats = -0.5 * (_DEGREES_OF_FREEDOM + steps.shape[1]) * np.log1p(squares / _DEGREES_OF_FREEDOM)
     return density

@@ -21,7 +21,7 @@ from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelati
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.identity import identity_of_run
 from tactile_bayes.inference.ensembles.kept import KeptSteps
-from tactile_bayes.inference.ensembles.places import places_in_words, places_of
+from tactile_bayes.inference.ensembles.modes import modes_message, modes_of
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability
 from tactile_bayes.inference.ensembles.walkers import Seed, checked_start, first_random_state, spawn
@@ -30,7 +30,7 @@ __all__ = ["Progress", "sample"]
 
 
 _DRAWS_PER_WALKER = 5
-"""Effective draws that the mean walker must have given: what is discarded then outlasts five autocorrelation times."""
+"""Smallest mean number of effective draws per walker: the discarded half then exceeds five autocorrelation times."""
 
 _CONVERGED = "converged"
 
@@ -43,17 +43,17 @@ _INTERRUPTED = "not converged, interrupted"
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands after a block of steps."""
+    """State of a run at a diagnosis."""
 
     steps: int
-    """Steps that each ensemble has made."""
+    """Number of steps that each ensemble has made."""
     max_steps: int
     r_hat: float
     """Largest R̂ of all parameters."""
     ess: float
     """Smallest effective sample size of all parameters, bulk or tail."""
     seconds: float
-    """Time since the start [s], with a checkpoint that of the steps made in earlier calls counted in."""
+    """Time since the start [s], including the steps of earlier calls with a checkpoint."""
 
 
 def sample(
@@ -71,59 +71,61 @@ def sample(
     """Draw from a posterior with independent ensembles of walkers, which propose from one another.
 
     The ensembles run in step. After `block_steps` steps, and whenever their number has grown by a quarter, the second
-    half of the steps so far is judged: rank-normalised R̂ across ensembles, each cut in early and late steps, and
+    half of the steps so far is diagnosed: rank-normalised R̂ across ensembles, each split in early and late steps, and
     effective sample size in bulk and tails (Vehtari et al. 2021, doi 10.1214/20-BA1221). The run stops when every
-    parameter satisfies the settings, every walker has on average given five effective draws, and none is lost where
-    nothing is probable.
+    parameter satisfies the settings, the walkers have given five effective draws each on average, and none is lost
+    where nothing is probable.
 
     Parameters
     ----------
     log_probability : callable
-        Takes an array (n, parameters), returns (n,): log of the target density up to a constant, −inf outside its
+        Function from an array (n, parameters) to (n,): log of the target density up to a constant, −inf outside its
         support.
     start : array_like, shape (ensembles, walkers, parameters)
-        Where each walker starts, in the coordinates, every point with a finite log-probability. Start wider than the
-        posterior, or R̂ cannot tell a part of it from the whole; `scatter_walkers` helps.
+        Starting point of each walker, in the coordinates, each with a finite log-probability. Start wider than the
+        posterior, or R̂ cannot distinguish a part of it from the whole; `scatter_walkers` helps.
     names : sequence of str
         Names of the parameters, for messages.
     seed : int or numpy.random.SeedSequence
-        The same seed gives the same draws.
+        Seed of all random numbers; the same seed gives the same draws.
     settings : SamplerSettings, optional
+        Size of the ensembles and criteria for stopping.
     progress : callable, optional
-        Is given a `Progress` after each look at the diagnostics.
+        Called with a `Progress` after each diagnosis.
     checkpoint : path-like, optional
-        Folder, made if it is not there, in which every block of steps is kept (see Notes).
+        Folder, created if missing, in which every block of steps is kept (see Notes).
     identity : mapping of str to str, optional
-        What the log-probability follows from, for the checkpoint: hash of the data, model, priors and the like. What
-        `sample` itself is given is added to it.
+        All that determines the log-probability, for the checkpoint: hash of the data, model, priors and the like. The
+        arguments of `sample` are added to it.
     coordinates : Coordinates, optional
-        In which the walkers walk, if not in the parameters; these are what is judged and returned.
+        Coordinates in which the parameters are sampled; by default the parameters. Diagnoses and results are of the
+        parameters.
 
     Returns
     -------
     Draws
-        `converged` says whether the settings were satisfied. A KeyboardInterrupt ends the run, and what has been drawn
-        by then is returned, with `converged` false; before the first step it is passed on.
+        `converged` is True if the settings were satisfied. A KeyboardInterrupt ends the run, and the draws made so far
+        are returned, with `converged` False; before the first step the interrupt is raised.
 
     Raises
     ------
     ParameterError
-        If shapes do not fit or there are too few walkers.
+        If shapes do not agree or there are too few walkers.
     InferenceError
         If walkers start outside the support or in a plane, or the log-probability is NaN or +inf somewhere; if the
-        checkpoint is another run's, of another format, damaged, in use, or a folder of other things.
+        checkpoint belongs to another run, has another format, is damaged or in use, or the folder holds other files.
     OSError
         If a block cannot be written. Those before it are kept.
 
     Notes
     -----
-    A run with a checkpoint may be killed at any moment. Called again with the same arguments it goes on after the last
-    block of at most `block_steps` steps that was finished, and its draws are, bit by bit, those of a run that was not
-    killed, as long as the log-probability is. A run that has ended is not made again: its draws come from the
-    checkpoint, and the log-probability is not asked. Of the settings, `max_steps`, `max_seconds`, `min_ess` and
-    `max_r_hat` may change from call to call, so that a run which ran out of steps or time goes on with more of them.
-    Steps that are there are never dropped: with a smaller `max_steps` all of them are returned. Steps that an interrupt
-    cuts short are returned, but not kept.
+    A run with a checkpoint may be killed at any moment. Called again with the same arguments it resumes after the last
+    finished block of at most `block_steps` steps, and its draws are, bit by bit, those of an uninterrupted run, if the
+    log-probability is reproducible. A run that has ended is not made again: its draws come from the checkpoint, and the
+    log-probability is not evaluated. Of the settings, `max_steps`, `max_seconds`, `min_ess` and `max_r_hat` may change
+    from call to call, so that a run which ran out of steps or time can resume with more of them. Stored steps are never
+    dropped: with a smaller `max_steps` all of them are returned. Steps of a block that an interrupt cuts short are
+    returned, but not stored.
 
     Examples
     --------
@@ -158,7 +160,7 @@ def sample(
                 kept.append(last)
             evaluations_before, seconds_before = chains * walkers * (1 + steps), stored.seconds
             if steps in (stored.judged, next_look(steps - 1, settings.block_steps)) or steps >= settings.max_steps:
-                look = steps  # else it was killed on its way to a look
+                look = steps  # else it was killed before a diagnosis
         else:
             last = _beginning(points, walked, seed)
             kept = KeptSteps(coordinates, points)
@@ -210,12 +212,12 @@ def sample(
 
     moved = kept.moved
     stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
-    places = () if ending == _CONVERGED else places_of(samples, values, names)
-    message = f"{ending} after {steps} steps: {diagnosis.in_words(names)}"
+    modes = () if ending == _CONVERGED else modes_of(samples, values, names)
+    message = f"{ending} after {steps} steps: {diagnosis.message(names)}"
     if ending != _CONVERGED:
         message += f"; wanted are R̂ below {settings.max_r_hat:g} and an effective sample size of {enough:.0f}"
-    if places:
-        message += f"; {places_in_words(places)}"
+    if modes:
+        message += f"; {modes_message(modes)}"
     if lost:
         message += (
             f"; {lost} of {chains * walkers} walkers are lost where nothing is probable: results are not to be used"
@@ -240,12 +242,12 @@ def sample(
         converged=ending == _CONVERGED,
         message=message,
         stuck=stuck,
-        places=places,
+        modes=modes,
     )
 
 
 def _beginning(points: Floats, target: LogProbability, seed: Seed) -> Block:
-    """The starting points as if they were a step."""
+    """Return the starting points as a block of one step."""
     values = np.array([target(ensemble) for ensemble in points])
     outside = int(np.count_nonzero(np.isneginf(values)))
     if outside:

@@ -1,4 +1,4 @@
-"""How many walkers walk, and when they may stop."""
+"""Settings of the sampler: size of the ensembles, and criteria for stopping."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from tactile_bayes.errors import ParameterError
 __all__ = ["SamplerSettings", "refuse_few_walkers", "settings_of"]
 
 _MOST = 10**9
-"""Of ensembles, walkers and steps."""
+"""Largest number of ensembles, walkers and steps."""
 
 
 @dataclass(frozen=True)
 class SamplerSettings:
-    """How many walkers walk, and when they may stop.
+    """Settings of the sampler: size of the ensembles, and criteria for stopping.
 
     Parameters
     ----------
@@ -26,32 +26,31 @@ class SamplerSettings:
         Number of walkers of each ensemble, even and at least twice the number of parameters. By default the larger of
         48 and six times the number of parameters: the effective draws per evaluation hardly depend on it (Gaussian
         targets of 2 to 14 dimensions, 2 to 12 walkers per dimension), and a vectorised target and emcee itself are
-        faster with more of them, but every one of them has to forget its start.
+        faster with more of them, but each of them has to forget its start.
     block_steps : int
-        Steps before the first look at the diagnostics, and the least between later ones, which come when the number of
-        steps has grown by a quarter. Also the steps between two files of a checkpoint: what a killed run has to make
-        again.
+        Number of steps before the first diagnosis, and the smallest number between later ones, which come when the
+        steps have grown by a quarter. Also the number of steps in a file of a checkpoint, which a killed run may have
+        to make again.
     max_r_hat : float
         Every parameter's rank-normalised R̂ must be below this (1.01: Vehtari et al. 2021, doi 10.1214/20-BA1221).
     min_ess : float
         Every parameter's effective sample size, in the bulk and in the tails, must reach this, and five for every
-        walker: fewer would mean that walkers have not forgotten where they started.
+        walker: fewer would mean that walkers have not forgotten their starting points.
     max_steps : int
-        Steps after which each ensemble stops, converged or not.
+        Number of steps after which each ensemble stops, converged or not.
     max_seconds : float, optional
-        Time after which a posterior is content with what it has [s], counted from the call: the search for a start
-        ends with the step that it is in, and the ensembles with theirs, of which they make at least one. It is
-        exceeded by these steps, by a look at what is likely around the start (some 60 points for each parameter) and by
-        the last diagnosis: a few seconds in all, more for records of thousands of samples, and for the first
-        posterior after an installation, which waits for compilers. What is predicted from the draws, and files and
-        figures, come after it. A run that ends by it is not reproducible from its seed. A run that goes on from a
-        checkpoint has all of the time again; its search for a start, which must come to the same end each time, is
-        counted, but not cut short.
+        Time limit of a posterior [s], counted from the call: the search for a start ends with its present step, and so
+        do the ensembles, which make at least one step. These steps exceed the limit, and so do the approximation around
+        the start (some 60 points for each parameter) and the last diagnosis: by a few seconds in all, more for records
+        of thousands of samples, and for the first posterior after an installation, which waits for compilers.
+        Predictions from the draws, files and figures come after it. A run that ends by it is not reproducible from its
+        seed. A run that resumes from a checkpoint has the whole time again; its search for a start, which must have the
+        same result each time, is counted, but not cut short.
 
     Raises
     ------
     ParameterError
-        If a value is impossible.
+        If a value is not valid.
 
     Examples
     --------
@@ -88,7 +87,7 @@ class SamplerSettings:
             check_positive("max_seconds", self.max_seconds, "give a positive time [s], or None for no limit")
 
     def walkers_for(self, parameters: int) -> int:
-        """Number of walkers of each ensemble for a target of this many parameters."""
+        """Return the number of walkers of each ensemble for a target of this many parameters."""
         if self.walkers is None:
             return max(48, 6 * parameters)
         refuse_few_walkers(self.walkers, parameters)
@@ -96,12 +95,13 @@ class SamplerSettings:
 
 
 def settings_of(settings: SamplerSettings | None) -> SamplerSettings:
-    """Return the settings that are given, or the usual ones."""
+    """Return the given settings, or the default ones; refuse other objects."""
     check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
     return SamplerSettings() if settings is None else settings
 
 
 def refuse_few_walkers(walkers: int, parameters: int) -> None:
+    """Refuse fewer than two walkers per parameter."""
     if walkers < 2 * parameters:
         raise ParameterError(
             f"{walkers} walkers for {parameters} parameters: give at least {2 * parameters}, or the proposals of half "

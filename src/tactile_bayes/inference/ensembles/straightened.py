@@ -16,35 +16,36 @@ from tactile_bayes.inference.ensembles.proposal import Mixture
 __all__ = ["Straightened"]
 
 _FARTHEST = 1e100
-"""Coordinate of what is further off: its square is a number still."""
+"""Bound of a coordinate, whose square remains finite."""
 
 _NEAR = 0.1
-"""Share of draws, those nearest to the middle, by which directions are found."""
+"""Share of the draws, those nearest to the centre, from which principal directions are found."""
 
 _SURE = 3.0
-"""Standard errors that a bend has to be: what is uncertain would bend the coordinates anew."""
+"""Smallest significance of a bend, in standard errors: uncertain ones would distort the coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
 class Straightened:
-    """Principal directions, wide ones first, each counted from parabolas of those before it; volumes stay as they are.
+    """Principal directions, wide ones first, each relative to a quadratic form in those before it; volume-preserving.
 
-    Where loads are thousands of times their noise, a record tells most directions to a ten-thousandth, and a few hardly
-    more than the prior: stiffness, lever. Along these few the others move by second order further than they are wide,
-    and turn about one another.
+    If loads are thousands of times their noise, a record determines most directions to a ten-thousandth, and a few,
+    such as stiffness and lever, hardly better than the prior. Along these few the second-order shift of the others
+    exceeds their width.
 
     Parameters
     ----------
     base : Coordinates
-        Those that are turned and straightened.
+        Coordinates that are rotated and straightened.
     mean : ndarray, shape (d,)
+        Centre in the base's coordinates.
     root : ndarray, shape (d, d)
         Directions, a column each; one step along each is about a standard deviation.
     bends : ndarray, shape (d, d, d)
-        By how much a direction, first index, moves with the product of two before it, the wider one first; zero for
-        other products.
+        Coefficient of a direction, first index, on the product of two before it, the wider one first; zero for other
+        products.
     proposal : Mixture, optional
-        Of coordinates, that comes near the posterior.
+        Distribution of the coordinates that approximates the posterior.
     """
 
     base: Coordinates
@@ -55,22 +56,22 @@ class Straightened:
 
     @classmethod
     def fitted(cls, base: Coordinates, points: Floats, scale: Floats, count: float) -> Straightened:
-        """To draws of a posterior.
+        """Fit coordinates to draws of a posterior.
 
         Parameters
         ----------
         base : Coordinates
         points : ndarray, shape (n, d)
-            Parameters.
+            Draws, in parameters.
         scale : ndarray, shape (d,)
-            On which each of the base's coordinates varies a priori: wide is what is wide on it.
+            Prior scale of each of the base's coordinates, by which widths are compared.
         count : float
-            How many independent draws they are worth.
+            Effective number of independent draws.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            If they lie in a plane.
+            If the draws lie in a plane.
         """
         places = base.of(points)
         mean: Floats = places.mean(axis=0)
@@ -106,7 +107,7 @@ class Straightened:
         return self.base.parameters(self.mean + turned @ self.root.T)
 
     def of(self, points: Floats) -> Floats:
-        """Coordinates of points, shape (..., parameters)."""
+        """Return the coordinates of points, shape (..., parameters)."""
         straight = _solved(self.root, self.base.of(points.reshape(-1, points.shape[-1])) - self.mean)
         for k, bend in enumerate(self.bends):
             one, other = np.nonzero(bend)
@@ -126,12 +127,12 @@ def _solved(root: Floats, apart: Floats) -> Floats:
 
 
 def _principal(covariance: Floats, scale: Floats) -> Floats:
-    """Principal directions, a column each, the widest on the scale first.
+    """Return principal directions, a column each, the widest relative to the scale first.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        If one of them is no wider than rounding.
+        If one of them is no wider than rounding errors.
     """
     sizes, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
     if not sizes[0] > np.finfo(float).eps * sizes[-1]:

@@ -1,4 +1,4 @@
-"""The log-probability as ensembles ask for it: checked and counted."""
+"""The log-probability as ensembles call it: checked and counted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LogProbability = Callable[[Floats], Floats]
 
 
 class CheckedTarget:
-    """The log-probability with its answer checked and its evaluations counted."""
+    """The log-probability with its values checked and its evaluations counted."""
 
     def __init__(self, log_probability: LogProbability, names: Sequence[str]) -> None:
         self.log_probability = log_probability

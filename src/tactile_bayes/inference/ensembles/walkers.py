@@ -1,4 +1,4 @@
-"""Where walkers start, and the random numbers they walk by."""
+"""Starting points of walkers, and their random numbers."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ Seed = int | np.random.SeedSequence
 
 
 class RandomState(NamedTuple):
-    """State of NumPy's Mersenne Twister, whose random numbers emcee's moves take."""
+    """State of NumPy's Mersenne Twister, which emcee's moves use."""
 
     algorithm: str
     key: NDArray[np.uint32]
-    """(624,)."""
+    """Shape (624,)."""
     position: int
     has_gauss: int
     gauss: float
@@ -44,7 +44,7 @@ class RandomState(NamedTuple):
         return cls(*random.get_state(legacy=True))
 
     def numbers(self) -> np.random.RandomState:
-        """Random numbers that go on from here."""
+        """Return a generator that continues from this state."""
         random = np.random.RandomState()
         random.set_state(self)
         return random
@@ -55,18 +55,27 @@ def first_random_state(seed: np.random.SeedSequence) -> RandomState:
 
 
 def seed_sequence(seed: Seed) -> np.random.SeedSequence:
-    """The seed as a sequence of which nothing has been spawned."""
+    """Return the seed as a sequence that has not spawned any; refuse other objects."""
     if isinstance(seed, np.random.SeedSequence):
         return np.random.SeedSequence(seed.entropy, spawn_key=seed.spawn_key, pool_size=seed.pool_size)
     return np.random.SeedSequence(check_seed(seed, "give a whole number from 0 up, or a numpy.random.SeedSequence"))
 
 
 def spawn(seed: Seed, count: int) -> list[np.random.SeedSequence]:
-    """Independent seeds; the same for the same seed, however often it has been asked before."""
+    """Return independent seeds, the same at every call with the same seed."""
     return seed_sequence(seed).spawn(count)
 
 
 def checked_start(start: ArrayLike, names: Sequence[str], settings: SamplerSettings) -> Floats:
+    """Return starting points, shape (ensembles, walkers, parameters), and refuse unsuitable ones.
+
+    Raises
+    ------
+    ParameterError
+        If the shape does not agree with names and settings, or there are too few walkers.
+    InferenceError
+        If a number is not finite, or the walkers of an ensemble lie in a plane.
+    """
     points = np.array(start, dtype=float)
     if points.ndim != 3 or points.shape[0] != settings.ensembles or points.shape[2] != len(names):
         raise ParameterError(
@@ -99,23 +108,23 @@ def scatter_walkers(
     settings: SamplerSettings | None = None,
     max_rounds: int = 100,
 ) -> Floats:
-    """Starting points for `sample`: random points, redrawn until each has a finite log-probability.
+    """Return starting points for `sample`: random points, redrawn until each has a finite log-probability.
 
     Parameters
     ----------
     log_probability : callable
-        The target, as `sample` takes it.
+        The target, as for `sample`.
     draw : callable
-        Takes a random generator and n, returns n points (n, parameters), scattered more widely than the posterior:
+        Function from a random generator and n to n points (n, parameters), scattered more widely than the posterior:
         draws from the prior, or from a widened normal approximation.
     parameters : int
         Number of parameters.
     seed : int or numpy.random.SeedSequence
-        Each ensemble draws from its own stream.
+        Seed, from which each ensemble has its own stream.
     settings : SamplerSettings, optional
-        Says how many ensembles of how many walkers.
+        Numbers of ensembles and walkers.
     max_rounds : int
-        Points that are drawn at most for each walker, on average.
+        Largest mean number of points drawn for each walker.
 
     Returns
     -------
@@ -136,7 +145,7 @@ def scatter_walkers(
     """
     settings = SamplerSettings() if settings is None else settings
     walkers = settings.walkers_for(parameters)
-    # A step aside, so that the streams differ from those that the same seed gives to the ensembles themselves.
+    # The second half, so that the streams differ from those that the same seed gives to the ensembles themselves.
     seeds = spawn(seed, 2 * settings.ensembles)[settings.ensembles :]
     start = np.empty((settings.ensembles, walkers, parameters))
     for k, each in enumerate(seeds):

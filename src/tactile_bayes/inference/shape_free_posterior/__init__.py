@@ -1,1 +1,1 @@
-"""Contours of any shape: their prior, the family, and coordinates in which their posterior is nearly normal."""
+"""Posterior of shape-free contours: normal approximation, optimum, and coordinates in which it is nearly normal."""

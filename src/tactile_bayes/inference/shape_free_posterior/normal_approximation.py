@@ -1,4 +1,4 @@
-"""What a record says of a contour of any shape, with loads and snap-offs made linear: a normal distribution."""
+"""Normal approximation to the posterior of a shape-free contour, with linearised loads and snap-offs."""
 
 from __future__ import annotations
 
@@ -21,41 +21,41 @@ __all__ = ["LinearPrior", "NormalApproximation", "Observer", "joined", "linear_n
 _OF_ROUGHNESS = ("amplitude", "length_scale")
 
 _STEP = 1e-4
-"""Of the differences by which loads are made linear, over the scale of each coordinate."""
+"""Step of the differences by which loads are linearised, over the scale of each coordinate."""
 
-_TELLING = 0.03
-"""Change of residuals, in standard deviations for a prior's or a radius' logarithm of one, below which all is noise."""
+_MIN_CHANGE = 0.03
+"""Singular value of the linearised residuals, in standard deviations per prior scale, below which it is noise."""
 
 _SURE = 0.01
-"""Standard deviation of a snap-off, over half a step of the drive, below which nothing more is asked of it."""
+"""Smallest standard deviation of a snap-off, over half a step of the drive."""
 
 _RIDGE = 1e-12
-"""Share by which precisions are raised, so that they stay positive definite where rounding is as large as the least."""
+"""Share by which precisions are raised, so that they stay positive definite despite rounding."""
 
-_BRAVE = 4.0
-"""Residual in standard deviations from which on a reading pulls less than by its square."""
+_HUBER_THRESHOLD = 4.0
+"""Residual in standard deviations from which Huber's loss is linear."""
 
 
 class LinearPrior(NamedTuple):
-    """Means, shape (d,), and one over variances of log r, the directions' weights, the vertex and the rig."""
+    """Means and precisions, shape (d,) each, of log r, the directions' weights, the vertex and the rig."""
 
     mean: Floats
     precision: Floats
 
 
 def scale_names(model: ContourModel) -> tuple[str, ...]:
-    """Parameters in which loads are not made linear."""
+    """Return the parameters in which loads are not linearised."""
     return (*_OF_ROUGHNESS, *model.noise.names)
 
 
 def linear_names(model: ContourModel) -> tuple[str, ...]:
-    """Parameters in which loads are made linear, r by its logarithm; amplitude, length scale and noise are the rest."""
+    """Return the parameters in which loads are linearised, r by its logarithm: all but those of `scale_names`."""
     rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
     return (*rough, *model.nuisances.names)
 
 
 def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
-    """Scales (amplitude, length scale, noise), (n, scales), and what is linear, (n, d), of the model's parameters."""
+    """Return scales (amplitude, length scale, noise), (n, scales), and linear parameters, (n, d), of points."""
     values = model.values(points)
     linear = np.stack([values[name] for name in linear_names(model)], axis=1)
     linear[:, 0] = np.log(linear[:, 0])
@@ -63,12 +63,12 @@ def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
 
 
 def joined(scales: Floats, linear: Floats) -> Floats:
-    """The model's parameters, (n, parameters), from scales and what is linear."""
+    """Return the model's parameters, (n, parameters), from scales and linear parameters."""
     return np.hstack([np.exp(linear[:, :1]), scales[:, :2], linear[:, 1:], scales[:, 2:]])
 
 
 class Observer:
-    """What contours and rigs look like to the record's sensor.
+    """Residuals of contours and rigs with respect to the record.
 
     Parameters
     ----------
@@ -86,8 +86,10 @@ class Observer:
         self._width = self._within / np.sqrt(3.0)
 
     def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, NDArray[np.bool_], Floats]:
-        """Expected readings less measured ones, in `noise`; which are loaded as measured; and snap-offs less measured
-        ones, in standard deviations: shapes (n, samples, 3), (n, samples), (n, strokes that end).
+        """Return residuals of readings, over `noise`; True for samples loaded as measured; and residuals of snap-offs.
+
+        Residuals are expected less measured values, those of snap-offs in standard deviations. Shapes are
+        (n, samples, 3), (n, samples) and (n, sweep segments that end).
         """
         model, rig = self.model, self.model.nuisances.rig(values)
         loads, _ = model.likelihood.predict(contours, rig)
@@ -99,7 +101,7 @@ class Observer:
         return beyond, agree, late[:, self.ends]
 
     def insist(self, point: Floats) -> bool:
-        """Take snap-offs for better known that a point, (1, parameters), has where the record has none; any there?"""
+        """Reduce the widths of snap-offs that a point, (1, parameters), misses; return True if there are any."""
         _, _, late = self(self.model.contours(point), self.model.values(point))
         off = np.zeros(self._width.size, dtype=bool)
         off[self.ends] = np.abs(late[0]) * self._width[self.ends] > self._within[self.ends]
@@ -108,30 +110,33 @@ class Observer:
         return bool(off.any())
 
     def log_density(self, points: Floats) -> Floats:
-        """Roughly the log-likelihood, shape (n,), for a search: samples that are loaded where the record's are not cost
-        what the snap-off is off, and outliers less than by their square.
+        """Return a coarse log-likelihood, shape (n,), for a search, with Huber's loss of the readings.
+
+        Samples that are loaded unlike the record's have a constant loss, since the snap-offs account for them.
         """
         model = self.model
         residual, agree, late = self(model.contours(points), model.values(points))
         scale = model.noise_scale(points)
         cost = _huber(residual / scale[:, None])
-        cost = np.where(agree[..., None], cost, 0.5 * _BRAVE)[..., model.present].sum(axis=(1, 2))
+        cost = np.where(agree[..., None], cost, 0.5 * _HUBER_THRESHOLD)[..., model.present].sum(axis=(1, 2))
         volume = residual.shape[1] * np.log(scale[:, model.present]).sum(axis=1)
         return np.nan_to_num(-cost - volume - 0.5 * np.square(late).sum(axis=1), nan=-np.inf)
 
 
 class NormalApproximation:
-    """Given amplitude and length scale of the random radius, and the noise, a normal distribution of all the rest.
+    """Normal distribution of the linear parameters, given amplitude and length scale of the random radius, and noise.
 
-    Exact would be that for loads and snap-offs that are linear in the radii's logarithms and the rig, with normal
-    priors. What belongs to a length scale is tabulated for those of the random radius, and interpolated.
+    It is exact if loads and snap-offs are linear in the logarithms of the radii and in the rig, and priors are normal.
+    Its dependence on the length scale is tabulated at those of the random radius, and interpolated.
 
     Parameters
     ----------
     observer : Observer
+        Residuals of the record.
     prior : LinearPrior
+        Prior of the linear parameters.
     scales, linear : ndarray, shape (scales,), (d,)
-        Where loads and snap-offs are made linear.
+        Point at which loads and snap-offs are linearised.
     """
 
     def __init__(self, observer: Observer, prior: LinearPrior, scales: Floats, linear: Floats) -> None:
@@ -139,8 +144,8 @@ class NormalApproximation:
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
         known, self._count = family.radius.directions, family.radius.count
-        slopes, self._seen, self._kinds, self._readings = _linearised(observer, family, prior, scales, linear)
-        # From what is linear to what is seen, for every length scale: a spline of it belongs to that of the directions.
+        slopes, self._observed, self._kinds, self._readings = _linearised(observer, family, prior, scales, linear)
+        # The map from linear parameters to observations, at every length scale of the tabulated directions.
         nodes = known.values.shape[1]
         through = np.empty((len(known.values), linear.size, len(slopes)))
         through[:, 0] = slopes[:, :nodes].sum(axis=1)
@@ -150,13 +155,13 @@ class NormalApproximation:
 
     @property
     def arrays(self) -> tuple[Floats, ...]:
-        """All that `conditional` follows from."""
-        return self._through.c, self._seen, *self.prior
+        """Arrays that determine `conditional`."""
+        return self._through.c, self._observed, *self.prior
 
     def conditional(self, scales: Floats) -> tuple[Floats, Floats]:
-        """L⁻¹b, (n, d), and L, (n, d, d): the precision is L·Lᵀ, the mean L⁻ᵀL⁻¹b, given scales (n, scales)."""
+        """Return L⁻¹b, (n, d), and L, (n, d, d), given scales (n, scales): precision L·Lᵀ and mean L⁻ᵀL⁻¹b."""
         at = np.clip(np.log(scales[:, 1]), self._through.x[0], self._through.x[-1])
-        # One over the noise of what is seen, of which the snap-offs' is known.
+        # One over the noise of the observations; that of the snap-offs is known.
         certainty = np.hstack([1.0 / scales[:, 2:], np.ones((len(scales), 1))])[:, self._kinds]
         through = self._through(at) * certainty[:, None, :]
         through[:, 1 : 1 + self._count] *= scales[:, :1, None]
@@ -165,33 +170,35 @@ class NormalApproximation:
         precision[:, diagonal, diagonal] += self.prior.precision
         precision[:, diagonal, diagonal] *= 1.0 + _RIDGE
         root = np.linalg.cholesky(precision)
-        pull = through @ (certainty * self._seen)[..., None] + (self.prior.precision * self.prior.mean)[:, None]
+        pull = through @ (certainty * self._observed)[..., None] + (self.prior.precision * self.prior.mean)[:, None]
         return np.linalg.solve(root, pull)[..., 0], np.asarray(root)
 
     def mean(self, scales: Floats) -> Floats:
-        """Of what is linear, shape (d,), given scales of shape (scales,)."""
+        """Return the mean of the linear parameters, shape (d,), given scales of shape (scales,)."""
         pulled, root = (of_one[0] for of_one in self.conditional(scales[None]))
         return np.asarray(solve_triangular(root.T, pulled))
 
     def log_evidence(self, scales: Floats) -> float:
-        """Logarithm of the density of readings and snap-offs given scales of shape (scales,), up to a constant."""
+        """Return the log-density of readings and snap-offs given scales of shape (scales,), up to a constant."""
         pulled, root = (of_one[0] for of_one in self.conditional(scales[None]))
         certainty = np.append(1.0 / scales[2:], 1.0)[self._kinds]
         volume = np.sum(self._readings * np.log(scales[2:])) + np.log(np.diag(root)).sum()
-        return float(0.5 * (pulled @ pulled - np.sum(np.square(certainty * self._seen))) - volume)
+        return float(0.5 * (pulled @ pulled - np.sum(np.square(certainty * self._observed))) - volume)
 
 
 def _huber(residual: Floats) -> Floats:
     size = np.abs(residual)
-    return np.where(size < _BRAVE, 0.5 * size**2, _BRAVE * (size - 0.5 * _BRAVE))
+    return np.where(size < _HUBER_THRESHOLD, 0.5 * size**2, _HUBER_THRESHOLD * (size - 0.5 * _HUBER_THRESHOLD))
 
 
 def _linearised(
     observer: Observer, family: ShapeFreeFamily, prior: LinearPrior, scales: Floats, linear: Floats
 ) -> tuple[Floats, Floats, NDArray[np.intp], Floats]:
-    """What is seen, as few combinations of readings and snap-offs as tell all that can be told: their slopes over
-    radii at the nodes and all the rest, (seen, k); their values where those are zero, (seen,), with noise of the
-    scale's size; kinds of noise, the snap-offs' the last; and the number of readings of each kind but that.
+    """Return the linearised observations: as few combinations of readings and snap-offs as carry all information.
+
+    These are their slopes over radii at the nodes and the other parameters, (observations, k); their values at zero
+    parameters, (observations,), with the noise of the scales; their kinds of noise, the last being that of snap-offs;
+    and the number of readings of each other kind.
     """
     model, radius = observer.model, family.radius
     nodes, count = radius.nodes, radius.count
@@ -202,40 +209,41 @@ def _linearised(
     points = np.concatenate([centre + np.diag(steps), centre - np.diag(steps), centre[None]])
     contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
     residual, agree, late = observer(contours, dict(zip(model.nuisances.names, points[:, nodes + 2 :].T, strict=True)))
-    # A sample that only one of two has touched says nothing about how loads change.
+    # A sample that is loaded on one side of a difference only has no slope.
     smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
-    seen, counts = [], []
+    observed, counts = [], []
     for channels, scale in zip(model.noise.channels, scales[2:], strict=True):
         chosen = [CHANNELS.index(c) for c in channels if model.present[CHANNELS.index(c)]]
         of_kind = residual[:, smooth][..., chosen].reshape(len(points), -1)
-        of_kind *= np.minimum(1.0, _BRAVE * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
+        of_kind *= np.minimum(1.0, _HUBER_THRESHOLD * scale / np.maximum(np.abs(of_kind[-1]), 1e-300)) ** 0.5
         counts.append(float(of_kind.shape[1]))
-        seen.append(_condensed(of_kind, centre, units))
+        observed.append(_condensed(of_kind, centre, units))
     readings = np.array(counts)
-    seen.append(_condensed(late, centre, units))
-    kinds = np.repeat(np.arange(len(seen)), [len(values) for _, values in seen])
+    observed.append(_condensed(late, centre, units))
+    kinds = np.repeat(np.arange(len(observed)), [len(values) for _, values in observed])
     return (
-        np.concatenate([slopes for slopes, _ in seen]),
-        np.concatenate([values for _, values in seen]),
+        np.concatenate([slopes for slopes, _ in observed]),
+        np.concatenate([values for _, values in observed]),
         kinds,
         readings,
     )
 
 
 def _condensed(residual: Floats, centre: Floats, units: Floats) -> tuple[Floats, Floats]:
-    """Combinations of residuals of unit noise that tell all, from those beside a centre, which come last.
+    """Return combinations of unit-noise residuals that carry all information, by singular value decomposition.
 
-    What is not there at one of the points, like a snap-off where the rod does not reach, says nothing.
+    Residuals are those at points on either side of a centre, and last at the centre. Residuals that are not finite at
+    one of the points, like a snap-off that the rod does not reach, are left out.
     """
     size = centre.size
     finite = np.isfinite(residual).all(axis=0)
     residual = residual if finite.all() else residual[:, finite]
     slopes = (residual[:size] - residual[size:-1]).T / (2.0 * _STEP)
     axes, sizes, across = np.linalg.svd(slopes, full_matrices=False)
-    telling = sizes > _TELLING
-    combined = sizes[telling, None] * across[telling] / units
+    significant = sizes > _MIN_CHANGE
+    combined = sizes[significant, None] * across[significant] / units
     left = -residual[-1]
-    told = axes[:, telling].T @ left
-    # What no parameter explains is one more number, with slopes of zero, for the sake of the noise's size.
-    rest = np.sqrt(max(float(left @ left - told @ told), 0.0))
-    return np.vstack([combined, np.zeros(size)]), np.append(combined @ centre + told, rest)
+    explained = axes[:, significant].T @ left
+    # The norm of the unexplained residual, with slopes of zero, informs the noise scale.
+    rest = np.sqrt(max(float(left @ left - explained @ explained), 0.0))
+    return np.vstack([combined, np.zeros(size)]), np.append(combined @ centre + explained, rest)

@@ -1,4 +1,4 @@
-"""Where a contour of any shape and all else that is not known explain a record best."""
+"""The posterior mode of a shape-free contour and its rig."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 __all__ = ["whitening_at"]
 
 _ROUNDS = 20
-"""Times that the place where loads are made linear moves, at most."""
+"""Largest number of linearisations."""
 
 _GAINED = 0.5
-"""Log-density below which a round has gained nothing."""
+"""Gain in log-density below which the rounds end."""
 
 _SHORTER = np.append(0.0, 0.5 ** np.arange(8))
-"""Steps that are tried, over that to where linear loads say that the posterior is."""
+"""Step lengths that are tried, over the full Gauss-Newton step."""
 
-_BOLD = 0.7
-"""By how much the logarithm of a scale may change in a round."""
+_MAX_LOG_STEP = 0.7
+"""Largest change of the logarithm of a scale in a round."""
 
 _INSIDE = 1e-3
-"""By how much the logarithm of a scale stays off its end."""
+"""Smallest distance of the logarithm of a scale from its bounds."""
 
 _DRAWS = 4000
-"""From a prior, for its mean and standard deviation."""
+"""Number of draws from a prior for its mean and standard deviation."""
 
 
 def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, deadline: Deadline = NEVER) -> Whitening:
-    """Coordinates that belong to the posterior's centre, which is sought from a point, shape (parameters,).
+    """Return whitening coordinates at the posterior's mode, which is sought from a point, shape (parameters,).
 
-    Gauss's and Newton's steps, shortened as long as they lead down, alternate with the likeliest scales, of which
-    linear loads give the evidence in closed form. A snap-off that is not where the record has it is insisted upon.
-    Past the deadline, the best place so far is the centre.
+    Gauss-Newton steps, shortened until the density rises, alternate with the most probable scales, whose evidence has a
+    closed form for linearised loads. The widths of snap-offs that the point misses are reduced. After the deadline, the
+    best point so far is taken.
     """
     observer, prior = Observer(model), _linear_prior(model, rng)
     (scales,), (linear,) = split(model, point[None])
@@ -70,7 +70,7 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
 
 
 def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: Floats) -> Floats:
-    """Not far from those that are given."""
+    """Return the most probable scales in the vicinity of the given ones."""
     names = scale_names(model)
     columns = [model.names.index(name) for name in names]
 
@@ -81,8 +81,8 @@ def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: 
 
     here = np.log(scales)
     with np.errstate(divide="ignore"):
-        least = np.maximum(np.log(model.low[columns]) + _INSIDE, here - _BOLD)
-        most = np.minimum(np.log(model.high[columns]) - _INSIDE, here + _BOLD)
+        least = np.maximum(np.log(model.low[columns]) + _INSIDE, here - _MAX_LOG_STEP)
+        most = np.minimum(np.log(model.high[columns]) - _INSIDE, here + _MAX_LOG_STEP)
     return np.exp(
         minimize(cost, here, method="L-BFGS-B", bounds=list(zip(least.tolist(), most.tolist(), strict=True))).x
     )

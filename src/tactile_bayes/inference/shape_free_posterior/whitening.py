@@ -1,4 +1,4 @@
-"""Coordinates in which the posterior of a contour of any shape is nearly a standard normal one."""
+"""Coordinates in which the posterior of a shape-free contour is nearly standard normal."""
 
 from __future__ import annotations
 
@@ -15,25 +15,24 @@ from tactile_bayes.inference.shape_free_posterior.normal_approximation import No
 __all__ = ["Whitening"]
 
 _FAR = 4.0
-"""Logarithm of how far from where walkers start a scale may be: beyond, all is taken for impossible."""
+"""Largest distance of the logarithm of a scale from its starting value; the density is zero beyond."""
 
 _LARGEST = 50.0
-"""Logarithm of a radius that no prior comes near."""
+"""Bound of the logarithm of a radius, far beyond any prior."""
 
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """A change of variables, exact whatever it is made from: only how normal the posterior becomes depends on that.
+    """A change of variables by a normal approximation, whose quality affects efficiency, not exactness.
 
-    Given what is not linear (amplitude and length scale of the random radius, and the noise), an approximation says
-    how all the rest is distributed: normally, with a mean and covariance that are known. The rest is given by how far
-    it is from that mean, in units of that covariance: coordinates are the logarithms of what is not linear, and these
-    numbers, which the posterior makes nearly independent and standard normal.
+    Given the scales (amplitude and length scale of the random radius, and the noise), the approximation gives mean and
+    covariance of all other parameters. The coordinates are the logarithms of the scales, and the other parameters
+    standardised by that mean and covariance, which makes them nearly independent and standard normal.
     """
 
     approximation: NormalApproximation
     scales: Floats
-    """Amplitude, length scale and noise around which walkers start, shape (bent,)."""
+    """Amplitude, length scale and noise at the centre of the walkers' starting points, shape (bent,)."""
 
     @property
     def bent(self) -> int:
@@ -42,29 +41,29 @@ class Whitening:
 
     @property
     def digest(self) -> str:
-        """Of all that parameters follow from."""
+        """Hash of all that determines the change of variables."""
         arrays = (*self.approximation.arrays, self.scales)
         return hashlib.sha256(b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)).hexdigest()
 
     @property
     def middle(self) -> Floats:
-        """Where the posterior has its centre, roughly, shape (coordinates,)."""
+        """Approximate centre of the posterior, shape (coordinates,)."""
         return np.append(np.log(self.scales), np.zeros(self.approximation.prior.mean.size))
 
     @property
     def centre(self) -> Floats:
-        """The model's parameters there."""
+        """The model's parameters at that centre, shape (parameters,)."""
         return self.parameters(self.middle[None])[0][0]
 
     def parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
-        """The model's parameters, (n, parameters), and the logarithm of by how much a volume grows, (n,)."""
+        """Return the model's parameters, (n, parameters), and the log of the Jacobian determinant, (n,)."""
         points, growth = np.empty(coordinates.shape), np.empty(len(coordinates))
         for part in np.array_split(np.arange(len(coordinates)), max(1, len(coordinates) // 500)):
             points[part], growth[part] = self._moved(coordinates[part])
         return points, growth
 
     def of(self, points: Floats) -> Floats:
-        """Coordinates of the model's parameters, (n, parameters)."""
+        """Return the coordinates of the model's parameters, (n, parameters)."""
         scales, linear = split(self.approximation.model, points)
         pulled, root = self.approximation.conditional(scales)
         return np.hstack([np.log(scales), (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled])

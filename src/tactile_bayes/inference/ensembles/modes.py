@@ -1,4 +1,4 @@
-"""Ensembles that have come to rest in different places: modes between which no walker goes."""
+"""Modes of the posterior: groups of ensembles at rest between which no walker moves."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Floats
 
-__all__ = ["Place", "places_in_words", "places_of"]
+__all__ = ["Mode", "modes_message", "modes_of"]
 
 
 _APART = 5.0
-"""Distance of two ensembles' means, in the larger of their standard deviations, from which they are apart."""
+"""Distance of two ensembles' means, over the larger of their standard deviations, from which they are apart."""
 
 _AT_REST = 1.1
-"""R̂ of an ensemble's early against its late steps, below which it stays where it is."""
+"""R̂ of an ensemble's early against its late steps below which it is at rest."""
 
 _DRAWS_PER_WALKER = 2.0
-"""Effective draws that the mean walker of an ensemble at rest has made there."""
+"""Smallest number of effective draws per walker of an ensemble at rest."""
 
-_MOST_TOLD = 3
-"""Parameters that are named in words."""
+_MOST_NAMED = 3
+"""Largest number of parameters that the message names for a mode."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where some of the ensembles sit, apart from the others."""
+class Mode:
+    """A mode in which some of the ensembles sit, apart from the others."""
 
     ensembles: tuple[int, ...]
-    """Which, counted from 0."""
+    """Numbers of the ensembles, counted from 0."""
     values: Mapping[str, float]
-    """Median of each parameter that tells the places apart, the clearest first."""
+    """Median of each parameter that separates the modes, the clearest first."""
     log_probability: float
-    """Mean over the draws there."""
+    """Mean log-probability over the draws of the mode."""
 
 
-def places_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Place, ...]:
-    """Places of the ensembles, from samples (chain, step, walker, parameter) and their (chain, step, walker).
+def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Mode, ...]:
+    """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities.
 
-    None if there is but one, or if an ensemble is still on its way: each has to agree with itself, early against late
-    steps, and to have forgotten where its walkers were, before it makes sense to say that they disagree. So a run that
-    is merely slow is not taken for one with several modes.
+    The result is empty if there is only one mode, or if an ensemble is not at rest: the early and late steps of each
+    ensemble must agree, and its walkers must have forgotten their positions, before disagreement means several modes.
+    So a slow run is not taken for one with several modes.
     """
     if not _at_rest(samples):
         return ()
@@ -55,27 +55,27 @@ def places_of(samples: Floats, log_probability: Floats, names: Sequence[str]) ->
     if len(groups) < 2:
         return ()
     clearest = np.argsort(-distance.max(axis=(0, 1)), kind="stable")
-    telling = [i for i in clearest if distance[..., i].max() >= _APART]
+    separating = [i for i in clearest if distance[..., i].max() >= _APART]
     return tuple(
-        Place(
+        Mode(
             ensembles=group,
-            values={names[i]: float(np.median(samples[list(group), ..., i])) for i in telling},
+            values={names[i]: float(np.median(samples[list(group), ..., i])) for i in separating},
             log_probability=float(log_probability[list(group)].mean()),
         )
         for group in groups
     )
 
 
-def places_in_words(places: Sequence[Place]) -> str:
-    told = []
-    for place in places:
-        values = [f"{name} = {value:.6g}" for name, value in place.values.items()]
-        more = [f"{len(values) - _MOST_TOLD} more"] if len(values) > _MOST_TOLD else []
-        which = f"{'ensemble' if len(place.ensembles) == 1 else 'ensembles'} {', '.join(map(str, place.ensembles))}"
-        where = ", ".join(values[:_MOST_TOLD] + more)
-        told.append(f"{which} near {where} (mean log-probability {place.log_probability:.1f})")
+def modes_message(modes: Sequence[Mode]) -> str:
+    parts = []
+    for mode in modes:
+        values = [f"{name} = {value:.6g}" for name, value in mode.values.items()]
+        more = [f"{len(values) - _MOST_NAMED} more"] if len(values) > _MOST_NAMED else []
+        which = f"{'ensemble' if len(mode.ensembles) == 1 else 'ensembles'} {', '.join(map(str, mode.ensembles))}"
+        where = ", ".join(values[:_MOST_NAMED] + more)
+        parts.append(f"{which} near {where} (mean log-probability {mode.log_probability:.1f})")
     return (
-        f"ensembles sit in {len(places)} places and none of them leaves its own: {'; '.join(told)}; their shares "
+        f"ensembles sit in {len(modes)} modes and none of them leaves its own: {'; '.join(parts)}; their shares "
         "of the probability are unknown and more steps will not tell: use priors that leave one of them"
     )
 
@@ -97,7 +97,7 @@ def _at_rest(samples: Floats) -> bool:
 
 
 def _connected(near: NDArray[np.bool_]) -> list[tuple[int, ...]]:
-    """Groups of ensembles that are near one another, be it by way of others."""
+    """Return the groups of ensembles that are near one another, directly or through others."""
     reached = near.copy()
     for k in range(len(near)):
         reached |= np.outer(reached[:, k], reached[k])

@@ -1,0 +1,172 @@
+"""An experiment: a record, what is known of the rig that made it, and priors of all else."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.stats import rv_histogram
+
+from tactile_bayes.checks import check_names, check_optional, check_switch
+from tactile_bayes.contours.families import family_named
+from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.noise import Noise, noise_of
+from tactile_bayes.inference.nuisances import STANDARD, Nuisances, nuisances_of
+from tactile_bayes.inference.priors import Prior, check_priors, refuse_strangers
+from tactile_bayes.inference.priors import default_priors as contour_priors
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.reconstruction import CONTACT_SIDES
+from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
+
+__all__ = ["Experiment", "default_priors", "prior_in_words", "priors_in_words", "usual_load_cell"]
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A record, what is known of the contour and of the rig that touched it, and priors of what is not known.
+
+    Parameters
+    ----------
+    record : xr.Dataset
+        Measured, or the template of one that is to be made.
+    family, load_cell, priors, rod, friction, nuisances, events
+        As in `infer_contour`.
+
+    Raises
+    ------
+    RecordError, ParameterError
+        As `infer_contour`.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> experiment = Experiment(scan(paper_profile("II", q=0.5)).record, nuisances=["friction"])
+    >>> experiment.model.names
+    ('a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise')
+    """
+
+    record: xr.Dataset
+    family: str = "parabola"
+    load_cell: LoadCell | None = None
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+    rod: Rod | None = None
+    friction: float | None = None
+    nuisances: Sequence[str] = STANDARD
+    events: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "record", with_rod(validate(self.record), self.rod))
+        check_optional("load_cell", self.load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
+        object.__setattr__(self, "events", check_switch("events", self.events))
+        check_priors("priors", self.priors)
+        object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
+        more = ", and of what is not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
+        refuse_strangers(self.priors, self.default_priors, more=more)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone: the model is built again where it is needed."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @cached_property
+    def noise(self) -> Noise:
+        """The parameters of the noise."""
+        return noise_of(self.record, self.load_cell)
+
+    @cached_property
+    def rig(self) -> Nuisances:
+        """The nuisance parameters."""
+        return nuisances_of(self.record, self.nuisances, self.priors, self.noise.cell, self.friction)
+
+    @cached_property
+    def default_priors(self) -> dict[str, Prior]:
+        """Default priors of all parameters: the contour's, the rig's and the noise's."""
+        base = float(self.record.base_x.mean()), float(self.record.base_y.mean())
+        of_contour = contour_priors(family_named(self.family), base, rod_of(self.record).length)
+        return {**of_contour, **self.rig.priors, **self.noise.priors}
+
+    @cached_property
+    def model(self) -> ContourModel:
+        """Prior times likelihood of all samples."""
+        priors = {**self.default_priors, **self.priors}
+        return ContourModel(self.record, family_named(self.family), self.rig, self.noise, priors)
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """The attributes of a posterior: what it follows from."""
+        attrs, cell = self.record.attrs, self.noise.cell
+        rod = ("rod_length", "rod_flexural_rigidity", "rod_diameter")
+        return {
+            "data_sha256": record_hash(self.record),
+            "family": self.family,
+            "friction": self.rig.friction,
+            "nuisances": json.dumps(self.rig.names),
+            "events": int(self.events),
+            "priors": priors_in_words({**self.default_priors, **self.priors}),
+            "units": attrs["units"],
+            "load_cell_frame": frame_of(self.record),
+            **{name: attrs[name] for name in (CONTACT_SIDES, *rod) if name in attrs},
+            "approximations": "; ".join(cell.approximations),
+            **{f"load_cell_{name}": v for name, v in cell.entries().items() if name not in self.noise.inferred},
+        }
+
+    @property
+    def assumptions(self) -> dict[str, str]:
+        """What simulations follow from besides their records, for the results store."""
+        cell = self.load_cell or self.noise.cell
+        return {
+            "family": self.family,
+            "load_cell": json.dumps(cell.entries()),
+            "load_cell_frame": cell.frame or "fixed",
+            "rod": "dimensionless" if self.rod is None else json.dumps(asdict(self.rod)),
+            "priors": priors_in_words(self.priors),
+            "nuisances": json.dumps(self.nuisances),
+            "friction": repr(self.friction),
+        }
+
+
+def usual_load_cell(rod: Rod) -> LoadCell:
+    """Return a load cell with noise of 0.05 EI/L² and 0.02 EI/L, in the units of a rod."""
+    return LoadCell(force_noise=0.05 * rod.force_unit, moment_noise=0.02 * rod.moment_unit)
+
+
+def default_priors(
+    measured: xr.Dataset,
+    family: str = "parabola",
+    load_cell: LoadCell | None = None,
+    nuisances: Sequence[str] = STANDARD,
+) -> dict[str, Prior]:
+    """The priors that `infer_contour` takes where it is given none, in the record's units; its notes say which.
+
+    Examples
+    --------
+    >>> from tactile_bayes import scan
+    >>> from tactile_bayes.contours import paper_profile
+    >>> list(default_priors(scan(paper_profile("II", q=0.5)).record, nuisances=["friction"]))
+    ['a', 'q', 'x_c', 'friction', 'moment_noise', 'force_noise']
+    """
+    return Experiment(measured, family, load_cell, nuisances=nuisances).default_priors
+
+
+def prior_in_words(prior: Prior) -> str:
+    """Return a distribution as an attribute."""
+    law = getattr(prior, "dist", None)
+    if law is None:
+        return repr(prior)
+    if isinstance(law, rv_histogram):
+        counts, edges = law._histogram  # type: ignore[attr-defined]
+        return f"histogram of {len(counts)} bins ({zlib.crc32(np.concatenate([counts, edges]).tobytes()):08x})"
+    arguments = [f"{a:g}" for a in prior.args] + [f"{k}={v:g}" for k, v in prior.kwds.items()]  # type: ignore[attr-defined]
+    return f"{law.name}({', '.join(arguments)})"
+
+
+def priors_in_words(priors: Mapping[str, Prior]) -> str:
+    """Return distributions by name as an attribute."""
+    return json.dumps({name: prior_in_words(prior) for name, prior in priors.items()})

@@ -1,0 +1,85 @@
+"""Experiments: what is refused when one is made, what its model is made from, and what travels to another process."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tactile_bayes.contours import Parabola
+from tactile_bayes.errors import ParameterError, RecordError
+from tactile_bayes.inference.experiment import Experiment, usual_load_cell
+from tactile_bayes.load_cell import LoadCell
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.sweep import scan
+
+CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
+RECORD = scan(Parabola(0.5, q=0.5), drive_step=0.1).record
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"family": "cube"}, "there is no family 'cube'"),
+        ({"load_cell": 0.05}, r"load_cell is 0.05: give LoadCell\("),
+        ({"rod": 0.2}, "the rod is 0.2: give a Rod"),
+        ({"priors": None}, "priors is None: give distributions by name"),
+        ({"priors": {1: stats.norm()}}, "priors is .*: give distributions by name"),
+        ({"priors": {"a": stats.norm}}, "the prior of a is .*: give a frozen distribution"),
+        ({"priors": {"b": stats.norm()}}, "a prior of b, which is no parameter: there are a, q, x_c, .*moment_gain"),
+        ({"friction": -0.1}, "friction is -0.1: give a coefficient from 0 to"),
+        ({"friction": 0.1, "nuisances": ["friction"]}, "to be inferred as well: leave one of the two"),
+        ({"nuisances": "bias"}, r"nuisances is 'bias': give a list of names, like \['bias'\]"),
+        ({"nuisances": ["rust"]}, "there is no nuisance parameter 'rust'"),
+        ({"events": 1}, "events is 1: give True or False"),
+    ],
+)
+def test_arguments_are_checked_when_it_is_made(wrong, message):
+    with pytest.raises(ParameterError, match=message):
+        Experiment(RECORD, **wrong)
+
+
+def test_what_is_no_record_is_refused():
+    with pytest.raises(RecordError, match=r"a record is an xarray\.Dataset"):
+        Experiment(RECORD.holding_moment)
+
+
+def test_the_model_is_built_once_and_anew_of_another_record():
+    one = Experiment(RECORD, "circle", CELL, nuisances=["bias"])
+    assert one.model is one.model
+    other = replace(one, record=RECORD.isel(sample=slice(0, 20)))
+    assert other.model is not one.model
+    assert other.model.names == one.model.names
+    assert other.model.measured.sizes["sample"] == 20
+
+
+def test_priors_of_its_own_take_the_place_of_default_ones():
+    own = {"q": stats.norm(0.5, 0.1), "friction": stats.halfnorm(scale=0.1)}
+    experiment = Experiment(RECORD, load_cell=CELL, priors=own, nuisances=[])
+    assert experiment.model.names == ("a", "q", "x_c", "friction", "noise_scale")
+    assert {name: experiment.model.priors[name] for name in own} == own
+    assert experiment.model.priors["a"] is experiment.default_priors["a"]
+
+
+def test_the_model_does_not_travel_and_is_the_same_there():
+    here = Experiment(RECORD, load_cell=CELL, nuisances=[])
+    before = len(pickle.dumps(here))
+    point = np.array([[0.5, 0.5, 0.0, 1.0]])
+    density = here.model.log_probability(point)
+    sent = pickle.dumps(here)
+    assert len(sent) == before
+    np.testing.assert_array_equal(pickle.loads(sent).model.log_probability(point), density)
+
+
+def test_a_rod_takes_the_place_of_that_of_the_record():
+    rod = Rod(length=0.1, flexural_rigidity=1e-5)
+    cell = usual_load_cell(rod)
+    record = scan(Parabola(5.0, q=0.05), drive_step=0.1, rod=rod).record
+    stiffer = replace(rod, flexural_rigidity=2e-5)
+    experiment = Experiment(record, load_cell=cell, rod=stiffer, nuisances=[])
+    assert experiment.model.likelihood.rod == stiffer
+    assert experiment.about["rod_flexural_rigidity"] == 2e-5
+    assert Experiment(record, load_cell=cell, nuisances=[]).about["rod_flexural_rigidity"] == 1e-5
