@@ -13,7 +13,7 @@ import pytest
 import typer
 
 import tactile_bayes as tb
-from helpers import commands
+from helpers.commands import call
 from helpers.pages import DOCS, ROOT, agree, blocks, commands, matter, run
 from tactile_bayes.cli import app
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS
@@ -60,13 +60,13 @@ def test_a_rigs_file_says_what_is_shown(tmp_path: Path, monkeypatch: pytest.Monk
     shown = [block.code for block in blocks(section) if block.language == "text"]
     assert Path("data/synthetic/rig.csv").read_text(encoding="utf-8").startswith(shown[0])
     (asked,) = (words for block in blocks(section) for words in commands(block.code) if words[0] == "inspect")
-    first, *_ = commands.call(*asked).stdout.splitlines(keepends=True)
+    first, *_ = call(*asked).stdout.splitlines(keepends=True)
     assert first == shown[1]
     asked = [word.replace("force_x=Fx", "force_x=-Fx") for word in asked]
-    inspected = commands.call(*asked).stdout
+    inspected = call(*asked).stdout
     for part in shown[2].split("\n\n"):
         assert part in inspected
-    found = commands.call("reconstruct", *asked[1:], "--out", tmp_path).stdout
+    found = call("reconstruct", *asked[1:], "--out", tmp_path).stdout
     assert found.startswith(shown[3])
 
 
