@@ -103,7 +103,7 @@ def test_a_scan_from_two_pivots_is_drawn(tmp_path):
         (["--family", "parabola", "--parameter", "r=1"], "--parameter r=1: write NAME=VALUE, with one of a, q, x_c"),
         (["--family", "parabola", *["--parameter", "a=1"] * 2], "--parameter a= is given twice"),
         (["--family", "parabola", "--parameter", "a=x"], "--parameter a is 'x'"),
-        (["--family", "shape-free"], "--family shape-free: a few parameters do not define such a contour, so give --points"),
+        (["--family", "shape-free"], "--family shape-free: a few parameters do not define such a contour"),
         (["--family", "blob"], "there is no family 'blob'"),
         (["--distance", "1.5"], "the contour is out of reach"),
         (["--points", "{}/none.csv"], "none.csv: No such file or directory"),
