@@ -80,6 +80,14 @@ def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod
         assert str(mine.phases.values) == "-".join("A" if kind == "tip" else "B" for kind in kinds)
 
 
+def test_a_small_fall_beside_a_sharp_vertex_is_no_snap_off():
+    """The drive angle falls by 4e-6 rad before the vertex, where the radius of curvature is zero, and rises again."""
+    vertex = 0.6637, 1.6517, 0.4240, -0.8370
+    alone = tb.scan(PowerLaw(*vertex), direction="backward").events["backward"]
+    many = tb.scan_many(PowerLaw(*np.array(vertex)[:, None]), ANGLES, direction="backward")
+    assert many.snap_off_drive_angle.item() == pytest.approx(alone.snap_off.drive_angle, abs=1e-12)
+
+
 def test_what_cannot_be_swept_says_why():
     many = tb.scan_many(Circle(np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.4, 1.2, -0.1, 0.01])), ANGLES)
     assert many.status.values.tolist() == ["ok", "out of reach", "cuts the pivot", "too close to the pivot"]

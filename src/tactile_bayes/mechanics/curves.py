@@ -52,6 +52,9 @@ WAY = 3
 MISS = 1e-8
 """Tolerance of the derivatives of exact states where they only guide a search."""
 
+_ROUNDING = 1e-14
+"""Tail of the series of a drive angle that its rounding leaves [rad]: shorter stretches do not make it smaller."""
+
 DIP = 1e-4
 """Least fall of the drive angle beyond a maximum that makes it the snap-off [rad]. After a smaller fall the rod hardly
 jumps, since the same object stops it at once."""
@@ -135,7 +138,7 @@ def sample(scene: Scene, stretch: Stretch, curves: Curves) -> None:
 def misses(accuracy: Accuracy, tolerance: Floats, curves: Curves) -> bool:
     """Return whether the series miss the drive angle, the loads or the states by more than the tolerances."""
     angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
-    rough = angle > accuracy.resolved * change or angle > accuracy.sharp
+    rough = angle > max(accuracy.resolved * change, _ROUNDING) or angle > accuracy.sharp
     for c in range(3):
         loads = curves.series[c]
         rough |= tail(loads) + angle * change_of(loads) / change > tolerance[c]
