@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from helpers.legendre import equilibrium, tangential_arclength
-from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw
+from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.curves import DIP
 from tactile_bayes.mechanics.paths import trace
@@ -171,6 +171,18 @@ def test_a_shallow_dip_is_passed_over():
     np.testing.assert_array_less(paths.snap_angle[index] - dense, 5e-3)
     likely = trace(sweep_frame, **LIKELIHOOD)
     np.testing.assert_allclose(likely.snap_angle[index], paths.snap_angle[index], rtol=0, atol=5e-5)
+
+
+def test_a_dip_beside_a_corner_ends_the_path_though_it_is_narrow():
+    """On this narrow ellipse tip contact begins with a fall of 4e-4 rad, within 3 % of a stretch."""
+    sweep_frame = sweep_frame_of(Ellipse(0.9036, 0.06482, 0.7733, -0.571))
+    exact, likely = trace(sweep_frame, **SCAN), trace(sweep_frame, **LIKELIHOOD)
+    assert exact.snap_off[0] == SnapOff.CORNER
+    ahead = np.linspace(exact.snap_parameter[0], exact.snap_parameter[0] - 0.1, 1000)
+    angle = exact.states_at(np.array([[0]]), ahead[None]).wrench.drive_angle[0]
+    assert DIP < np.max(np.maximum.accumulate(angle) - angle) < 5 * DIP
+    assert angle[-1] > angle[0]
+    np.testing.assert_allclose(likely.snap_angle, exact.snap_angle, rtol=0, atol=1e-6)
 
 
 def _nearest_parameter(sweep_frame, index):

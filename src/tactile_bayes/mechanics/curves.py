@@ -168,19 +168,26 @@ def first_fall(accuracy: Accuracy, is_first: bool, curves: Curves) -> float:
 def regained(stop: float, most: float, curves: Curves) -> float:
     """Position after `stop` at which the drive angle exceeds a maximum again; above 1 if the stretch ends before,
     `LOST` if the drive angle falls too far below it."""
-    on, angle = curves.on, curves.series[ANGLE]
+    on, angle, slope = curves.on, curves.series[ANGLE], curves.series[ANGLE + 1]
     weighted(on.on_grid, angle, curves.on_grid)
+    weighted(on.slopes, angle, slope)
+    weighted(on.slopes, slope, curves.bend)
     below = max(stop, 0.0)
+    falls = stop >= 0.0 or value(slope, below) < 0.0
     for cell in range(on.grid.size):
-        if on.grid[cell] <= stop:
+        above = on.grid[cell]
+        if above <= stop:
             continue
-        if curves.on_grid[cell] < most - DIP:
+        rises = value(slope, above) > 0.0
+        lowest = above
+        if falls and rises and above > below:  # the whole dip may lie between two points of the grid
+            lowest = crossing(slope, curves.bend, 0.0, above, below, 0.5 * (above + below), _LAST)
+        if value(angle, lowest) < most - DIP:
             return LOST
         if curves.on_grid[cell] > most:
-            weighted(on.slopes, angle, curves.series[ANGLE + 1])
-            above = on.grid[cell]
-            return crossing(angle, curves.series[ANGLE + 1], most, above, below, 0.5 * (above + below), _LAST)
-        below = on.grid[cell]
+            below = lowest if lowest < above else below
+            return crossing(angle, slope, most, above, below, 0.5 * (above + below), _LAST)
+        below, falls = above, not rises
     return 2.0
 
 
