@@ -19,7 +19,6 @@ from tactile_bayes.inference.found_rig import rig_with
 from tactile_bayes.inference.nuisances import BIASES
 from tactile_bayes.inference.start import Optimum, descend, optima
 from tactile_bayes.numerics.blocks import blocks
-from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, present_channels
 
 __all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimum_of"]
@@ -291,13 +290,7 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
     moment, *forces = model.deviation * np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
     rig = rig_with(model.measured, cell, _zeros(model) if found is None else found, model.nuisances.friction)
-    contacts = reconstruct(
-        rig.record,
-        method="constrained",
-        load_cell=rig.load_cell,
-        friction=rig.friction,
-        suspension_compliance=rig.suspension_compliance,
-    )
+    contacts = rig.contacts()
     firm = contacts.status.values == "ok"
     if firm.any():
         firm &= contacts.normal_sd.values <= _FIRM * np.median(contacts.normal_sd.values[firm])

@@ -11,7 +11,6 @@ from scipy.special import logsumexp
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.errors import InferenceError
-from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.contour_optimum import ContourOptimum, contact_fit, fitted_noise, optima_of, optimum_of
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -32,7 +31,6 @@ from tactile_bayes.inference.flank_coordinates import FlankCoordinates
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
 from tactile_bayes.inference.start import Cloud, gather
-from tactile_bayes.numerics.differences import central_slopes
 
 __all__ = ["Walk", "walk_of"]
 
@@ -67,13 +65,6 @@ _SAME = 3.0
 
 _RARE = 9.0
 """Logarithm of how much less mass a mode may have than another to be left out: one draw in ten thousand."""
-
-_X_C = 3
-"""Column of x_c among the parameters of a power law."""
-
-_RARELY, _NEARBY = 0.01, 0.1
-"""Share of draws, and of the usual distance of the vertex from where the rod touches: where more of them are nearer,
-vertices may lie on the other side as well, which the coordinates of a flank do not have."""
 
 _POOR = 2.0
 """Mean square of what is left of a record, over its own roughness, from which on a search is worth its time."""
@@ -251,25 +242,21 @@ def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) 
 
 
 def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator, deadline: Deadline) -> _Mode:
-    """Around an optimum, in the coordinates in which the posterior is nearer to a normal distribution."""
+    """Approximate a mode around an optimum, in the coordinates in which the posterior is nearer to a normal one."""
     usual = _mode_in(model, optimum, model.coordinates, optimum.covariance, rng, deadline, model.walked_ends)
-    if usual.proposal.efficiency > _EFFICIENT or model.family.name != "power-law" or deadline.has_passed:
+    if usual.proposal.efficiency > _EFFICIENT or deadline.has_passed:
         return usual
-    at = optimum.point[None]
-    ends = events_of(model.likelihood, model.contours(at), model.rig(at), exact=False)
-    touched = float(np.mean([ends["first_contact_x"], ends["snap_off_contact_x"]]))
-    flank = FlankCoordinates(model.coordinates, touched, float(np.sign(touched - optimum.point[_X_C])))
-    place = model.coordinates.of(at)[0]
-    slopes = central_slopes(lambda places: flank.of(model.coordinates.parameters(places)[0]), place, 1e-6)
-    covariance = slopes @ optimum.covariance @ slopes.T
-    if not np.isfinite(covariance).all():  # that is the vertex
+    flank = FlankCoordinates.where_touched(model, optimum.point)
+    if flank is None:
+        return usual
+    covariance = flank.covariance(optimum.point, optimum.covariance)
+    if not np.isfinite(covariance).all():  # the vertex is too near
         return usual
     mode = _mode_in(model, optimum, flank, covariance, rng, deadline)
-    distances = np.abs(flank.parameters(mode.proposal.draw(rng, _OF_SCALE)[0])[0][:, _X_C] - touched)
-    reaches_vertex = np.quantile(distances, _RARELY) < _NEARBY * np.median(distances)
-    return (
-        usual if reaches_vertex or mode.proposal.efficiency < usual.proposal.efficiency else mode._replace(usual=usual)
-    )
+    reaches_vertex = flank.reach_vertex(mode.proposal.draw(rng, _OF_SCALE)[0])
+    if reaches_vertex or mode.proposal.efficiency < usual.proposal.efficiency:
+        return usual
+    return mode._replace(usual=usual)
 
 
 def _mode_in(

@@ -35,6 +35,16 @@ class FoundRig(NamedTuple):
     suspension_compliance: float
     """Per moment of the rod as stated, as `reconstruct` takes it."""
 
+    def contacts(self) -> xr.Dataset:
+        """Return contact points by Step 2, as from `reconstruct`: constrained where the noise is known, else raw."""
+        return reconstruct(
+            self.record,
+            method="constrained" if self.load_cell.has_variances else "raw",
+            load_cell=self.load_cell,
+            friction=self.friction,
+            suspension_compliance=self.suspension_compliance,
+        )
+
 
 def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> FoundRig:
     """Medians of what was inferred of the rig beside a contour, put where `reconstruct` takes it.
@@ -123,11 +133,4 @@ def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: 
     """
     if set(present_channels(measured)) != set(CHANNELS):
         return None
-    rig = found_rig(measured, load_cell, posterior)
-    return reconstruct(
-        rig.record,
-        method="constrained" if rig.load_cell.has_variances else "raw",
-        load_cell=rig.load_cell,
-        friction=rig.friction,
-        suspension_compliance=rig.suspension_compliance,
-    )
+    return found_rig(measured, load_cell, posterior).contacts()
