@@ -1,11 +1,10 @@
-"""Prints what becomes of bands where the world is not as inference assumes, whether it is noticed, and what cures it.
+"""Prints what becomes of bands where the rig is not as inference assumes, whether it is noticed, and what cures it.
 
 Every row is a calibration: parabolas are drawn from the default prior, swept, measured and inferred as `infer` does by
-default, and bands compared with the truth; what else is not known of the rig is drawn from its default prior, noise is
-as stated. Below a
-world that the default allows for stands what becomes of it where everything is taken as stated; below the others what
-is to be inferred, or told, to cure it. What is done is kept in results/misspecification, so that a run that was stopped
-goes on.
+default, and their bands are compared with the truth. Noise is as stated; what else is not known of the rig is drawn
+from its default prior. An indented row repeats the case above it with other arguments of inference. Where the default
+infers the property that is wrong, everything is taken as stated instead (--as-stated); elsewhere the row names what is
+inferred, or told, to cure it. Replicates are kept in results/misspecification, from which a stopped run resumes.
 """
 
 from __future__ import annotations
@@ -43,14 +42,10 @@ class Run(NamedTuple):
     asked: Mapping[str, Any] = MappingProxyType({})
 
 
-AS_STATED = "--as-stated"
-AS_ASSUMED = "as assumed"
-
-
 def _known_to_vary(exactly: dict[str, float], beside: dict[str, Any]) -> dict[str, Run]:
     """What by default has a prior, one value of it; and the same where everything is taken as stated."""
     priors = {name: stats.norm(value, 1e-9) for name, value in exactly.items()}
-    return {"": Run({"priors": priors}), AS_STATED: Run(beside, {"nuisances": ()})}
+    return {"": Run({"priors": priors}), "--as-stated": Run(beside, {"nuisances": ()})}
 
 
 def _untold(world: dict[str, Any], asked: dict[str, Any], **others: dict[str, Any]) -> dict[str, Run]:
@@ -63,7 +58,7 @@ def _untold(world: dict[str, Any], asked: dict[str, Any], **others: dict[str, An
 BIASES = (0.02, 0.05, 0.05)
 OUTLIERS = {"load_cell": replace(CELL, degrees_of_freedom=2.5)}
 CASES: Mapping[str, Mapping[str, Run]] = {
-    AS_ASSUMED: _known_to_vary({}, {}),
+    "as assumed": _known_to_vary({}, {}),
     **{f"friction {mu}": _known_to_vary({"friction": mu}, {"friction": mu}) for mu in (0.1, 0.3, 0.5)},
     "base off by 1 % L, across": _untold({"base_shift": (0.01, 0.0)}, {}),
     "base off by 1 % L, along": _untold({"base_shift": (0.0, 0.01)}, {}),
