@@ -27,20 +27,16 @@ PRIORS = {"a": stats.lognorm(s=0.4, scale=0.6), "q": stats.uniform(0.3, 0.4), "x
 SI = Rod(length=0.1, flexural_rigidity=1e-5)
 
 
-def experiment(*, nuisances=(), priors=PRIORS, load_cell=QUIET, base=(0.0, 0.0), **options):
-    asked = {
-        "seed": 1,
-        "family": "parabola",
-        "rod": None,
-        "direction": "both",
-        "drive_angles": ANGLES,
-        "friction": 0.0,
-        "events": True,
-        "settings": None,
-        "probability": 0.9,
-        "world": None,
-    }
-    return experiment_of(nuisances=nuisances, priors=priors, load_cell=load_cell, base=base, **(asked | options))
+def experiment(*, nuisances=(), priors=PRIORS, load_cell=QUIET, drive_angles=ANGLES, friction=0.0, **options):
+    return experiment_of(
+        seed=1,
+        nuisances=nuisances,
+        priors=priors,
+        load_cell=load_cell,
+        drive_angles=drive_angles,
+        friction=friction,
+        **options,
+    )
 
 
 def simulated(seed=0, **options):

@@ -14,22 +14,7 @@ from tactile_bayes.calibration.ranks import noticed_ranks
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 from tactile_bayes.calibration.summary import CLAIMS, FALSE_ALARM, summary
 
-EXPERIMENT = experiment_of(
-    seed=1,
-    family="parabola",
-    load_cell=None,
-    rod=None,
-    base=(0.0, 0.0),
-    direction="both",
-    drive_angles=None,
-    priors=None,
-    nuisances=[],
-    friction=0.0,
-    events=True,
-    settings=None,
-    probability=0.9,
-    world=None,
-)
+EXPERIMENT = experiment_of(seed=1, nuisances=[], friction=0.0)
 
 NAMES = ("a", "q", "x_c", "rigidity_scale", "noise_scale", LOG_LIKELIHOOD, "snap_off_backward", "snap_off_forward")
 

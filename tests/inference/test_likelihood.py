@@ -17,7 +17,6 @@ from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import RecordLikelihood
-from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
@@ -315,22 +314,7 @@ def exact_sensed(model, point):
 def off_at_the_truth(noise, family, numbers):
     """By how much log-likelihoods of records from the default prior differ from exact ones."""
     cell = LoadCell(force_noise=0.05 * noise, moment_noise=0.02 * noise)
-    experiment = experiment_of(
-        seed=1,
-        family=family,
-        load_cell=cell,
-        rod=None,
-        base=(0.0, 0.0),
-        direction="both",
-        drive_angles=None,
-        priors=None,
-        nuisances=STANDARD,
-        friction=0.0,
-        events=True,
-        settings=None,
-        probability=0.9,
-        world=None,
-    )
+    experiment = experiment_of(seed=1, family=family, load_cell=cell, friction=0.0)
     off = []
     for number in numbers:
         simulation = simulate(experiment, np.random.default_rng([9, number]))

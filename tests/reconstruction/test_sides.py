@@ -32,17 +32,9 @@ def simulated(family, count, spread=0.3, seed=7):
         seed=1,
         family=family,
         load_cell=CELL,
-        rod=None,
-        base=(0.0, 0.0),
-        direction="both",
-        drive_angles=None,
         priors=priors,
         nuisances=("rigidity_scale", "drive_angle_offset", "bias"),
         friction=0.0,
-        events=True,
-        settings=None,
-        probability=0.9,
-        world=None,
     )
     for number in range(count):
         yield simulate(experiment, np.random.default_rng([seed, number])).measured
