@@ -9,18 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays, broadcastable_shapes
 from scipy.integrate import tanhsinh
 
-from helpers.contours_drawn import (
-    all_power_laws,
-    circles,
-    edges,
-    ellipses,
-    functions,
-    measured_contours,
-    mirrored,
-    parabolas,
-    shapes,
-    vertex_joints,
-)
+from helpers.contours_drawn import FAMILIES, all_power_laws, circles, ellipses, functions, mirrored, parabolas
 from helpers.refusals import refused
 from tactile_bayes.contours import (
     Circle,
@@ -41,17 +30,6 @@ EPS = np.finfo(float).eps
 STEEPEST = 1.5
 """Endless contours are tried up to here: there the tangent is 14, and heights have lost a digit."""
 
-FAMILIES = {
-    "parabola": parabolas,
-    "circle": circles,
-    "ellipse": ellipses,
-    "power-law": all_power_laws,
-    "vertex": vertex_joints(),
-    "edge": edges(),
-    "function": functions(),
-    "measured": measured_contours(),
-    "shape-free": shapes(),
-}
 FEW = settings(
     max_examples=settings.default.max_examples // 3,
     deadline=None,

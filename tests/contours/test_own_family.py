@@ -10,17 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from helpers.contours_drawn import (
-    all_power_laws,
-    circles,
-    edges,
-    ellipses,
-    functions,
-    measured_contours,
-    parabolas,
-    shapes,
-    vertex_joints,
-)
+from helpers.contours_drawn import FAMILIES
 from helpers.refusals import refused
 from tactile_bayes import scan
 from tactile_bayes.contours import (
@@ -40,18 +30,6 @@ from tactile_bayes.contours import (
 from tactile_bayes.errors import ContourError
 
 # --- what is right ---------------------------------------------------------------------------------------------------
-
-FAMILIES = {
-    "parabola": parabolas,
-    "circle": circles,
-    "ellipse": ellipses,
-    "power-law": all_power_laws,
-    "vertex": vertex_joints(),
-    "edge": edges(),
-    "function": functions(),
-    "measured": measured_contours(),
-    "shape-free": shapes(),
-}
 
 
 @pytest.mark.parametrize("n", [1.85, 1.9, 1.99])

@@ -162,6 +162,19 @@ def measured_contours(draw) -> Contour:
         assume(False)
 
 
+FAMILIES = {
+    "parabola": parabolas,
+    "circle": circles,
+    "ellipse": ellipses,
+    "power-law": all_power_laws,
+    "vertex": vertex_joints(),
+    "edge": edges(),
+    "function": functions(),
+    "measured": measured_contours(),
+    "shape-free": shapes(),
+}
+
+
 # --- mirrored --------------------------------------------------------------------------------------------------------
 
 
