@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import pickle
-from dataclasses import replace
+import copy
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -66,12 +66,11 @@ def test_priors_of_its_own_take_the_place_of_default_ones():
 
 def test_the_model_does_not_travel_and_is_the_same_there():
     here = Experiment(RECORD, load_cell=CELL, nuisances=[])
-    before = len(pickle.dumps(here))
     point = np.array([[0.5, 0.5, 0.0, 1.0]])
     density = here.model.log_probability(point)
-    sent = pickle.dumps(here)
-    assert len(sent) == before
-    np.testing.assert_array_equal(pickle.loads(sent).model.log_probability(point), density)
+    there = copy.deepcopy(here)  # of what __getstate__ returns, as on the way to another process
+    assert list(vars(there)) == [each.name for each in fields(Experiment)]
+    np.testing.assert_array_equal(there.model.log_probability(point), density)
 
 
 def test_a_rod_takes_the_place_of_that_of_the_record():
