@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 from helpers.commands import assert_misused, assert_refused, call, plain
+from helpers.interrupts import interrupted_while_sampling
 from helpers.report_pages import FEW
 from tactile_bayes import __version__, read_record
 from tactile_bayes.cli.sampling_bar import remaining_seconds
@@ -428,35 +428,18 @@ def test_time_that_is_left_is_that_of_draws_as_they_came(made, left):
 
 # --- Interrupts -----------------------------------------------------------------------------------------------------
 
-SAMPLING = """
-import functools
+NO_FIGURES = """
 from tactile_bayes.runs import contour as run
-from tactile_bayes.cli import main
-from tactile_bayes.inference import contour, ensembles
 
-made = contour.sample
-def sample(*arguments, progress, **options):
-    return made(*arguments, progress=lambda state: print("sampling", flush=True), **options)
-
-contour.sample = sample
 run._draw = lambda *arguments, **options: {}
-ensembles.SamplerSettings = functools.partial(ensembles.SamplerSettings, block_steps=5, min_ess=1e9)
-main()
 """
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
-    command = [sys.executable, "-c", SAMPLING, "infer", record, "--as-stated", "--out", "run", "-q"]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", cwd=tmp_path
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "sampling\n"
-        process.send_signal(signal.SIGINT)
-        out, errors = process.communicate(timeout=300)
-    assert process.returncode == 130
+    code, out, errors = interrupted_while_sampling("infer", record, tmp_path, setup=NO_FIGURES)
+    assert code == 130
     answer, end = errors.split("\n", 2)[1:]
     assert answer.startswith("tactile-bayes: stopping; what has been drawn is judged, drawn and written now")
     assert end == (

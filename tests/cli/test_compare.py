@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
 import sys
-import time
 
 import pandas as pd
 import pytest
@@ -13,6 +10,7 @@ import xarray as xr
 
 from helpers.commands import assert_misused, assert_refused, call
 from helpers.comparisons import NAMES, made_up
+from helpers.interrupts import interrupted_while_sampling
 from tactile_bayes.inference.ensembles import Progress
 from tactile_bayes.record import write_record
 from tactile_bayes.runs import comparison as comparison_run
@@ -184,37 +182,11 @@ def test_a_file_that_is_not_there(tmp_path):
 # --- Interrupts -----------------------------------------------------------------------------------------------------
 
 
-SAMPLING = """
-import functools
-from tactile_bayes.cli import main
-from tactile_bayes.inference import contour, ensembles
-
-made = contour.sample
-def sample(*arguments, progress, **options):
-    def show(state):
-        print("sampling", flush=True)
-        progress(state)
-    return made(*arguments, progress=show, **options)
-
-contour.sample = sample
-ensembles.SamplerSettings = functools.partial(ensembles.SamplerSettings, block_steps=5, min_ess=1e9)
-main()
-"""
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
 def test_control_c_while_sampling_ends_all_of_it(record, tmp_path):
-    command = [sys.executable, "-c", SAMPLING, "compare", record, "--as-stated", "--out", "run", "-q"]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", cwd=tmp_path
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "sampling\n"
-        time.sleep(0.5)  # while walkers walk, which is most of the time
-        process.send_signal(signal.SIGINT)
-        out, errors = process.communicate(timeout=300)
-    assert process.returncode == 130
+    code, out, errors = interrupted_while_sampling("compare", record, tmp_path)
+    assert code == 130
     assert errors == "tactile-bayes: interrupted while sampling shape-free: there is no result\n"
     assert set(out.splitlines()) <= {"sampling"}
     assert list((tmp_path / "run").iterdir()) == []

@@ -2,6 +2,30 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
+import time
+
+SAMPLING = """
+import functools
+from tactile_bayes.cli import main
+from tactile_bayes.inference import contour, ensembles
+
+made = contour.sample
+def sample(*arguments, progress, **options):
+    def show(state):
+        print("sampling", flush=True)
+        if progress is not None:
+            progress(state)
+    return made(*arguments, progress=show, **options)
+
+contour.sample = sample
+ensembles.SamplerSettings = functools.partial(ensembles.SamplerSettings, block_steps=5, min_ess=1e9)
+main()
+"""
+"""Command line that does not converge, and prints a line whenever a sampler reports."""
+
 
 def interrupted_at(call, function):
     """The function until it is called for so many times, when Control-C is pressed, and again after that."""
@@ -15,3 +39,22 @@ def interrupted_at(call, function):
         return function(*arguments)
 
     return until_then
+
+
+def interrupted_while_sampling(command, record, cwd, *, setup=""):
+    """Exit code, stdout and stderr of a command that writes to run/, when Control-C is pressed while it samples."""
+    arguments = [command, record, "--as-stated", "--out", "run", "-q"]
+    with subprocess.Popen(
+        [sys.executable, "-c", setup + SAMPLING, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        cwd=cwd,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "sampling\n"
+        time.sleep(0.5)  # while walkers walk, which is most of the time
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=300)
+    return process.returncode, out, errors
