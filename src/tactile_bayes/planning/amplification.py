@@ -20,6 +20,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
 )
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS
+from tactile_bayes.record.frame import to_fixed_axes
 
 __all__ = ["METHODS", "SOURCES", "Method", "amplification"]
 
@@ -163,11 +164,7 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: NDArray[np.intp]) -> _Forwa
     in_cell = loads
     if cell.frame == "turning":
         leaning[:, 1], leaning[:, 2] = -loads[:, 2], loads[:, 1]
-        turn = np.zeros((angle.size, 3, 3))
-        turn[:, 0, 0] = 1.0
-        turn[:, 1, 1] = turn[:, 2, 2] = np.cos(angle)
-        turn[:, 2, 1] = np.sin(angle)
-        turn[:, 1, 2] = -turn[:, 2, 1]
+        turn = to_fixed_axes(angle)
         in_cell = np.einsum("nji,nj->ni", turn, loads)
     side = np.where(record.direction.values == "forward", 1.0, -1.0)
     signs = np.where(side[:, None] < 0.0, [-1.0, -1.0, 1.0], 1.0)

@@ -16,6 +16,7 @@ from tactile_bayes.mechanics.fitting import Reading
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
+from tactile_bayes.record.frame import to_fixed_axes
 
 __all__ = ["FALSE_ALARM", "Samples", "loaded_samples", "samples_of"]
 
@@ -101,11 +102,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
             loads[:, 1], loads[:, 2] = turned(loads[:, 1], loads[:, 2], -angle)
             leaning[:, 1], leaning[:, 2] = -loads[:, 2], loads[:, 1]
         if has_noise and frame_of(measured) == "turning":
-            turn = np.zeros((angle.size, 3, 3))
-            turn[:, 0, 0] = 1.0
-            turn[:, 1, 1] = turn[:, 2, 2] = np.cos(angle)
-            turn[:, 2, 1] = np.sin(angle)
-            turn[:, 1, 2] = -turn[:, 2, 1]
+            turn = to_fixed_axes(angle)
             covariance = turn @ covariance @ np.swapaxes(turn, 1, 2)
         angle = angle - suspension_compliance * rod.moment_unit * loads[:, 0]
     signs = np.where(side[:, None] < 0.0, _MIRROR, 1.0)

@@ -16,7 +16,7 @@ from tactile_bayes.record.schema import ATTRIBUTE_UNITS, CHANNELS, FRAMES, LOAD_
 from tactile_bayes.record.table import Source
 from tactile_bayes.record.validation import validate
 
-__all__ = ["frame_of", "in_frame", "turned"]
+__all__ = ["frame_of", "in_frame", "to_fixed_axes", "turned"]
 
 _BOUND = {name for name in LOAD_CELL_UNITS if "force" in name or name.startswith("drive_angle")} - {"force_noise"} | {
     "degrees_of_freedom",
@@ -139,6 +139,19 @@ def turned(force_x: ArrayLike, force_y: ArrayLike, angle: ArrayLike) -> tuple[Fl
     x, y = np.asarray(force_x, dtype=np.float64), np.asarray(force_y, dtype=np.float64)
     cos, sin = np.cos(angle), np.sin(angle)
     return np.asarray(x * cos + y * sin), np.asarray(y * cos - x * sin)
+
+
+def to_fixed_axes(angle: Floats) -> Floats:
+    """Return matrices, shape (n, 3, 3), by which loads along axes turned by angles, shape (n,), are along fixed ones.
+
+    The loads are in the order of `CHANNELS`.
+    """
+    matrices = np.zeros((angle.size, 3, 3))
+    matrices[:, 0, 0] = 1.0
+    matrices[:, 1, 1] = matrices[:, 2, 2] = np.cos(angle)
+    matrices[:, 2, 1] = np.sin(angle)
+    matrices[:, 1, 2] = -matrices[:, 2, 1]
+    return matrices
 
 
 def _refuse_bound_to_frame(record: xr.Dataset) -> None:
