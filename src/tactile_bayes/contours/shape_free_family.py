@@ -16,6 +16,7 @@ from tactile_bayes.contours.base import Contour, refuse_unless
 from tactile_bayes.contours.family import VERTEX, DefaultPrior, Family, FamilyParameter, log_normal, parabola_through
 from tactile_bayes.contours.random_radius import RandomRadius
 from tactile_bayes.contours.smooth import Smooth
+from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["SHAPE_FREE", "ShapeFreeFamily"]
 
@@ -91,7 +92,7 @@ class ShapeFreeFamily(Family):
 
         Of very many points an even selection is used.
         """
-        picked = np.unique(np.linspace(0, x.size - 1, min(x.size, _POINTS)).astype(np.intp))
+        picked = evenly_spread(x.size, _POINTS)
         x, y = x[picked], y[picked]
         a, q, x_c = parabola_through(x, y)
         middle = np.array([np.log(0.5 / a), *np.zeros(self.radius.count), q, x_c])

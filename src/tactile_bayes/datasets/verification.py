@@ -17,6 +17,7 @@ from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification import Specification, read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
+from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["Verification", "verify"]
 
@@ -70,7 +71,7 @@ def verify(
             f"{folder}: the manifest's specification is not the one that its checksum states: put a copy of the "
             "manifest back, or make the data set again in another folder"
         )
-    again = np.unique(np.linspace(0, len(manifest.shards) - 1, min(regenerate, len(manifest.shards))).astype(int))
+    again = evenly_spread(len(manifest.shards), regenerate)
     done, wanted = 0, len(manifest.shards) + again.size
 
     def note() -> None:

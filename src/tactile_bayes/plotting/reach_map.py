@@ -10,6 +10,7 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_whole_number
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.plotting.axes import single_axes
 from tactile_bayes.plotting.legends import legend_entry
 from tactile_bayes.plotting.maps import draw_pivot, finish_map, outline
@@ -181,8 +182,8 @@ def _draw(
     lowest = float(pivots[:, 1].min()) - _BELOW * length
     for above, (label, contours, colour) in enumerate(layers):
         style: dict[str, Any] = {"color": colour, "linewidth": _THIN}
-        count, zorder = contours.shape[0], 1.5 + 0.5 * above
-        for i in np.unique(np.linspace(0, count - 1, min(most, count)).astype(np.intp)):
+        zorder = 1.5 + 0.5 * above
+        for i in evenly_spread(contours.shape[0], most):
             x, y = outline(contours.take(i), *span)
             ax.plot(x, y, alpha=0.2, zorder=zorder, **style)
             for pivot in pivots:

@@ -15,6 +15,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.result import contour_draws
 from tactile_bayes.numerics.blocks import blocks
+from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 __all__ = ["contour_band", "contour_heights", "contours_drawn", "grid_points", "length_unit"]
@@ -98,8 +99,7 @@ def contour_heights(posterior: xr.DataTree, x: Floats, most: int = _DRAWS) -> Fl
 def contours_drawn(posterior: xr.DataTree, most: int = _DRAWS) -> Contour:
     """Up to `most` contours, evenly picked from the posterior's draws."""
     draws = contour_draws(posterior).stack(every=("chain", "draw"), create_index=False)
-    count = draws.sizes["every"]
-    picked = draws.isel(every=np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp)))
+    picked = draws.isel(every=evenly_spread(draws.sizes["every"], most))
     return contours_of(picked, posterior.attrs["family"])
 
 

@@ -21,6 +21,7 @@ from tactile_bayes.inference.result import contour_draws, posterior_draws, recor
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
+from tactile_bayes.numerics.selection import evenly_spread
 from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
 from tactile_bayes.sweep import to_lab_frame
 
@@ -100,9 +101,8 @@ def implied_contacts(posterior: xr.DataTree, *, draws: int = 250) -> xr.DataTree
     check_whole_number("draws", draws, 1, "give a whole number from 1 up, of draws of each chain")
     record = _checked_record(posterior)
     every = posterior_draws(posterior)
-    count = every.sizes["draw"]
     # `infer_contour` picks the draws of which it keeps events and predictions by the same rule.
-    picked = every.isel(draw=np.unique(np.linspace(0, count - 1, min(count, draws)).astype(int)))
+    picked = every.isel(draw=evenly_spread(every.sizes["draw"], draws))
     variables = _implied(posterior, record, picked)
     tangential, has = variables["tangential"], np.isfinite(variables["tangential"])
     share, tangential_count = has.mean(axis=(0, 1)), np.nansum(tangential, axis=(0, 1))
