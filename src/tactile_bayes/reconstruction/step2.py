@@ -23,6 +23,7 @@ from tactile_bayes.reconstruction.raw import raw_estimate
 from tactile_bayes.reconstruction.samples import Samples, samples_of
 from tactile_bayes.reconstruction.sides import OTHER_SIDE, side_of, sides_and_doubts, with_sides
 from tactile_bayes.record import CHANNELS, COLUMNS, present_channels, validate, with_rod
+from tactile_bayes.record.schema import column_attributes
 
 __all__ = ["AXIAL_ALARM", "reconstruct"]
 
@@ -230,8 +231,8 @@ def _variables(estimate: Estimate, samples: Samples, measured: xr.Dataset) -> di
     def column(values: object, unit: str, long_name: str) -> tuple[str, object, object]:
         return "sample", values, {"units": unit, "long_name": long_name}
 
-    variables = {
-        name: column(values, COLUMNS[name].unit_in(units), COLUMNS[name].long_name) for name, values in columns.items()
+    variables: dict[str, tuple[str, object, object]] = {
+        name: ("sample", values, column_attributes(name, units)) for name, values in columns.items()
     }
     variables["contact_phase"] = column(np.array(PHASE_NAMES).take(estimate.phase), "1", "phase of the contact")
     variables["status"] = column(np.array(STATUSES).take(estimate.status), "1", "what became of the sample")

@@ -27,6 +27,7 @@ __all__ = [
     "Frame",
     "Kind",
     "Scale",
+    "column_attributes",
     "column_of",
     "present_channels",
     "same_unit",
@@ -192,6 +193,11 @@ def column_of(name: str) -> Column | None:
         return known
     turning_name = known.turning_name and f"true {known.turning_name}"
     return replace(known, name=name, long_name=f"true {known.long_name}", turning_name=turning_name)
+
+
+def column_attributes(name: str, units: str) -> dict[str, str]:
+    """Return the attributes of a column of `COLUMNS` among data of the given units, "SI" or "dimensionless"."""
+    return {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name}
 
 
 def same_unit(one: str, other: str) -> bool:

@@ -20,7 +20,8 @@ from tactile_bayes.mechanics.elastica import wrench_from_contact
 from tactile_bayes.mechanics.paths import Paths, States
 from tactile_bayes.mechanics.phases import NONE, PHASE_NAMES
 from tactile_bayes.mechanics.rod import LARGEST_STRAIN, Rod
-from tactile_bayes.record import COLUMNS, make_record
+from tactile_bayes.record import make_record
+from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep.events import SweepEvents, events_of
 from tactile_bayes.sweep.lab_frame import to_lab_frame
 from tactile_bayes.sweep.path import Direction, friction_angle_of, sweep_paths, to_sweep_frame
@@ -124,24 +125,24 @@ def equilibria(
     pivots = check_pivots("base", base)
     if len(pivots) > 1:
         raise ParameterError(f"base is {base!r}: equilibria takes one pivot (x, y), only scan several")
-    units = Rod() if rod is None else rod
-    sweep_frame = to_sweep_frame(contour, pivots[0], direction, units)
+    rod = Rod() if rod is None else rod
+    sweep_frame = to_sweep_frame(contour, pivots[0], direction, rod)
     index = np.zeros(alpha.size, dtype=np.intp)
     parameter = (-1.0 if sweep_frame.mirrored[0] else 1.0) * contour.parameter_of_slope(alpha)
     locus = sweep_frame.locate(index, parameter)
     wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, friction_angle_of(friction))
     states = States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
-    columns = to_lab_frame(sweep_frame, index, states, units)
+    columns = to_lab_frame(sweep_frame, index, states, rod)
     reached = wrench.phase != NONE
     columns["contact_phase"] = np.array(PHASE_NAMES)[wrench.phase]
-    data = {}
+    data, units = {}, "dimensionless" if rod.is_dimensionless else "SI"
     for name, values in columns.items():
         if name == "slope_angle":
             continue
         if name != "contact_phase":
             values = np.where(reached, values, np.nan)
-        data[name] = ("slope_angle", values, _attributes(name, rod))
-    return xr.Dataset(data, coords={"slope_angle": ("slope_angle", alpha, _attributes("slope_angle", rod))})
+        data[name] = ("slope_angle", values, column_attributes(name, units))
+    return xr.Dataset(data, coords={"slope_angle": ("slope_angle", alpha, column_attributes("slope_angle", units))})
 
 
 def scan(
@@ -301,9 +302,3 @@ def _sweep(
     for name in ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle", "contact_phase"):
         sweep[f"truth_{name}"] = columns[name]
     return sweep
-
-
-def _attributes(name: str, rod: Rod | None) -> dict[str, str]:
-    column = COLUMNS[name]
-    units = "dimensionless" if rod is None or rod.is_dimensionless else "SI"
-    return {"units": column.unit_in(units), "long_name": column.long_name}

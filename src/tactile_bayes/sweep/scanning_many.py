@@ -15,7 +15,7 @@ from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.record import COLUMNS
+from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep.columns import ManyUnits, phases_of, sweep_events, sweep_samples
 from tactile_bayes.sweep.path import friction_angle_of
 
@@ -110,8 +110,7 @@ def scan_many(
     system = "dimensionless" if rod.is_dimensionless else "SI"
 
     def labelled(dims: Any, values: NDArray[Any], name: str) -> tuple[Any, NDArray[Any], dict[str, str]]:
-        column = COLUMNS[name]
-        return dims, values, {"units": column.unit_in(system), "long_name": column.long_name}
+        return dims, values, column_attributes(name, system)
 
     both = ("contour", "sample")
     samples = sweep_samples(paths, units, np.arange(count))

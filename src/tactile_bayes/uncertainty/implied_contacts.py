@@ -22,7 +22,8 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.phases import TANGENTIAL
 from tactile_bayes.numerics.selection import evenly_spread
-from tactile_bayes.record import CHANNELS, COLUMNS, record_hash, rod_of, validate
+from tactile_bayes.record import CHANNELS, record_hash, rod_of, validate
+from tactile_bayes.record.schema import column_attributes
 from tactile_bayes.sweep import to_lab_frame
 
 __all__ = ["contacts_of", "implied_contacts"]
@@ -206,4 +207,4 @@ def _attributes(name: str, units: str) -> dict[str, str]:
         return {"units": "1", "long_name": "whether the contact is tangential"}
     if name == "drive_angle":
         return {"units": "rad", "long_name": "drive angle"}
-    return {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name}
+    return column_attributes(name, units)

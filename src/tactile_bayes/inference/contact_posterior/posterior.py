@@ -34,7 +34,8 @@ from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct, samples_of
-from tactile_bayes.record import CHANNELS, COLUMNS, frame_of, record_hash, validate, with_rod
+from tactile_bayes.record import CHANNELS, frame_of, record_hash, validate, with_rod
+from tactile_bayes.record.schema import column_attributes
 
 __all__ = ["infer_contacts"]
 
@@ -228,11 +229,7 @@ def _groups(
         return spread
 
     variables: dict[str, Any] = {
-        name: (
-            dims,
-            everywhere(values),
-            {"units": COLUMNS[name].unit_in(units), "long_name": COLUMNS[name].long_name},
-        )
+        name: (dims, everywhere(values), column_attributes(name, units))
         for name, values in zip(PLACE, places, strict=True)
     }
     if density.has_free_angle:
