@@ -103,24 +103,17 @@ def _reservations(found: xr.Dataset) -> Iterator[str]:
 
 def _table(found: xr.Dataset) -> Table:
     """Return a table of at most 80 columns; the files hold the errors of the evidence."""
+    from tactile_bayes.report.wording import chance
+
     left_out = "elpd" in found
     rows = []
     for row in columns_of(found, "family"):
-        cells = [_share(row["probability"]), _fixed(row["log_evidence"])]
+        cells = [chance(row["probability"]), _fixed(row["log_evidence"])]
         if left_out:
-            cells += [_with_error(row["elpd_difference"], row["elpd_difference_error"]), _share(row["weight"])]
-        rows.append([row["family"], *cells, _share(row["p_value"]), "yes" if row["fits"] else "no"])
+            cells += [_with_error(row["elpd_difference"], row["elpd_difference_error"]), chance(row["weight"])]
+        rows.append([row["family"], *cells, chance(row["p_value"]), "yes" if row["fits"] else "no"])
     heads = ["family", "probability", "log evid.", *(["elpd diff.", "weight"] if left_out else []), "check p", "fits"]
     return table_of(heads, rows, left=["family", "fits"])
-
-
-def _share(value: float) -> str:
-    """Return a probability to three decimals; only exact 0 and 1 are written so."""
-    if value != value:
-        return "–"
-    if 0.0 < value < 1.0:
-        return "<0.001" if value < 0.001 else ">0.999" if value > 0.999 else f"{value:.3f}"
-    return f"{value:g}"
 
 
 def _fixed(value: float) -> str:
