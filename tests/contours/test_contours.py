@@ -30,6 +30,13 @@ EPS = np.finfo(float).eps
 STEEPEST = 1.5
 """Endless contours are tried up to here: there the tangent is 14, and heights have lost a digit."""
 
+RATES = (
+    lambda at: at.arclength_rate * np.cos(at.slope_angle),
+    lambda at: at.arclength_rate * np.sin(at.slope_angle),
+    lambda at: at.slope_rate,
+)
+"""Of x, y and the slope angle."""
+
 FEW = settings(
     max_examples=settings.default.max_examples // 3,
     deadline=None,
@@ -116,12 +123,7 @@ def test_the_rates_add_up_to_the_locus(family, data):
     here = contour.locate(stops)
     assert np.all(here.arclength_rate >= 0.0)
     assert np.all(here.slope_rate >= 0.0)
-    rates = (
-        lambda at: at.arclength_rate * np.cos(at.slope_angle),
-        lambda at: at.arclength_rate * np.sin(at.slope_angle),
-        lambda at: at.slope_rate,
-    )
-    for rate, value in zip(rates, here[:3], strict=True):
+    for rate, value in zip(RATES, here[:3], strict=True):
         integral, off = integrals(lambda p, rate=rate: rate(contour.locate(p)), stops)
         slack = 64 * EPS * (size_of(contour) + np.pi + here.arclength_rate.max())
         assert np.all(np.abs(integral - np.diff(value)) <= off + slack)
@@ -484,12 +486,7 @@ def test_in_the_sweep_frame(family, mirror, data):
     assert np.all(np.abs(locus.x - side * (u - base[0]) / length) <= rounding)
     assert np.all(np.abs(locus.y - (v - base[1]) / length) <= rounding)
     np.testing.assert_array_equal(locus.slope_angle, side * here.slope_angle)
-    rates = (
-        lambda at: at.arclength_rate * np.cos(at.slope_angle),
-        lambda at: at.arclength_rate * np.sin(at.slope_angle),
-        lambda at: at.slope_rate,
-    )
-    for rate, value in zip(rates, locus[:3], strict=True):
+    for rate, value in zip(RATES, locus[:3], strict=True):
         integral, off = integrals(
             lambda p, rate=rate: rate(sweep_frame.locate(np.zeros(p.shape, dtype=np.intp), p)), stops
         )

@@ -109,6 +109,8 @@ def graph(g, slope, curvature, **members):
     return dataclass(frozen=True, eq=False)(family)
 
 
+PARABOLA = (lambda x, k: k * x**2, lambda x, k: 2 * k * x, lambda x, k: 2 * k)
+
 WRONG = {
     "a wave": (
         graph(lambda x, k: k + np.sin(x), lambda x, k: np.cos(x), lambda x, k: -np.sin(x)),
@@ -147,39 +149,19 @@ WRONG = {
         "arrays",
     ),
     "a domain upside down": (
-        graph(
-            lambda x, k: k * x**2,
-            lambda x, k: 2 * k * x,
-            lambda x, k: 2 * k,
-            domain=property(lambda self: (np.asarray(1.0), np.asarray(-1.0))),
-        ),
+        graph(*PARABOLA, domain=property(lambda self: (np.asarray(1.0), np.asarray(-1.0)))),
         "domain",
     ),
     "another height": (
-        graph(
-            lambda x, k: k * x**2,
-            lambda x, k: 2 * k * x,
-            lambda x, k: 2 * k,
-            height=lambda self, x: self.k * np.asarray(x),
-        ),
+        graph(*PARABOLA, height=lambda self, x: self.k * np.asarray(x)),
         r"height .* at x = ",
     ),
     "another slope": (
-        graph(
-            lambda x, k: k * x**2,
-            lambda x, k: 2 * k * x,
-            lambda x, k: 2 * k,
-            parameter_of_slope=lambda self, slope_angle: np.tan(slope_angle) / self.k,
-        ),
+        graph(*PARABOLA, parameter_of_slope=lambda self, slope_angle: np.tan(slope_angle) / self.k),
         r"parameter_of_slope .* at x = ",
     ),
     "other contours": (
-        graph(
-            lambda x, k: k * x**2,
-            lambda x, k: 2 * k * x,
-            lambda x, k: 2 * k,
-            broadcast_to=lambda self, shape: type(self)(np.full(shape, 0.4)),
-        ),
+        graph(*PARABOLA, broadcast_to=lambda self, shape: type(self)(np.full(shape, 0.4))),
         r"broadcast_to .* y = ",
     ),
 }

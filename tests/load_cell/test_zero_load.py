@@ -50,6 +50,15 @@ def loaded_of(record, sweep):
     return int(loaded[0]), int(loaded[-1])
 
 
+def assert_bracketed(found, ideal):
+    """Onset and snap-off of both sweeps lie between the samples that are found."""
+    for sweep in (0, 1):
+        first, last = loaded_of(ideal, sweep)
+        before, after = found.onset.values[sweep]
+        assert before < first <= after
+        assert found.snap_off.values[sweep].tolist() == [last, last + 1]
+
+
 # --- Contact that is not there ------------------------------------------------------------------------------------
 
 
@@ -136,13 +145,9 @@ def test_events_of_real_sweeps_are_bracketed(contour, step, noise):
     measured = cell.measure(ideal, seed=3)
     found = zero_load(measured)
     assert found.contact.all()
-    for sweep in (0, 1):
-        first, last = loaded_of(ideal, sweep)
-        before, after = found.onset.values[sweep]
-        assert before < first <= after
-        assert found.snap_off.values[sweep].tolist() == [last, last + 1]
-        angles = found.snap_off_drive_angle.values[sweep]
-        np.testing.assert_array_equal(angles, measured.drive_angle.values[[last, last + 1]])
+    assert_bracketed(found, ideal)
+    angles = measured.drive_angle.values[found.snap_off.values]
+    np.testing.assert_array_equal(found.snap_off_drive_angle.values, angles)
     assert not (found.unloaded.values & (ideal.truth_contact_phase.values != "none")).any()
     # 3 channels in 54 records: beyond 6 standard errors (Student's t, 20 degrees of freedom) once in 1000 runs.
     assert (abs(found.bias - bias) < 6.0 * found.bias_uncertainty).all()
@@ -286,11 +291,7 @@ def test_steps_are_seen_and_bound_what_is_known(noise):
     assert (found.noise >= step / np.sqrt(12.0) * (1.0 - 1e-9)).all()
     assert (found.noise < 1.5 * np.hypot(noise, step / np.sqrt(12.0)) + 0.5 * step * (noise < step)).all()
     assert (abs(found.bias - bias) < 5.0 * found.bias_uncertainty).all()
-    for sweep in (0, 1):
-        first, last = loaded_of(ideal, sweep)
-        before, after = found.onset.values[sweep]
-        assert before < first <= after
-        assert found.snap_off.values[sweep].tolist() == [last, last + 1]
+    assert_bracketed(found, ideal)
 
 
 def test_steps_alone_make_no_contact():
