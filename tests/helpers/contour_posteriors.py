@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -53,6 +54,14 @@ def without(record: xr.Dataset, *names: str) -> xr.Dataset:
         else:
             del record.attrs[name]
     return record.drop_vars([name for name in record.data_vars if str(name).startswith("truth_")])
+
+
+def tree(family: str, *, units: str = "dimensionless", **values: Any) -> xr.DataTree:
+    """A posterior that holds these draws of the family's parameters, and nothing else."""
+    draws = {name: (("chain", "draw"), np.atleast_2d(v)) for name, v in values.items()}
+    out = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
+    out.attrs = {"family": family, "units": units}
+    return out
 
 
 @cache

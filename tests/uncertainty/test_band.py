@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from helpers.contour_posteriors import posterior
+from helpers.contour_posteriors import posterior, tree
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ParameterError
@@ -16,13 +15,6 @@ from tactile_bayes.uncertainty.band import contour_band, contour_heights, contou
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
 X = np.linspace(-0.8, 0.8, 41)
-
-
-def tree(family, *, units="dimensionless", **values):
-    draws = {name: (("chain", "draw"), np.atleast_2d(v)) for name, v in values.items()}
-    out = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
-    out.attrs = {"family": family, "units": units}
-    return out
 
 
 def made(size=3000):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import xarray as xr
 
+from helpers.contour_posteriors import tree
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
 from tactile_bayes.contours.families import FAMILIES, FLANKS
@@ -14,13 +14,6 @@ from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.normal_band import normal_band, normal_offsets
 
 X = np.linspace(-0.4, 0.4, 33)
-
-
-def tree(family, *, units="dimensionless", **values):
-    draws = {name: (("chain", "draw"), np.atleast_2d(v)) for name, v in values.items()}
-    out = xr.DataTree.from_dict({"posterior": xr.Dataset(draws)})
-    out.attrs = {"family": family, "units": units}
-    return out
 
 
 def spread(family, size=200, share=0.02):
