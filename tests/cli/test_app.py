@@ -19,7 +19,6 @@ from tactile_bayes import __version__, read_record
 from tactile_bayes.cli.sampling_bar import remaining_seconds
 from tactile_bayes.inference.contour import infer_contour
 from tactile_bayes.inference.ensembles import Progress
-from tactile_bayes.record import write_record
 from tactile_bayes.runs import contour as contour_run
 from tactile_bayes.runs.demonstration import LOAD_CELL, ROD
 
@@ -38,13 +37,6 @@ def start(*arguments, code=0, cwd=None):
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done.stdout, done.stderr
-
-
-@pytest.fixture(scope="session")
-def record(measured, tmp_path_factory):
-    path = tmp_path_factory.mktemp("record") / "record.csv"
-    write_record(measured, path)
-    return path
 
 
 @pytest.fixture(scope="session")

@@ -12,19 +12,11 @@ from helpers.commands import assert_misused, assert_refused, call
 from helpers.comparisons import NAMES, made_up
 from helpers.interrupts import interrupted_while_sampling
 from tactile_bayes.inference.ensembles import Progress
-from tactile_bayes.record import write_record
 from tactile_bayes.runs import comparison as comparison_run
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 FILES = {"comparison.nc", "comparison.csv", "families.png"}
-
-
-@pytest.fixture(scope="module")
-def record(measured, tmp_path_factory):
-    path = tmp_path_factory.mktemp("record") / "record.csv"
-    write_record(measured, path)
-    return path
 
 
 @pytest.fixture(scope="module")

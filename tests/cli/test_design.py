@@ -61,10 +61,7 @@ def test_json_for_scripts(tmp_path):
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
-    result = run("--out", tmp_path / "out", *wrong)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert "Traceback" not in result.output
+    commands.assert_refused(run("--out", tmp_path / "out", *wrong), message)
     assert not (tmp_path / "out").exists()
 
 

@@ -265,6 +265,12 @@ def test_a_method_that_is_none(rig, tmp_path):
 # --- From a rig's file to a contour -----------------------------------------------------------------------------------
 
 
+def named_command(inspected, tmp_path):
+    """The words of the command that inspect names, with a folder of the test."""
+    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
+    return [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
+
+
 def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured(inspected, tmp_path, monkeypatch):
     """In SI, with signs and sweeps; what comes of it is below."""
     asked = []
@@ -274,9 +280,7 @@ def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured
         raise tb.errors.InferenceError("that is enough")
 
     monkeypatch.setattr("tactile_bayes.runs.contour.analyse", analyse)
-    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
-    words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
-    assert_refused(call(*words), "that is enough")
+    assert_refused(call(*named_command(inspected, tmp_path)), "that is enough")
     ((measured, out, options),) = asked
     expected = record_of_rig()
     for name in ("drive_angle", *CHANNELS):
@@ -291,9 +295,7 @@ def test_the_command_that_inspect_names_infers_from_the_record_that_was_measured
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_the_command_that_inspect_names_infers_the_contour(inspected, tmp_path):
-    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
-    words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
-    answer = json.loads(call(*words, "--json").stdout)
+    answer = json.loads(call(*named_command(inspected, tmp_path), "--json").stdout)
     rows = {row["quantity"]: row for row in answer["quantities"]}
     assert rows["q"]["median"] == pytest.approx(0.1, abs=2e-3)
     assert rows["force_x_bias"]["median"] == pytest.approx(4e-3, abs=2e-3)
@@ -303,9 +305,7 @@ def test_the_command_that_inspect_names_infers_the_contour(inspected, tmp_path):
 @pytest.mark.slow
 def test_a_laboratorys_path_ends_at_the_truth(inspected, tmp_path):
     """At full length: each interval of 95 % holds the truth, up to half its width."""
-    last = inspected[0].stdout.splitlines()[-1].removeprefix("Next: tactile-bayes ")
-    words = [str(tmp_path / "run") if word == "run/" else word for word in shlex.split(last)]
-    answer = json.loads(call(*words, "--json").stdout)
+    answer = json.loads(call(*named_command(inspected, tmp_path), "--json").stdout)
     assert answer["converged"] is True
     rows = {row["quantity"]: row for row in answer["quantities"]}
     for name, truth in {"a": 2.5, "q": 0.1, "x_c": 0.0, "force_x_bias": 4e-3}.items():
