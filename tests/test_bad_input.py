@@ -84,7 +84,7 @@ MISTAKES = {
         lambda rows: (NAMES, mapped(rows, "direction", lambda cell: "forward")),
         ["sweep 1", "'forward'", "decreases"],
     ),
-    "two strokes in one sweep": (
+    "two segments in one sweep": (
         lambda rows: (NAMES, mapped(rows, "sweep", lambda cell: "0")),
         ["sweep 0", "'direction'", f"'forward' (line {FIRST_ROW})", "'backward' (line"],
     ),

@@ -26,7 +26,7 @@ _HOMES = {
     "RandomWalk": "load_cell",
     "Rod": "mechanics.rod",
     "SamplerSettings": "inference.ensembles",
-    "World": "calibration.world",
+    "World": "calibration.misspecification",
     "calibrate": "calibration.calibrate",
     "calibration_replicate": "calibration.calibrate",
     "check_record": "diagnostics.record_check",
@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from tactile_bayes import plotting as plotting
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
     from tactile_bayes.calibration.calibrate import calibration_replicate as calibration_replicate
-    from tactile_bayes.calibration.world import World as World
+    from tactile_bayes.calibration.misspecification import World as World
     from tactile_bayes.comparison.families import compare_families as compare_families
     from tactile_bayes.diagnostics.inspection import inspect_record as inspect_record
     from tactile_bayes.diagnostics.record_check import check_record as check_record

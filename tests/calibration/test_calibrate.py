@@ -19,9 +19,9 @@ from helpers.refusals import refused
 from helpers.replicates import STAGES, failing
 from helpers.tasks import wait_until
 from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate, experiment_of
-from tactile_bayes.calibration.ledger import REPLICATES
+from tactile_bayes.calibration.misspecification import World
 from tactile_bayes.calibration.replicate import Outcome
-from tactile_bayes.calibration.world import World
+from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.errors import CalibrationError, ParameterError
 from tactile_bayes.inference.contour import sampled
 from tactile_bayes.inference.ensembles import SamplerSettings, moves
@@ -406,7 +406,7 @@ def test_the_same_in_other_words_is_the_same(noted, tmp_path, same):
 
 def test_what_an_experiment_is_follows_from_its_words():
     """Defaults and the same written out."""
-    words = experiment_of(seed=1, nuisances=[]).words
+    words = experiment_of(seed=1, nuisances=[]).identity
     written_out = {
         "load_cell": LoadCell(force_noise=0.05, moment_noise=0.02),
         "drive_angles": np.radians(np.arange(-30.0, 211.0, 2.0))[::-1],
@@ -418,7 +418,7 @@ def test_what_an_experiment_is_follows_from_its_words():
         ),
         "world": World(),
     }
-    assert experiment_of(seed=1, **written_out).words == words
+    assert experiment_of(seed=1, **written_out).identity == words
     assert all(isinstance(said, str) for said in words.values())
 
 

@@ -12,8 +12,8 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.calibration import simulation
 from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.misspecification import World
 from tactile_bayes.calibration.simulation import simulate
-from tactile_bayes.calibration.world import World
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ReachError
 from tactile_bayes.load_cell import LoadCell
@@ -225,7 +225,7 @@ def test_contours_of_another_family():
 def test_events_are_those_of_a_scan(friction):
     made = simulated(world=World(friction=friction))
     scan = scanned(made, friction=friction)
-    for stroke, direction in enumerate(("forward", "backward")):
+    for segment, direction in enumerate(("forward", "backward")):
         sweep = scan.events[direction]
         for label, event in (("first", sweep.first_contact), ("snap_off", sweep.snap_off)):
             for mine, theirs in (
@@ -233,7 +233,7 @@ def test_events_are_those_of_a_scan(friction):
                 (f"{label}_contact_x", event.contact_x),
                 (f"{label}_contact_y", event.contact_y),
             ):
-                np.testing.assert_allclose(made.events[mine][stroke], theirs, atol=1e-7, err_msg=mine)
+                np.testing.assert_allclose(made.events[mine][segment], theirs, atol=1e-7, err_msg=mine)
 
 
 # ---- the load cell

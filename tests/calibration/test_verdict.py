@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_bayes.calibration.ranks import NoticedRanks
-from tactile_bayes.calibration.verdict import Tally, conclusion, lost_in_words, power_in_words, statement
+from tactile_bayes.calibration.verdict import Tally, conclusion, lost_message, power_message, statement
 
 NOTHING = NoticedRanks(np.nan, np.nan, np.nan)
 
@@ -64,24 +64,24 @@ def test_statements(concluded, tally, said):
 
 
 def test_lost_ones_in_words():
-    assert lost_in_words({3: "ValueError: a: b"}) == (
+    assert lost_message({3: "ValueError: a: b"}) == (
         "1 lost, and counted as not holding: 3 (ValueError). To see why, add --replicate 3 --debug to the command, or "
         "call calibration_replicate(3, …) with the options of calibrate."
     )
     many = {number: "ReachError: x" if number % 2 else "KeyError: 'x'" for number in range(4, 10)}
-    assert lost_in_words(many).startswith(
+    assert lost_message(many).startswith(
         "6 lost, and counted as not holding: 4, 5, 6, 7, 8, … (KeyError, ReachError). To see why, add --replicate 4 "
     )
 
 
-def test_power_in_words():
-    assert power_in_words(0.9, 0.7694, 0.9844, NoticedRanks(0.391, 1.433, 1.521)) == (
+def test_power_message():
+    assert power_message(0.9, 0.7694, 0.9844, NoticedRanks(0.391, 1.433, 1.521)) == (
         "What would have been noticed with a probability of 90%: coverage of at most 76.9% or at least 98.4% in place "
         "of 90%, posteriors off by 0.39 standard deviations, too narrow by a factor of 1.43, too wide by a factor of "
         "1.52."
     )
-    without = power_in_words(0.9, 0.43, np.nan, NOTHING)
+    without = power_message(0.9, 0.43, np.nan, NOTHING)
     assert without.endswith("90%: coverage of at most 43.0% in place of 90%.")
-    assert power_in_words(0.9, np.nan, np.nan, NOTHING._replace(shift=1.2)).endswith(
+    assert power_message(0.9, np.nan, np.nan, NOTHING._replace(shift=1.2)).endswith(
         "90%: posteriors off by 1.2 standard deviations."
     )

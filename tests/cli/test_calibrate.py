@@ -12,8 +12,8 @@ import typer
 import xarray as xr
 
 from helpers import commands
-from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
+from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.cli.interrupts import resumable
 
 making = importlib.import_module("tactile_bayes.calibration.replicate")
@@ -77,7 +77,7 @@ def test_another_experiment_is_refused(done):
     assert "holds replicates of another experiment: seed is 1 there and 2 here" in result.stderr
 
 
-def test_a_world_is_told_and_kept(tmp_path, monkeypatch):
+def test_a_misspecification_is_passed_on_and_kept(tmp_path, monkeypatch):
     made = []
 
     def replicate(task):

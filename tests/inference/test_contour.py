@@ -159,8 +159,8 @@ def test_events_are_those_of_the_drawn_contours():
     draw = result["posterior"].to_dataset().sel(draw=result["events"].draw).isel(chain=0, draw=3)
     contour = Parabola(*(float(draw[name]) for name in TRUTH))
     events = scan(contour).events
-    for stroke, direction in enumerate(("forward", "backward")):
-        found = result["events"].isel(chain=0, draw=3, stroke=stroke)
+    for segment, direction in enumerate(("forward", "backward")):
+        found = result["events"].isel(chain=0, draw=3, stroke=segment)
         for label, event in (("first", events[direction].first_contact), ("snap_off", events[direction].snap_off)):
             for name in ("drive_angle", "contact_x", "contact_y"):
                 off = 1e-6 if name == "drive_angle" else 1e-5

@@ -303,9 +303,9 @@ def exact_sensed(model, point):
     """What the cell senses of one point, (1, samples, 3), from states at the drive angles to rounding."""
     likelihood, rig = model.likelihood, model.rig(point)
     paths = likelihood.paths(model.contours(point), rig)
-    stroke = likelihood.stroke_of_sample
-    signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.strokes])[stroke]
-    found = paths.states(stroke, likelihood.seen_angles - signs * likelihood.misread(rig)[0]).wrench
+    segment = likelihood.segment_of_sample
+    signs = np.array([-1.0 if each.backward else 1.0 for each in likelihood.segments])[segment]
+    found = paths.states(segment, likelihood.angles_in_sweep_frame - signs * likelihood.misread(rig)[0]).wrench
     loads = np.stack([signs * found.holding_moment, signs * found.force_x, found.force_y], axis=-1)
     scaled = np.atleast_1d(rig.rigidity_scale)[:, None, None] * np.nan_to_num(loads)[None]
     return model.nuisances.sensed(scaled, model.values(point), likelihood.load_cell)

@@ -54,8 +54,8 @@ def model_of(measured, nuisances, cell=CELL, exact=True):
 
 def information(model):
     """Fisher's, over contour and nuisances, with the normal priors' own for the latter; noise is known."""
-    point = np.array([(TRUTH | STATED)[name] for name in model.located])
-    kinked = [name in ("friction", "suspension_compliance") for name in model.located]  # no less than zero
+    point = np.array([(TRUTH | STATED)[name] for name in model.forward_parameters])
+    kinked = [name in ("friction", "suspension_compliance") for name in model.forward_parameters]  # no less than zero
     steps = 1e-5 * np.eye(point.size)
     ahead = model.loads(point + steps)
     behind = model.loads(point - np.where(kinked, 0.0, 1.0)[:, None] * steps)
@@ -65,7 +65,7 @@ def information(model):
     events = np.abs(ahead - behind).max(axis=(0, 2)) > 1e-3
     slopes = (slopes / noise)[:, ~events][..., model.present].reshape(point.size, -1)
     found = slopes @ slopes.T
-    for i, name in enumerate(model.located):
+    for i, name in enumerate(model.forward_parameters):
         if name in STATED:
             found[i, i] += (
                 1.0 / model.priors[name].var() if not kinked[i] else 1.0 / model.priors[name].kwds["scale"] ** 2
@@ -151,7 +151,7 @@ def test_a_lever_and_a_backlash_may_be_known_or_inferred_or_both(exact, frame):
         left = {"lever_x": 0.03, "lever_y": -0.02, "backlash": 0.02}
         point = {**TRUTH, **{name: (1.0 - known) * value for name, value in left.items()}}
         points = np.array(
-            [[{**point, "moment_gain": factor}[name] for name in model.located] for factor in (1.0, 1.02)]
+            [[{**point, "moment_gain": factor}[name] for name in model.forward_parameters] for factor in (1.0, 1.02)]
         )
         read = model.likelihood.load_cell.expected(model.loads(points[:1]))[0]
         off = np.abs(read - model.likelihood.measured).max(axis=1)

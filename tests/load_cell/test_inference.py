@@ -109,7 +109,7 @@ def test_an_encoder_that_is_not_exact_beside_a_drift_is_refused():
 
 
 def test_a_drift_goes_on_through_all_sweeps():
-    """The likelihood of a record is that of its samples in their order, whatever the strokes."""
+    """The likelihood of a record is that of its samples in their order, whatever the sweep segments."""
     record = cell(drift=WALK).measure(swept(Parabola(**TRUTH), step=0.1), seed=1)
     likelihood = RecordLikelihood(record, cell(drift=WALK))
     contour = Parabola(*(np.array([value]) for value in TRUTH.values()))

@@ -98,7 +98,7 @@ def test_events_are_the_exact_ones(friction):
     likelihood = likelihood_of(THIN, is_always_clear=False)
     *_, usable, events = likelihood.predict_with_events(contours, rig)
     *_, expected = likelihood_of(THIN, is_always_clear=False, exact=True).predict_with_events(contours, rig)
-    assert events.shape == (contours.shape[0], len(likelihood.strokes), 2)
+    assert events.shape == (contours.shape[0], len(likelihood.segments), 2)
     assert np.count_nonzero(usable) > 30
     off = np.abs(events - expected)[usable]
     assert np.quantile(off, 0.99) < 1e-6

@@ -99,8 +99,8 @@ def test_a_map_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 )
 def test_the_folder_of_another_study_is_refused(tmp_path_factory, other):
     folder = tmp_path_factory.mktemp("study")
-    with module.open_results_store(module._words(task_of(SMALL)), folder, CELLS) as ledger:
-        ledger.outcomes[0] = CellOutcome({"gap_width": 0.1}, "ok")
+    with module.open_results_store(module._identity(task_of(SMALL)), folder, CELLS) as store:
+        store.outcomes[0] = CellOutcome({"gap_width": 0.1}, "ok")
     before = (folder / "cells.json").read_bytes()
     with refused(StudyError, "another experiment", "there", "here"):
         error_map(**{**SMALL, **other}, out=folder)
@@ -111,7 +111,7 @@ def task_of(options):
     """What a study is made from, without making it."""
     kept = {}
 
-    def keep(ledger, function, task, count, **others):
+    def keep(store, function, task, count, **others):
         kept["task"] = task
         return {number: CellOutcome({}, "not made") for number in range(count)}
 
@@ -123,10 +123,10 @@ def task_of(options):
 
 def test_an_outcome_comes_back_from_its_row(tmp_path):
     outcome = CellOutcome({"gap_width": 0.1 + 0.2, "posterior_gap_width": np.nan}, "ok")
-    with module.open_results_store({}, tmp_path, CELLS) as ledger:
-        ledger.outcomes[0] = outcome
-    with module.open_results_store({}, tmp_path, CELLS) as ledger:
-        back = ledger.outcomes[0]
+    with module.open_results_store({}, tmp_path, CELLS) as store:
+        store.outcomes[0] = outcome
+    with module.open_results_store({}, tmp_path, CELLS) as store:
+        back = store.outcomes[0]
     assert back.message == "ok"
     assert back.numbers["gap_width"] == 0.1 + 0.2
     assert np.isnan(back.numbers["posterior_gap_width"])

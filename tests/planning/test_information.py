@@ -51,7 +51,7 @@ def between(cell=CELL, nuisances=("rigidity_scale", "drive_angle_offset"), **opt
 
 
 def located(plan):
-    return plan.point[: len(plan.model.located)]
+    return plan.point[: len(plan.model.forward_parameters)]
 
 
 @cache
@@ -63,7 +63,7 @@ def swept(a, q, x_c, less, direction):
 
 def readings(plan, values, by_angle=0.0):
     """What the plan's cell would read, by `scan`: shape (samples, 3)."""
-    of = dict(zip(plan.model.located, map(float, values), strict=True))
+    of = dict(zip(plan.model.forward_parameters, map(float, values), strict=True))
     loads, angles = swept(of["a"], of["q"], of["x_c"], of.get("drive_angle_offset", 0.0) - by_angle, plan.direction)
     if plan.cell.frame == "turning":
         cos, sin = np.cos(angles), np.sin(angles)
@@ -141,7 +141,7 @@ def test_information_of_an_encoder_is_that_of_dense_algebra(name, encoder, frame
     right = sum(
         j.T @ np.linalg.inv(white + encoder**2 * np.outer(a, a)) @ j for j, a in zip(slopes, by_angle, strict=True)
     )
-    size = len(plan.model.located)
+    size = len(plan.model.forward_parameters)
     assert_matrices_agree(record_information(plan.model, plan.point).matrix[:size, :size], right, 1e-6)
 
 

@@ -120,7 +120,7 @@ def test_priors_that_are_given_are_those_of_the_model():
     prior = stats.norm(0.5, 0.01)
     plan = Plan(PROFILE, CELL, priors={"q": prior, "friction": stats.halfnorm(scale=0.1)}, nuisances=())
     assert plan.model.priors["q"] is prior
-    assert plan.model.located == ("a", "q", "x_c", "friction")
+    assert plan.model.forward_parameters == ("a", "q", "x_c", "friction")
 
 
 def test_noise_grows_by_a_factor_and_nothing_else():

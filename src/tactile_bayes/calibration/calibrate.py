@@ -1,4 +1,4 @@
-"""Simulation-based calibration: are posteriors right, over truths drawn from the prior?"""
+"""Simulation-based calibration: tests of posteriors against truths drawn from the prior."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from tactile_bayes.calibration.ledger import REPLICATES
+from tactile_bayes.calibration.misspecification import World
 from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
+from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.calibration.summary import summary
-from tactile_bayes.calibration.world import World
 from tactile_bayes.checks import (
     check_choice,
     check_number,
@@ -39,14 +39,14 @@ from tactile_bayes.tasks import ResultsStore, TaskProgress, keep_outcomes, open_
 __all__ = ["calibrate", "calibration_replicate", "experiment_of"]
 
 _ANGLES = np.arange(-30.0, 211.0, 2.0)
-"""Drive angles where none are given [degrees]: from before first contact to after snap-off in either direction."""
+"""Default drive angles [degrees], from before first contact to after snap-off in either direction."""
 
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
 _FEWEST_WALKERS, _MORE_WALKERS = 20, 2
-"""Walkers of an ensemble at least, and how many more than twice the parameters: few, as 200 draws are soon there."""
+"""Least number of walkers of an ensemble, and their excess over twice the parameters; few suffice for 200 draws."""
 
 _AGAIN = replace(_SETTINGS, max_steps=6000)
-"""Where that has not converged: as many walkers as `infer_contour` has, which learn the shape of a bent posterior."""
+"""Settings of a second run if the first has not converged; the walkers of `infer_contour` adapt to a bent posterior."""
 
 
 def calibrate(
@@ -71,55 +71,56 @@ def calibrate(
     scheduler: str | None = None,
     progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.Dataset:
-    """Show whether intervals hold: simulate records of truths that are drawn from the prior, infer, and compare.
+    """Test whether intervals hold: simulate records of truths drawn from the prior, infer, and compare.
 
     If a posterior is right, the rank of the truth among its draws is uniform, for every quantity (simulation-based
-    calibration: Talts et al. 2018, arXiv:1804.06788), and what is stated with 90 % probability holds in nine of ten
-    replicates. The other way round, ranks that are not uniform prove that sampler, likelihood or prior are wrong; and
-    with a `world` that differs from what inference assumes they show what becomes of the intervals there.
+    calibration: Talts et al. 2018, arXiv:1804.06788), and a statement with 90 % probability holds in nine of ten
+    replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong. With a
+    misspecification (`world`), the rig differs from what inference assumes, and the ranks show the effect on intervals.
 
-    An error in a replicate does not end the run: the replicate is lost, counts as one in which nothing holds, and is
-    made again, alone, by `calibration_replicate`. An interrupt ends the run.
+    An error in a replicate does not end the run: the replicate is lost and counts as one in which nothing holds;
+    `calibration_replicate` repeats it alone. An interrupt ends the run.
 
     Parameters
     ----------
     seed : int
-        The same seed, the same numbers, whatever the number of workers, but for the seconds.
+        Seed of all random numbers; the results, except the seconds, do not depend on the number of workers.
     family : str
         As in `infer_contour`.
     replicates : int
-        How many; each takes some two seconds on one core.
+        Number of replicates; each takes some two seconds on one core.
     load_cell : LoadCell, optional
-        That measures and that inference is told, with noise, in the record's units; by default force_noise 0.05 EI/L²
+        Load cell of simulation and inference, with noise, in the record's units; by default force_noise 0.05 EI/L²
         and moment_noise 0.02 EI/L.
     rod : Rod, optional
         By default the dimensionless rod.
     base : (float, float) or sequence of them
         Pivots, visited in turn [length].
     direction : {"both", "forward", "backward"}
+        Directions of the sweeps about each pivot.
     drive_angles : array_like, shape (n,), optional
-        As a perfect encoder reads them [rad], in every sweep; by default every 2° from −30° to 210°. They do not depend
-        on the contour, or they would tell of it.
+        Readings of a perfect encoder [rad], in every sweep; by default every 2° from −30° to 210°. They do not depend
+        on the contour, and so carry no information about it.
     priors, nuisances, friction, events
         As in `infer_contour`; truths are drawn from the same priors.
     settings : SamplerSettings, optional
-        By default 2 ensembles of 20 walkers, or two more than twice the parameters where these are many, until R̂ is
-        below 1.05 and 200 effective draws are there, five for every walker, in 500 steps at most; where they are
-        not, again with as many walkers as `infer_contour` has, in 6000 steps at most. Runs that end unconverged
-        stay in.
+        By default 2 ensembles of 20 walkers, or two more than twice the parameters if that is larger, until R̂ is
+        below 1.05 and the effective draws number 200, five for every walker, in 500 steps at most; if they do not
+        converge, a second run with as many walkers as `infer_contour` has, in 6000 steps at most. Runs that end
+        unconverged are counted.
     probability : float
-        Of the bands, regions and intervals that are judged.
+        Stated probability of the bands, regions and intervals, in (0, 1).
     world : World, optional
-        In what the world differs from what inference assumes.
+        Misspecification: differences between the simulated rig and what inference assumes.
     out : path-like, optional
-        Folder in which what is done is kept, in replicates.json: a run that was killed goes on, and one with more
-        replicates begins with those that are there.
+        Folder of the results store replicates.json: a run that was killed resumes, and one with more replicates
+        begins with those that are stored.
     workers : int, optional
-        Processes on this machine; by default one for each core.
+        Number of processes on this machine; by default one for each core.
     scheduler : str, optional
         Address of a Dask scheduler, in place of `workers`.
     progress : callable, optional
-        Is given a `TaskProgress` after each replicate.
+        Called with a `TaskProgress` after each replicate.
 
     Returns
     -------
@@ -127,38 +128,38 @@ def calibrate(
         Over "replicate", "quantity" (parameters, log-likelihood, angles of snap-off) and "claim":
 
         ranks (replicate, quantity)
-            Of the truth among 99 draws; −1 where there is none.
+            Rank of the truth among 99 draws; −1 if it is unknown.
         rank_p_value (quantity)
-            That uniform ranks are as far from uniform, by simultaneous bands of their distribution (Säilynoja et al.
-            2022, doi 10.1007/s11222-022-10090-6).
+            Probability that uniform ranks are as far from uniform, by simultaneous bands of their distribution
+            (Säilynoja et al. 2022, doi 10.1007/s11222-022-10090-6).
         coverage, coverage_error, coverage_replicates (claim)
-            Share in which what is stated holds, its standard error, and of how many: pointwise and simultaneous bands
-            of the contour in the gap and beside it, contact regions, the predicted angle of snap-off. It holds in no
-            replicate that is lost.
+            Share of the replicates in which a claim holds, its standard error, and the number of replicates: pointwise
+            and simultaneous bands of the contour in the gap and beside it, contact regions, the predicted angle of
+            snap-off. A claim holds in no replicate that is lost.
         noticed_below, noticed_above (claim)
-            Coverages below and above that stated that would have been called a fault with the probability ``power``,
-            by the binomial distribution; NaN where there is none.
+            Coverages below and above the stated one that would have been called a fault with the probability
+            ``power``, by the binomial distribution; NaN if there is none.
         pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
         median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,
         effective_draws, evaluations, seconds, message, traceback (replicate)
-            Of each; misfit_probability and axial_score, of single samples, only where a `world` is given. The message
-            of a replicate that is lost is its error, and only it has a traceback.
+            Results of each replicate; misfit_probability and axial_score, of single samples, only with a `world`. The
+            message of a replicate that is lost is its error, and only it has a traceback.
 
-        Attributes: verdict, in words; conclusion, "calibrated", "not calibrated", "undecided" (more than 1 % of the
+        Attributes: verdict, a text; conclusion, "calibrated", "not calibrated", "undecided" (more than 1 % of the
         replicates are lost, or more than 5 % did not converge) or "too few"; calibrated (0 or 1); lost and
-        not_converged, how many; false_alarm, the probability, at most, that right posteriors are not called so, and
-        level, the p-value below which a single quantity or claim is at fault; the experiment. The smallest errors of
-        normal posteriors that their ranks would have shown with the probability power: noticed_shift, in standard
-        deviations, noticed_narrow and noticed_wide, factors by which these are too small or too large.
+        not_converged, numbers of replicates; false_alarm, the largest probability that right posteriors are not called
+        calibrated; level, the p-value below which a single quantity or claim is at fault; the experiment. The smallest
+        errors of normal posteriors that their ranks would have shown with the probability power: noticed_shift, in
+        standard deviations, noticed_narrow and noticed_wide, factors by which these are too small or too large.
 
     Raises
     ------
     ParameterError
         If an argument is impossible.
     CalibrationError
-        If `out` holds replicates of another experiment, or is being worked on.
+        If `out` holds replicates of another experiment, or another run uses it.
     TaskError
-        If processes died over a replicate again and again, or cannot begin.
+        If processes died repeatedly in a replicate, or cannot start.
 
     Examples
     --------
@@ -187,9 +188,9 @@ def calibrate(
         world=world,
     )
     folder = None if out is None else check_path("out", out).resolve()
-    with open_results_store(experiment.words, folder, REPLICATES) as ledger:
+    with open_results_store(experiment.identity, folder, REPLICATES) as store:
         kept = keep_outcomes(
-            ledger, replicate, experiment, int(replicates), workers=workers, scheduler=scheduler, progress=progress
+            store, replicate, experiment, int(replicates), workers=workers, scheduler=scheduler, progress=progress
         )
     return summary(experiment, kept)
 
@@ -197,24 +198,24 @@ def calibrate(
 def calibration_replicate(
     number: int, *, out: str | os.PathLike[str] | None = None, throw: bool = True, **options: Any
 ) -> Replicate:
-    """Make one replicate of a calibration again, alone: the same record, the same posterior, or the same error.
+    """Repeat one replicate of a calibration alone: the same record, the same posterior, or the same error.
 
     Parameters
     ----------
     number : int
-        Of the replicate, from 0 up.
+        Number of the replicate, from 0 up.
     out : path-like, optional
-        Folder of the calibration, to be sure that it is the same one; nothing is written.
+        Folder of the calibration, to verify that it is the same one; nothing is written.
     throw : bool
-        Whether the error of a replicate that is lost is raised; else it is in the outcome.
+        Whether the error of a replicate that is lost is raised; otherwise it is in the outcome.
     options
-        What is simulated and inferred, as `calibrate` was given it: all but `replicates`, `workers`, `scheduler` and
+        Options of the calibration, as they were given to `calibrate`, except `replicates`, `workers`, `scheduler` and
         `progress`.
 
     Returns
     -------
     Replicate
-        With ``outcome``, ``truth``, ``measured`` and ``posterior``.
+        A named tuple with ``outcome``, ``truth``, ``measured`` and ``posterior``.
 
     Raises
     ------
@@ -233,7 +234,7 @@ def calibration_replicate(
     number = check_whole_number("number of the replicate", number, 0)
     experiment = experiment_of(**options)
     folder = None if out is None else check_path("out", out)
-    ResultsStore(experiment.words, folder, REPLICATES)  # refuses that of another experiment
+    ResultsStore(experiment.identity, folder, REPLICATES)  # refuses that of another experiment
     return make_replicate(experiment, number, throw=throw)
 
 
@@ -254,18 +255,18 @@ def experiment_of(
     probability: float = 0.9,
     world: World | None = None,
 ) -> SimulatedExperiment:
-    """What `calibrate` is asked for, as it says, and by the same defaults."""
+    """Return the experiment that `calibrate` repeats, from the same arguments and defaults."""
     check_optional("load_cell", load_cell, LoadCell)
     check_optional("rod", rod, Rod)
     check_optional("settings", settings, SamplerSettings)
     check_optional("world", world, World)
     directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
     check_choice("direction", direction, directions)
-    remedy = "give a list of at least 3 different finite numbers [rad]"
+    correction = "give a list of at least 3 different finite numbers [rad]"
     given = np.radians(_ANGLES) if drive_angles is None else drive_angles
-    angles = np.unique(check_numbers("drive_angles", given, remedy, shape=(None,)))
+    angles = np.unique(check_numbers("drive_angles", given, correction, shape=(None,)))
     if angles.size < 3:
-        raise refused("drive_angles", drive_angles, remedy)
+        raise refused("drive_angles", drive_angles, correction)
     bases, cell = tuple(check_pivots("base", base)), load_cell or usual_load_cell(rod or Rod())
     assumed = Experiment(
         record_template(bases, directions[direction], angles, rod, cell),

@@ -1,4 +1,4 @@
-"""Coverage: whether what is stated with a probability holds as often, and how far off it must be to be noticed."""
+"""Tests of coverage: the p-value of an observed coverage, and the smallest deviations that a test detects."""
 
 from __future__ import annotations
 
@@ -12,24 +12,29 @@ from tactile_bayes.arrays import Floats
 __all__ = ["coverage_p_value", "noticed_coverage"]
 
 _MARGIN = 0.01
-"""What quantiles of some hundred draws may miss of a probability."""
+"""Error in probability that is allowed for quantiles of some hundred draws."""
 
 
 def coverage_p_value(share: ArrayLike, count: int, probability: float, *, is_whole: bool) -> Floats:
-    """Probability, at most, that the mean of right shares is as far from what it is to be.
+    """Return an upper bound on the probability that an observed coverage is as far from the stated one by chance.
 
     Parameters
     ----------
     share : array_like
-        Mean over replicates of the share in which a claim holds in each.
+        Mean over replicates of the share in which a claim holds in each, from 0 to 1; any shape.
     count : int
         Number of replicates.
     probability : float
-        That is stated; a hundredth more or less is right as well.
+        Stated probability; a deviation of 0.01 counts as none.
     is_whole : bool
-        Whether the claim holds or fails as a whole in each replicate. Then the p value is the binomial one; else it is
-        the bound for any numbers between 0 and 1 (Hoeffding 1963, doi 10.1080/01621459.1963.10500830, theorem 1), as
-        places of one replicate are held together.
+        Whether the claim holds or fails as a whole in each replicate. Then the p-value is binomial; otherwise it is
+        the bound for any numbers between 0 and 1 (Hoeffding 1963, doi 10.1080/01621459.1963.10500830, theorem 1), since
+        the grid points of one replicate are correlated.
+
+    Returns
+    -------
+    ndarray
+        Two-sided p-values, in the shape of `share`.
 
     Examples
     --------
@@ -50,11 +55,28 @@ def coverage_p_value(share: ArrayLike, count: int, probability: float, *, is_who
 def noticed_coverage(
     count: int, probability: float, level: float, power: float, *, is_whole: bool
 ) -> tuple[float, float]:
-    """Coverages next to a stated one, below and above, that a test at a level notices with the probability `power`.
+    """Return the coverages nearest to a stated one, below and above, that a test detects with the probability `power`.
 
-    The number of replicates in which a claim holds is binomial, and the coverages follow from that exactly. Of a claim
-    that holds at a share of places, it is taken for all or none of them, which spreads the most. NaN where no coverage
-    is noticed so often.
+    The number of replicates in which a claim holds is binomial, and the coverages follow from that exactly. A claim
+    that holds at a share of the grid points is taken to hold at all or none of them, which has the largest variance.
+
+    Parameters
+    ----------
+    count : int
+        Number of replicates.
+    probability : float
+        Stated probability.
+    level : float
+        Level of the test, the largest p-value that counts as a fault.
+    power : float
+        Probability of detection.
+    is_whole : bool
+        As in `coverage_p_value`.
+
+    Returns
+    -------
+    below, above : float
+        Coverages; NaN if no coverage is detected with that probability.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Ranks of truths among draws: whether they are uniform, as those of a right posterior are, and what would show."""
+"""Ranks of truths among draws: a test of uniformity, and the errors of a posterior that it detects."""
 
 from __future__ import annotations
 
@@ -6,32 +6,33 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.optimize import brentq
 from scipy.special import bdtr, gammaln, log_ndtr
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["NoticedRanks", "expected_shares", "noticed_ranks", "simultaneous_band", "uniformity_p_value"]
 
 _SIMULATIONS = 20_000
-"""Sets of uniform ranks, by which it is judged how unusual one is."""
+"""Number of simulated sets of uniform ranks, the null distribution of the test."""
 
-_AT_ONCE = 2000
+_BLOCK_SIZE = 2000
+"""Number of sets that are simulated at a time."""
 
 _FARTHEST = 10.0
-"""Shift, and factor of the standard deviation, up to which it is asked what would be noticed."""
+"""Largest shift, and largest factor of the standard deviation, in the search for detected errors."""
 
-_TO_LOG_OR_SHIFT = 1e-4
-"""To which shifts, and logarithms of factors, are found."""
+_TOLERANCE = 1e-4
+"""Tolerance of shifts, and of logarithms of factors."""
 
 
 class NoticedRanks(NamedTuple):
-    """Smallest errors of a posterior that its ranks show with some probability; NaN where none would."""
+    """Smallest errors of a posterior that its ranks show with a given probability; NaN if none is detected."""
 
     shift: float
-    """Of the posterior, to either side, in its standard deviations."""
+    """Shift of the posterior, to either side, in its standard deviations."""
     narrow: float
     """Factor > 1 by which its standard deviation is too small."""
     wide: float
@@ -39,16 +40,22 @@ class NoticedRanks(NamedTuple):
 
 
 def uniformity_p_value(ranks: ArrayLike, top: int) -> float:
-    """Probability that uniform ranks, from 0 to `top`, are as far from uniform as these.
+    """Return the probability that uniform ranks, from 0 to `top`, are as far from uniform as these.
 
-    At each rank the share of ranks up to it is binomial; what counts is the least probable of these shares, as in
+    At each rank the share of ranks up to it is binomial; the statistic is the least probable of these shares, as in
     simultaneous bands for empirical distributions (Säilynoja, Bürkner & Vehtari 2022, doi 10.1007/s11222-022-10090-6).
 
     Parameters
     ----------
     ranks : array_like of int, shape (n,)
+        Ranks of the truths, from 0 to `top`.
     top : int
         Largest possible rank, the number of draws.
+
+    Returns
+    -------
+    float
+        P-value, from `_SIMULATIONS` simulated sets of uniform ranks, always the same ones.
 
     Examples
     --------
@@ -62,14 +69,29 @@ def uniformity_p_value(ranks: ArrayLike, top: int) -> float:
 
 
 def expected_shares(top: int) -> Floats:
-    """Expected share of ranks up to 0, 1, …, top − 1, shape (top,)."""
+    """Return the expected share of ranks up to 0, 1, …, top − 1, shape (top,)."""
     return np.arange(1, top + 1) / (top + 1.0)
 
 
 def simultaneous_band(count: int, top: int, probability: float) -> tuple[Floats, Floats]:
-    """Between what the shares of `expected_shares` lie with a probability, all of them at once; shapes (top,)."""
+    """Return the simultaneous band of the empirical distribution of uniform ranks.
+
+    Parameters
+    ----------
+    count : int
+        Number of ranks.
+    top : int
+        Largest possible rank.
+    probability : float
+        Probability that all shares lie within the band.
+
+    Returns
+    -------
+    lower, upper : ndarray, shape (top,)
+        Bounds on the shares of ranks up to 0, 1, …, top − 1, whose means are `expected_shares`.
+    """
     null = _null(count, top)
-    # The largest level that sets of uniform ranks fall short of no more often than they may.
+    # The largest level below which no more sets of uniform ranks fall than the probability allows.
     level = float(null[min(int((1.0 - probability) * null.size), null.size - 1)])
     counts = np.arange(count + 1)
     inside = _tails(counts[:, None], count, expected_shares(top)) >= level
@@ -78,10 +100,22 @@ def simultaneous_band(count: int, top: int, probability: float) -> tuple[Floats,
 
 @lru_cache(maxsize=8)
 def noticed_ranks(count: int, top: int, level: float, power: float) -> NoticedRanks:
-    """Smallest errors of a normal posterior for which `uniformity_p_value` is at most `level` with probability `power`.
+    """Return the smallest errors of a normal posterior that the test of uniformity detects.
 
-    The probability is computed without simulation (see `_power`); the level that it is held against is that of the
-    simulated uniform ranks, as in the test.
+    An error is detected if `uniformity_p_value` is at most `level` with probability `power`. That probability is
+    computed without simulation (see `_power`); the critical value is that of the simulated uniform ranks, as in the
+    test.
+
+    Parameters
+    ----------
+    count : int
+        Number of ranks.
+    top : int
+        Largest possible rank.
+    level : float
+        Level of the test.
+    power : float
+        Probability of detection.
 
     Examples
     --------
@@ -91,16 +125,16 @@ def noticed_ranks(count: int, top: int, level: float, power: float) -> NoticedRa
     """
 
     def smallest(shift: float, log_scale: float) -> float:
-        """On the way from no error to the farthest."""
+        """Return the smallest detected error on the line from no error to the farthest."""
 
         def excess(share: float) -> float:
-            law = _rank_probabilities(top, share * shift, float(np.exp(share * log_scale)))
-            return _power(count, law, level) - power
+            probabilities = _rank_probabilities(top, share * shift, float(np.exp(share * log_scale)))
+            return _power(count, probabilities, level) - power
 
         farthest = max(abs(shift), abs(log_scale))
         if excess(1.0) < 0.0:
             return np.nan
-        return farthest * float(brentq(excess, 0.0, 1.0, xtol=_TO_LOG_OR_SHIFT / farthest))
+        return farthest * float(brentq(excess, 0.0, 1.0, xtol=_TOLERANCE / farthest))
 
     factor = float(np.log(_FARTHEST))
     found = smallest(_FARTHEST, 0.0), *np.exp([smallest(0.0, factor), smallest(0.0, -factor)]).tolist()
@@ -108,8 +142,9 @@ def noticed_ranks(count: int, top: int, level: float, power: float) -> NoticedRa
 
 
 def _rank_probabilities(top: int, shift: float, scale: float) -> Floats:
-    """Of the ranks 0, 1, …, top of truths z ~ N(shift, scale²) among standard normal draws, shape (top + 1,).
+    """Return the probabilities of the ranks 0, 1, …, top of truths among standard normal draws, shape (top + 1,).
 
+    Truths are z ~ N(shift, scale²).
     P(rank = r) = E[C(top, r) Φ(z)ʳ (1 − Φ(z))ᵗᵒᵖ⁻ʳ], by the trapezoidal rule.
     """
     t = np.linspace(-8.0, 8.0, 1601)[:, None]
@@ -120,46 +155,46 @@ def _rank_probabilities(top: int, shift: float, scale: float) -> Floats:
 
 
 def _power(count: int, probabilities: Floats, level: float) -> float:
-    """Probability that `uniformity_p_value` of ranks with these probabilities is at most a level.
+    """Return the probability that `uniformity_p_value` of ranks with these probabilities is at most a level.
 
-    Exact: numbers of ranks up to each rank are a Markov chain, sums of independent Poisson numbers given their total,
-    and it is followed as long as it stays within what the level allows.
+    It is exact: numbers of ranks up to each rank are a Markov chain, sums of independent Poisson numbers given their
+    total, which is followed as long as it stays within the bounds of the level.
     """
     top = probabilities.size - 1
     null = _null(count, top)
     fewest = int(level * (1 + null.size)) - 1
-    if fewest < 0:  # a p value is never so small
+    if fewest < 0:  # no p-value is so small
         return 0.0
     counts = np.arange(count + 1)
     inside = _tails(counts[:, None], count, expected_shares(top)) >= null[fewest]
-    first, reached = 0, np.ones(1)  # the least number possible, and the probabilities of those from it on
-    for place in range(top):
-        allowed = np.flatnonzero(inside[first:, place]) + first
-        more = stats.poisson.pmf(counts[: allowed[-1] + 1 - first], count * probabilities[place])
+    first, reached = 0, np.ones(1)  # the least possible number, and the probabilities from it on
+    for rank in range(top):
+        allowed = np.flatnonzero(inside[first:, rank]) + first
+        more = stats.poisson.pmf(counts[: allowed[-1] + 1 - first], count * probabilities[rank])
         reached = np.convolve(reached, more)[allowed[0] - first : allowed[-1] + 1 - first]
         first = allowed[0]
     rest = stats.poisson.pmf(count - first - np.arange(reached.size), count * probabilities[top])
     return float(1.0 - reached @ rest / stats.poisson.pmf(count, count))
 
 
-def _tails(below: NDArray[np.intp], count: int, shares: Floats) -> Floats:
-    """Twice the smaller tail of the binomial distribution of numbers of ranks up to somewhere."""
+def _tails(below: Index, count: int, shares: Floats) -> Floats:
+    """Return twice the smaller binomial tail of numbers of ranks up to each rank."""
     at_most = bdtr(below, count, shares)
     at_least = 1.0 - np.where(below > 0, bdtr(np.maximum(below - 1, 0), count, shares), 0.0)
     return np.asarray(2.0 * np.minimum(at_most, at_least))
 
 
-def _least_probability(below: NDArray[np.intp], count: int) -> Floats:
-    """Of rows of numbers of ranks up to 0, 1, …, top − 1, shape (rows, top): twice the least tail, shape (rows,)."""
+def _least_probability(below: Index, count: int) -> Floats:
+    """Return twice the least tail over all ranks, shape (rows,), from numbers of ranks, shape (rows, top)."""
     return np.asarray(_tails(below, count, expected_shares(below.shape[1])).min(axis=1))
 
 
 @lru_cache(maxsize=8)
 def _null(count: int, top: int) -> Floats:
-    """The statistic of uniform ranks, sorted; always of the same random numbers."""
+    """Return the sorted statistics of simulated uniform ranks, always from the same random numbers."""
     rng = np.random.default_rng(2022)
     parts = []
-    for _ in range(_SIMULATIONS // _AT_ONCE):
-        counts = rng.multinomial(count, np.full(top + 1, 1.0 / (top + 1)), size=_AT_ONCE)
+    for _ in range(_SIMULATIONS // _BLOCK_SIZE):
+        counts = rng.multinomial(count, np.full(top + 1, 1.0 / (top + 1)), size=_BLOCK_SIZE)
         parts.append(_least_probability(np.cumsum(counts, axis=1)[:, :-1], count))
     return np.sort(np.concatenate(parts))

@@ -1,4 +1,4 @@
-"""One replicate: a record simulated, a posterior inferred, and what is to be said of it beside the truth."""
+"""One replicate: a simulated record, the posterior inferred from it, and their comparison with the truth."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.calibration.misspecification import World
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
-from tactile_bayes.calibration.world import World
 from tactile_bayes.diagnostics.record_check import check_record
 from tactile_bayes.errors import InferenceError, TactileBayesError
 from tactile_bayes.inference.contour import Sampled, sampled
@@ -26,53 +26,54 @@ from tactile_bayes.uncertainty.implied_contacts import contacts_of
 __all__ = ["DRAWS", "LOG_LIKELIHOOD", "Outcome", "Replicate", "make_replicate", "replicate"]
 
 DRAWS = 99
-"""Thinned draws among which the truth has a rank, from 0 to this."""
+"""Number of draws among which the truth has a rank, from 0 to this number."""
 
 LOG_LIKELIHOOD = "log_likelihood"
-"""What is ranked besides parameters."""
+"""Name of the log-likelihood among the ranked quantities."""
 
-_PLACES = 9
-"""At which a band is judged in the gap, and on each side of it."""
+_GRID_POINTS = 9
+"""Number of grid points of x at which a band is judged, in the gap and on each side of it."""
 
 _CONTACTS = (0.1, 0.5, 0.9)
-"""Places in a stroke, between first contact and snap-off, whose contact region is judged."""
+"""Samples whose contact region is judged, as shares of the way from first contact to snap-off in a segment."""
 
 _CONTACT_DRAWS = 200
-"""That a contact region is made from."""
+"""Number of draws from which a contact region is computed."""
 
 
 class Outcome(NamedTuple):
-    """Of one replicate; what could not be had is NaN, or missing among the ranks."""
+    """Outcome of one replicate; missing numbers are NaN, missing ranks are left out."""
 
     ranks: Mapping[str, int]
-    """Of the truth among the draws: of parameters, of the log-likelihood, and of what follows from them."""
+    """Ranks of the truth among the draws: of parameters, of the log-likelihood, and of drive angles of snap-off."""
     numbers: Mapping[str, float]
     """Shares, widths, scores and times by name."""
     message: str
-    """How sampling ended, or the error over which the replicate was lost."""
+    """Message of the sampler, or the error by which the replicate was lost."""
     traceback: str = ""
-    """Of that error; empty where there was none."""
+    """Traceback of that error; empty if there was none."""
 
     @property
     def is_lost(self) -> bool:
-        """Whether an error ended the replicate before the truth had its ranks."""
+        """True if an error ended the replicate before the ranks were computed."""
         return not self.ranks
 
 
 class Replicate(NamedTuple):
-    """One replicate, with all that was made on the way, as far as it came.
+    """One replicate with its intermediate results, as far as they were computed.
 
     Attributes
     ----------
     number : int
+        Number of the replicate, from 0 up.
     outcome : Outcome
-        What a calibration keeps of it: ``ranks``, ``numbers``, ``message`` and ``traceback``.
+        Entries of the results store: ``ranks``, ``numbers``, ``message`` and ``traceback``.
     truth : mapping of str to float
-        Parameters that were drawn, by name; empty if none were.
+        Parameters that were drawn, by name, in the record's units; empty if none were.
     measured : xr.Dataset, optional
         The record.
     posterior : xr.DataTree, optional
-        What was inferred from it.
+        The posterior of the record.
     """
 
     number: int
@@ -83,7 +84,7 @@ class Replicate(NamedTuple):
 
 
 def replicate(task: tuple[SimulatedExperiment, int]) -> Outcome:
-    """Outcome of one replicate of an experiment; an error is an outcome as well."""
+    """Return the outcome of one replicate of an experiment; an error is an outcome as well."""
     return make_replicate(*task).outcome
 
 
@@ -94,23 +95,24 @@ def make_replicate(experiment: SimulatedExperiment, number: int, *, throw: bool 
     ----------
     experiment : SimulatedExperiment
     number : int
+        Number of the replicate, from which its random numbers follow.
     throw : bool
-        Whether an error is raised; else it is the outcome. An interrupt always is.
+        Whether an error is raised; otherwise it is the outcome. An interrupt is always raised.
     """
-    simulated, inferred, picked = np.random.SeedSequence(experiment.seed, spawn_key=(number,)).spawn(3)
+    for_record, for_posterior, for_ranks = np.random.SeedSequence(experiment.seed, spawn_key=(number,)).spawn(3)
     simulation: Simulation | None = None
     result: Sampled | None = None
     began = time.perf_counter()
     try:
-        simulation = simulate(experiment, np.random.default_rng(simulated))
+        simulation = simulate(experiment, np.random.default_rng(for_record))
         began = time.perf_counter()
         problem = experiment.problem_of(simulation.measured)
-        result = sampled(problem, seed=inferred, settings=experiment.settings, with_prior=False)
+        result = sampled(problem, seed=for_posterior, settings=experiment.settings, with_prior=False)
         if not result.draws.converged and experiment.again is not None:
-            result = sampled(problem, seed=inferred, settings=experiment.again, with_prior=False)
+            result = sampled(problem, seed=for_posterior, settings=experiment.again, with_prior=False)
         seconds = time.perf_counter() - began
         result.draws.refuse_interrupted(f"replicate {number}")
-        outcome = _compared(experiment, simulation, problem.model, result, np.random.default_rng(picked))
+        outcome = _compared(experiment, simulation, problem.model, result, np.random.default_rng(for_ranks))
         outcome = outcome._replace(numbers={"seconds": seconds, **outcome.numbers})
     except Exception as error:
         if throw:
@@ -133,7 +135,7 @@ def _compared(
     result: Sampled,
     rng: np.random.Generator,
 ) -> Outcome:
-    """A posterior beside the truth."""
+    """Compare a posterior with the truth."""
     tree, draws = result.tree, result.draws
     numbers = {
         "converged": float(draws.converged),
@@ -156,9 +158,10 @@ def _ranks(
     is_of_family: bool,
     rng: np.random.Generator,
 ) -> dict[str, int]:
-    """Among draws picked at random, as neighbours in a walker's history are alike.
+    """Rank the true parameters and their log-likelihood among the draws.
 
-    Of a contour that is none of the family there are no true parameters.
+    The draws are picked at random, since neighbours in a walker's history are correlated. A contour outside the
+    family has no true parameters.
     """
     draws = samples.reshape(-1, samples.shape[-1])
     picked = draws[rng.choice(len(draws), min(DRAWS, len(draws)), replace=False)]
@@ -174,32 +177,33 @@ def _ranks(
 
 
 def _ranks_of_events(tree: xr.DataTree, simulation: Simulation, rng: np.random.Generator) -> dict[str, int]:
-    """Of the snap-off's drive angle in each stroke."""
+    """Rank the true drive angle of snap-off in each sweep segment among the draws."""
     events = tree["events"].to_dataset()
-    angles = events.snap_off_drive_angle.stack(all=("chain", "draw")).values  # (stroke, draws)
+    angles = events.snap_off_drive_angle.stack(all=("chain", "draw")).values  # (segments, draws)
     picked = rng.choice(angles.shape[1], min(DRAWS, angles.shape[1]), replace=False)
-    names = _stroke_names(events)
+    names = _segment_names(events)
     truths = simulation.events["snap_off_drive_angle"]
     return {
-        f"snap_off_{name}": _rank(of_stroke[picked], truth, rng)
-        for name, of_stroke, truth in zip(names, angles, truths, strict=True)
+        f"snap_off_{name}": _rank(of_segment[picked], truth, rng)
+        for name, of_segment, truth in zip(names, angles, truths, strict=True)
     }
 
 
-def _stroke_names(events: xr.Dataset) -> list[str]:
-    strokes = [str(stroke) for stroke in events.stroke.values]
-    counted = dict.fromkeys(strokes, 0)
+def _segment_names(events: xr.Dataset) -> list[str]:
+    """Return a distinct name for each sweep segment: its direction, with a number if there are several."""
+    directions = [str(direction) for direction in events.stroke.values]
+    counted = dict.fromkeys(directions, 0)
     names = []
-    for stroke in strokes:
-        counted[stroke] += 1
-        names.append(stroke if strokes.count(stroke) == 1 else f"{stroke}_{counted[stroke]}")
+    for direction in directions:
+        counted[direction] += 1
+        names.append(direction if directions.count(direction) == 1 else f"{direction}_{counted[direction]}")
     return names
 
 
 def _rank(draws: Floats, truth: float, rng: np.random.Generator) -> int:
-    """Draws below the truth, and of those that equal it, as at the end of a record, a random number.
+    """Return the number of draws below the truth, and a random share of those that equal it (ends of a record).
 
-    Where there are fewer than `DRAWS` the rank is stretched to as many.
+    With fewer than `DRAWS` draws the rank is scaled to that number.
     """
     below, equal = int(np.sum(draws < truth)), int(np.sum(draws == truth))
     rank = below + int(rng.integers(equal + 1))
@@ -207,8 +211,9 @@ def _rank(draws: Floats, truth: float, rng: np.random.Generator) -> int:
 
 
 def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
+    """Compare pointwise and simultaneous bands with the true contour."""
     numbers: dict[str, float] = {}
-    for region, x in _places(simulation).items():
+    for region, x in _grid_points(simulation).items():
         height = np.asarray(simulation.contour.height(x))
         if not x.size:
             continue
@@ -229,24 +234,24 @@ def _bands(tree: xr.DataTree, simulation: Simulation, probability: float) -> dic
     return numbers
 
 
-def _places(simulation: Simulation) -> dict[str, Floats]:
-    """Values of x beside the gap, from last to first contact, and in it, between the last contacts of both directions.
+def _grid_points(simulation: Simulation) -> dict[str, Floats]:
+    """Return values of x beside the gap, from last to first contact, and in it, between the last contacts.
 
-    None are in it where the sweeps leave no gap, or are of one direction.
+    The gap has none if both directions overlap, or the record has only one.
     """
     ends, begins = simulation.events["snap_off_contact_x"], simulation.events["first_contact_x"]
     is_forward = begins > ends
-    beside = [np.linspace(end, begin, _PLACES + 1)[1:] for end, begin in zip(ends, begins, strict=True)]
-    places = {"beside": np.concatenate(beside)}
+    beside = [np.linspace(end, begin, _GRID_POINTS + 1)[1:] for end, begin in zip(ends, begins, strict=True)]
+    grid = {"beside": np.concatenate(beside)}
     if is_forward.any() and not is_forward.all():
         left, right = ends[~is_forward].max(), ends[is_forward].min()
         if left < right:
-            places["in_gap"] = np.linspace(left, right, _PLACES + 2)[1:-1]
-    return places
+            grid["in_gap"] = np.linspace(left, right, _GRID_POINTS + 2)[1:-1]
+    return grid
 
 
 def _snap_offs(tree: xr.DataTree, simulation: Simulation, probability: float) -> dict[str, float]:
-    """Share of strokes whose snap-off lies in the central interval of the predicted one."""
+    """Return the share of segments whose snap-off lies in the central interval of the predicted one."""
     angles = tree["events"].to_dataset().snap_off_drive_angle
     low, high = np.quantile(angles.values, [0.5 - 0.5 * probability, 0.5 + 0.5 * probability], axis=(0, 1))
     true = simulation.events["snap_off_drive_angle"]
@@ -260,17 +265,17 @@ def _contacts(
     experiment: SimulatedExperiment,
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """Share of the contacts looked at that lie in their region."""
+    """Return the share of the chosen contacts that lie in their region."""
     likelihood = experiment.model.likelihood
     known = experiment.load_cell.misread(experiment.assumed.record.direction.values)
     read = experiment.assumed.record.drive_angle.values - known
     true = contacts_of(likelihood, simulation.contour, simulation.rig, read)
     chosen: list[int] = []
-    for stroke in likelihood.strokes:
-        touching = stroke.samples[np.isfinite(true["contact_x"][0, stroke.samples])]
-        if touching.size:
-            chosen += [int(touching[round(share * (touching.size - 1))]) for share in _CONTACTS]
-    if not chosen or not experiment.assumed.events:  # without events the record that is inferred from has fewer samples
+    for segment in likelihood.segments:
+        in_contact = segment.samples[np.isfinite(true["contact_x"][0, segment.samples])]
+        if in_contact.size:
+            chosen += [int(in_contact[round(share * (in_contact.size - 1))]) for share in _CONTACTS]
+    if not chosen or not experiment.assumed.events:  # without events, inference uses fewer samples
         return {}
     draws = samples.reshape(-1, samples.shape[-1])
     points = draws[rng.choice(len(draws), min(_CONTACT_DRAWS, len(draws)), replace=False)]
@@ -284,7 +289,7 @@ def _contacts(
     for sample in chosen:
         try:
             region = contact_region(implied, sample, experiment.probability)
-        except InferenceError:  # hardly any contour of the posterior is touched there
+        except InferenceError:  # too few contours of the posterior are touched there
             held.append(False)
             continue
         held.append(bool(region.contains(true["contact_x"][0, sample], true["contact_y"][0, sample])))
@@ -292,14 +297,14 @@ def _contacts(
 
 
 def _checks(tree: xr.DataTree, simulation: Simulation, experiment: SimulatedExperiment) -> dict[str, float]:
-    """What the checks say that a user sees: of the posterior's predictions, and of the loads of single samples."""
+    """Apply the checks that users see: of the posterior's predictions, and of the loads of single samples."""
     numbers = {"check_p_value": np.nan, "check_passed": np.nan, "misfit_probability": np.nan, "axial_score": np.nan}
     try:
         check = check_record(tree)
         numbers |= {"check_p_value": float(check.overall_p_value), "check_passed": float(check.attrs["passed"])}
-    except InferenceError:  # too few predictions of a run that was cut short
+    except InferenceError:  # a run that was cut short has too few predictions
         pass
-    if experiment.world == World():  # nothing to be noticed, and a tenth of the time
+    if experiment.world == World():  # nothing to detect; this saves a tenth of the time
         return numbers
     try:
         contacts = contact_points(simulation.measured, experiment.load_cell, tree)

@@ -1,4 +1,4 @@
-"""The experiment that is repeated: rig, drive and prior, what is inferred and how, and in what the world differs."""
+"""The experiment of a calibration: rig, drive, prior, inference, and the misspecification of the simulated rig."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import xarray as xr
 
-from tactile_bayes.calibration.world import NUMBERS, World
+from tactile_bayes.calibration.misspecification import NUMBERS, World
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
@@ -29,16 +29,16 @@ _LIBRARIES = ("tactile-bayes", "numpy", "scipy", "emcee", "arviz-stats")
 
 @dataclass(frozen=True)
 class SimulatedExperiment:
-    """One record, drawn, measured and inferred from; `calibrate` says what each entry means."""
+    """Simulation of a record and inference from it; `calibrate` describes the entries."""
 
     assumed: Experiment
-    """What inference assumes, on a template: its drive angles are those read where the encoder makes no error."""
+    """Assumptions of inference, on a template whose drive angles are readings of an encoder without errors."""
     drive_angles: tuple[float, ...]
     bases: tuple[tuple[float, float], ...]
     directions: tuple[str, ...]
     settings: SamplerSettings
     again: SamplerSettings | None = None
-    """Of a second run, where the first has not converged."""
+    """Settings of a second run if the first has not converged; None for no second run."""
     probability: float = 0.9
     seed: int = 0
     world: World = field(default_factory=World)
@@ -47,7 +47,7 @@ class SimulatedExperiment:
         object.__setattr__(self, "probability", check_probability("probability", self.probability))
         if self.assumed.noise.stated_cell is None:
             raise ParameterError(
-                "the load cell has no noise, so that there is nothing to be calibrated: give "
+                "the load cell has no noise, so that there is nothing to calibrate: give "
                 "LoadCell(force_noise=0.05, moment_noise=0.02), in the record's units"
             )
         refuse_strangers(self.world.priors, self.names, "of the world ")
@@ -58,7 +58,7 @@ class SimulatedExperiment:
 
     @property
     def load_cell(self) -> LoadCell:
-        """The load cell that inference assumes."""
+        """Load cell that inference assumes."""
         return self.assumed.noise.cell
 
     @property
@@ -69,38 +69,39 @@ class SimulatedExperiment:
 
     @cached_property
     def model(self) -> ContourModel:
-        """What truths are drawn from, and to full accuracy what they would make the rod's base feel."""
+        """Model from which truths are drawn, with loads to full accuracy."""
         names, priors = self.names, {**self.assumed.priors, **self.world.priors}
         own = {name: prior for name, prior in priors.items() if name in names}
         model = replace(self.assumed, family=self.world.family or self.assumed.family, priors=own).model
         model.likelihood.exact = True
-        if self.world.friction or self.world.flat_spot:  # a family that is always clear without may be not with them
+        if self.world.friction or self.world.flat_spot:  # these may obstruct a rod that is clear without them
             model.likelihood.is_always_clear = False
         return model
 
     @property
     def is_of_family(self) -> bool:
-        """Whether contours are of the family that inference takes them for."""
+        """True if contours are of the family that inference assumes."""
         return self.world.family in (None, self.assumed.family) and self.world.flat_spot is None
 
     @property
     def parameters(self) -> int:
-        """How many are inferred."""
+        """Number of inferred parameters."""
         return len(self.assumed.default_priors)
 
     @property
     def pivots(self) -> int:
+        """Number of pivots."""
         return len(bases_of(self.assumed.record))
 
     def problem_of(self, measured: xr.Dataset) -> ContourProblem:
-        """What is inferred from a record."""
+        """Return the inference problem of a measured record."""
         return contour_problem(replace(self.assumed, record=measured))
 
     @property
-    def words(self) -> dict[str, str]:
-        """What its numbers follow from; the same words, the same numbers."""
+    def identity(self) -> dict[str, str]:
+        """Everything that determines the results, as text, for the results store."""
         world = self.world
-        told = self.assumed.assumptions | {
+        entries = self.assumed.assumptions | {
             "drive_angles": json.dumps(self.drive_angles),
             "bases": json.dumps(self.bases),
             "directions": json.dumps(self.directions),
@@ -110,13 +111,13 @@ class SimulatedExperiment:
             "probability": repr(self.probability),
             "seed": repr(self.seed),
         }
-        told["world_family"] = world.family or self.assumed.family
-        told |= {f"world_{name}": repr(getattr(world, name)) for name in NUMBERS}
-        told["world_load_cell"] = "as stated" if world.load_cell is None else json.dumps(world.load_cell.entries())
-        told["world_priors"] = priors_in_words(world.priors)
-        return told | {f"version of {name}": version(name) for name in _LIBRARIES}
+        entries["world_family"] = world.family or self.assumed.family
+        entries |= {f"world_{name}": repr(getattr(world, name)) for name in NUMBERS}
+        entries["world_load_cell"] = "as stated" if world.load_cell is None else json.dumps(world.load_cell.entries())
+        entries["world_priors"] = priors_in_words(world.priors)
+        return entries | {f"version of {name}": version(name) for name in _LIBRARIES}
 
 
 def _plain(value: Any) -> Any:
-    """A number of NumPy as one of Python."""
+    """Convert a NumPy number to a Python number."""
     return value.item()

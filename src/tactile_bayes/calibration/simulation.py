@@ -1,4 +1,4 @@
-"""The simulation of a record: a truth drawn from the prior, and what is measured of it in the world as it is."""
+"""Simulation of a record: a truth drawn from the prior, and its measurement by the misspecified rig."""
 
 from __future__ import annotations
 
@@ -21,27 +21,33 @@ from tactile_bayes.record import CHANNELS
 __all__ = ["Simulation", "simulate"]
 
 _TRIALS = 200
-"""Truths drawn until the rod reaches one in the world as it is."""
+"""Largest number of truths that are drawn until the misspecified rig reaches one."""
 
 
 class Simulation(NamedTuple):
-    """A record of which everything is known."""
+    """A simulated record and its truth."""
 
     measured: xr.Dataset
+    """The record."""
     truth: Mapping[str, float]
     """Parameters by name, in the record's units."""
     contour: Contour
-    """The object, of shape (1,)."""
+    """Contour of the object, shape (1,)."""
     rig: Rig
-    """As it is."""
+    """The rig, with its misspecification."""
     events: Mapping[str, Floats]
-    """First contact and snap-off by stroke, each of shape (strokes,)."""
+    """Drive angles and contact points of first contact and snap-off, each of shape (segments,)."""
 
 
 def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simulation:
     """Draw a truth, sweep along it and measure.
 
-    Loads come to full accuracy from the arrays of `Paths`, not from the compiled code that inference asks.
+    Loads are exact, from `Paths` and not from the compiled code of inference.
+
+    Parameters
+    ----------
+    experiment : SimulatedExperiment
+    rng : np.random.Generator
 
     Raises
     ------
@@ -50,17 +56,17 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     """
     model, world = experiment.model, experiment.world
     likelihood = model.likelihood
-    told = experiment.load_cell
-    cell = told if world.load_cell is None else world.load_cell
+    stated = experiment.load_cell
+    cell = stated if world.load_cell is None else world.load_cell
     misread = {
-        name: getattr(cell, name) - getattr(told, name) for name in ("drive_angle_offset", "drive_angle_backlash")
+        name: getattr(cell, name) - getattr(stated, name) for name in ("drive_angle_offset", "drive_angle_backlash")
     }
     for _ in range(_TRIALS):
         point, _ = model.draw_prior(rng, 1)
         contour = world.contour(model.contours(point))
         rig = world.rig(model.rig(point), experiment.pivots)
         rig = rig._replace(**{name: getattr(rig, name) + off for name, off in misread.items()})
-        if np.any(np.arctan(rig.friction) > MAX_FRICTION_ANGLE):  # what was drawn, and what the world adds
+        if np.any(np.arctan(rig.friction) > MAX_FRICTION_ANGLE):  # the drawn friction and the additional one
             continue
         loads, reached = likelihood.predict(contour, rig)
         if reached[0]:
@@ -79,7 +85,7 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     course = model.nuisances.way[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course
     template = experiment.assumed.record
-    # The template has the angles that are read but for noise and steps; what is misread is in those of the rod.
+    # The template has the readings without noise and resolution; systematic errors are in the angles of the rod.
     direction = template.direction.values
     angles = corrupted_angles(cell, template.drive_angle.values - cell.misread(direction), direction, rng)
     columns = {name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)}

@@ -1,4 +1,4 @@
-"""What replicates say together: uniformity of ranks, coverage, power, how often a check raises alarm; the verdict."""
+"""Summary of all replicates: uniformity of ranks, coverage, power, alarms of the record check, and the verdict."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverage
 from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniformity_p_value
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
@@ -19,15 +18,15 @@ from tactile_bayes.calibration.verdict import (
     POWER,
     Tally,
     conclusion,
-    lost_in_words,
-    power_in_words,
+    lost_message,
+    power_message,
     statement,
 )
 
 __all__ = ["CLAIMS", "FALSE_ALARM", "summary"]
 
 FALSE_ALARM = 0.01
-"""Probability, at most, that the verdict finds fault with posteriors that are right."""
+"""Largest probability that the verdict finds a fault in right posteriors."""
 
 CLAIMS = {
     "pointwise_in_gap": "band, in the gap",
@@ -37,18 +36,18 @@ CLAIMS = {
     "contact_region": "contact regions",
     "snap_off": "angle of snap-off",
 }
-"""What is stated with a probability, and is to hold with that."""
+"""Statements that must hold with the stated probability: names and descriptions."""
 
 
 class _Fault(NamedTuple):
-    """Something that is not as it is to be, in words."""
+    """A quantity or claim at fault."""
 
     p_value: float
-    words: str
+    message: str
 
 
 def summary(experiment: SimulatedExperiment, outcomes: Mapping[int, Outcome]) -> xr.Dataset:
-    """The Dataset of a calibration; see `calibrate`."""
+    """Return the result of a calibration; see `calibrate`."""
     numbers = sorted(outcomes)
     rows = [outcomes[number] for number in numbers]
     names = list(dict.fromkeys(name for row in rows for name in row.ranks))
@@ -63,7 +62,7 @@ def summary(experiment: SimulatedExperiment, outcomes: Mapping[int, Outcome]) ->
     shares = {name: values[name][np.isfinite(values[name])] for name in found}
     coverage = [float(s.mean()) if s.size else np.nan for s in shares.values()]
     errors = [float(s.std(ddof=1) / np.sqrt(s.size)) if s.size > 1 else np.nan for s in shares.values()]
-    # Shared by all that is looked at.
+    # The false-alarm rate is shared by all tests.
     tested = int(np.isfinite(p_values).sum()) + sum(s.size >= FEWEST for s in shares.values())
     level = FALSE_ALARM / max(tested, 1)
     noticed = [_noticed_coverage(s, experiment.probability, level) for s in shares.values()]
@@ -84,14 +83,14 @@ def summary(experiment: SimulatedExperiment, outcomes: Mapping[int, Outcome]) ->
     )
     unconverged = int(np.sum(data.converged.values == 0.0)) if "converged" in data else 0
     tally = Tally(len(rows), int(is_lost.sum()), unconverged)
-    # Where many are lost, their share is what the verdict states, and faults are looked for in what remains.
+    # If many are lost, the verdict states their share, and faults are sought in the others.
     judged = data if tally.has_few_lost else data.isel(replicate=~is_lost)
     faults = _faults(judged, experiment.probability, level)
     concluded = conclusion(tally, has_faults=bool(faults))
     left = len(rows) - tally.lost
     ranks_noticed = noticed_ranks(left, DRAWS, level, POWER) if left >= FEWEST else NoticedRanks(*3 * [np.nan])
     data.attrs = {
-        **experiment.words,
+        **experiment.identity,
         "calibrated": int(concluded == "calibrated"),
         "conclusion": concluded,
         "false_alarm": FALSE_ALARM,
@@ -103,7 +102,7 @@ def summary(experiment: SimulatedExperiment, outcomes: Mapping[int, Outcome]) ->
         "not_converged": tally.unconverged,
         "probability": experiment.probability,
     }
-    reason = _uniform_and_covered(data) if concluded == "calibrated" else "; ".join(fault.words for fault in faults)
+    reason = _uniform_and_covered(data) if concluded == "calibrated" else "; ".join(fault.message for fault in faults)
     lost = {number: row.message for number, row in zip(numbers, rows, strict=True) if row.is_lost}
     data.attrs["verdict"] = " ".join([statement(concluded, tally, reason), *_further(data, ranks_noticed, lost)])
     return data
@@ -116,17 +115,17 @@ def _noticed_coverage(shares: Floats, probability: float, level: float) -> tuple
 
 
 def _is_whole(shares: Floats) -> bool:
-    """Whether a claim held or failed as a whole in each replicate."""
+    """Return True if a claim held or failed as a whole in each replicate."""
     return bool(np.isin(shares, (0.0, 1.0)).all())
 
 
-def _uniformity(ranks: NDArray[np.intp]) -> float:
+def _uniformity(ranks: Index) -> float:
     known = ranks[ranks >= 0]
     return uniformity_p_value(known, DRAWS) if known.size >= FEWEST else np.nan
 
 
 def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
-    """What is at most as probable as a level, where posteriors are right."""
+    """Return the quantities and claims whose p-value is at most a level, the least probable first."""
     faults = []
     for name, p_value in zip(data.quantity.values, data.rank_p_value.values, strict=True):
         if p_value <= level:
@@ -143,8 +142,8 @@ def _faults(data: xr.Dataset, probability: float, level: float) -> list[_Fault]:
     return sorted(faults)
 
 
-def _off(ranks: NDArray[np.intp], name: str) -> str:
-    """In which way ranks are not uniform."""
+def _off(ranks: Index, name: str) -> str:
+    """Describe how ranks deviate from uniform ones."""
     known = ranks[ranks >= 0] / DRAWS
     shift = (known.mean() - 0.5) * np.sqrt(12.0 * known.size)
     spread = (known.var() - 1.0 / 12.0) * np.sqrt(180.0 * known.size)
@@ -156,7 +155,7 @@ def _off(ranks: NDArray[np.intp], name: str) -> str:
 
 
 def _uniform_and_covered(data: xr.Dataset) -> str:
-    """Why posteriors without a fault are called calibrated."""
+    """Return the reason why posteriors without a fault are called calibrated."""
     least, stated = float(np.nanmin(data.rank_p_value)), data.attrs["probability"]
     return (
         f"ranks of the truth are uniform (smallest p of {data.sizes['quantity']} quantities {least:.2g}), and what is "
@@ -165,23 +164,23 @@ def _uniform_and_covered(data: xr.Dataset) -> str:
 
 
 def _further(data: xr.Dataset, ranks_noticed: NoticedRanks, lost: Mapping[int, str]) -> list[str]:
-    """What a verdict goes on with: coverage, power, the check, what did not converge, what was lost."""
-    said, probability = [], data.attrs["probability"]
+    """Return the further sentences of a verdict: coverage, power, record check, unconverged and lost replicates."""
+    sentences, probability = [], data.attrs["probability"]
     judged = data.sel(claim=data.coverage_replicates >= FEWEST)
     below = above = np.nan
     if judged.sizes["claim"]:
         shares = zip(judged.claim.values, judged.coverage.values, judged.coverage_error.values, strict=True)
         held = [f"{CLAIMS[str(name)]} {share:.1%} ± {error:.1%}" for name, share, error in shares]
-        said.append(f"Of those with {probability:.0%} hold: {', '.join(held)}.")
-        # Of the claim by which the least is noticed; NaN if there is one by which nothing is.
+        sentences.append(f"Of those with {probability:.0%} hold: {', '.join(held)}.")
+        # The claim with the least power counts; NaN if one has none.
         below, above = float(np.min(judged.noticed_below.values)), float(np.max(judged.noticed_above.values))
     if np.isfinite([below, *ranks_noticed]).any():
-        said.append(power_in_words(probability, below, above, ranks_noticed))
+        sentences.append(power_message(probability, below, above, ranks_noticed))
     if "check_passed" in data:
         passed = data.check_passed.values[np.isfinite(data.check_passed.values)]
-        said.append(f"The check of the record raises alarm in {np.mean(passed == 0.0):.1%} of {passed.size}.")
+        sentences.append(f"The check of the record raises alarm in {np.mean(passed == 0.0):.1%} of {passed.size}.")
     if data.attrs["not_converged"]:
-        said.append(f"{data.attrs['not_converged']} did not converge, and are counted like all others.")
+        sentences.append(f"{data.attrs['not_converged']} did not converge, and are counted like all others.")
     if lost:
-        said.append(lost_in_words(lost))
-    return said
+        sentences.append(lost_message(lost))
+    return sentences

@@ -1,4 +1,4 @@
-"""The verdict of a calibration: what may be concluded, and sentences on that, on its power, and on what was lost."""
+"""The verdict of a calibration: its conclusion, and sentences on power and on lost replicates."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ import numpy as np
 
 from tactile_bayes.calibration.ranks import NoticedRanks
 
-__all__ = ["FEWEST", "POWER", "Conclusion", "Tally", "conclusion", "lost_in_words", "power_in_words", "statement"]
+__all__ = ["FEWEST", "POWER", "Conclusion", "Tally", "conclusion", "lost_message", "power_message", "statement"]
 
 Conclusion = Literal["calibrated", "not calibrated", "undecided", "too few"]
 
 FEWEST = 20
-"""Replicates below which nothing is said of uniformity or coverage."""
+"""Least number of replicates for which uniformity and coverage are tested."""
 
 POWER = 0.9
-"""Probability with which the faults would have been noticed that a verdict names."""
+"""Probability with which the faults that a verdict names would have been detected."""
 
 _MOST_LOST = 0.01
-"""Share of lost replicates up to which posteriors can be called calibrated: by as much coverage may be off."""
+"""Largest share of lost replicates of a calibrated posterior; coverage may be wrong by as much."""
 
 _MOST_UNCONVERGED = 0.05
-"""Share of unconverged runs up to which it is posteriors that are judged, and not the limit of steps."""
+"""Largest share of unconverged runs; beyond it, the limit of steps is tested instead of the posteriors."""
 
 _NAMED = 5
-"""Lost replicates whose numbers are stated."""
+"""Largest number of lost replicates whose numbers are stated."""
 
 
 @dataclass(frozen=True)
 class Tally:
-    """How many replicates there are, how many of them are lost, and how many did not converge."""
+    """Numbers of replicates: all, lost, and not converged."""
 
     replicates: int
     lost: int = 0
@@ -40,15 +40,17 @@ class Tally:
 
     @property
     def has_few_lost(self) -> bool:
+        """True if the share of lost replicates permits a conclusion."""
         return self.lost <= _MOST_LOST * self.replicates
 
     @property
     def has_few_unconverged(self) -> bool:
+        """True if the share of unconverged runs permits a conclusion."""
         return self.unconverged <= _MOST_UNCONVERGED * self.replicates
 
 
 def conclusion(tally: Tally, *, has_faults: bool) -> Conclusion:
-    """What may be concluded: a fault stands whatever was lost; that there is none counts if nearly all was judged."""
+    """Return the conclusion: a fault stands whatever was lost; its absence counts if nearly all were tested."""
     if tally.replicates < FEWEST:
         return "too few"
     if has_faults:
@@ -57,7 +59,7 @@ def conclusion(tally: Tally, *, has_faults: bool) -> Conclusion:
 
 
 def statement(concluded: Conclusion, tally: Tally, reason: str) -> str:
-    """A conclusion in words; the reason is why posteriors are called calibrated, or not."""
+    """Return the sentence of a conclusion, with the reason why posteriors are called calibrated or not."""
     count, left = tally.replicates, tally.replicates - tally.lost
     if concluded == "calibrated":
         return f"Calibrated, as far as {count} replicates tell: {reason}."
@@ -72,8 +74,8 @@ def statement(concluded: Conclusion, tally: Tally, reason: str) -> str:
     return f"It cannot be said whether posteriors are right: of {count} replicates {' and '.join(too_many)}; {rest}."
 
 
-def power_in_words(probability: float, below: float, above: float, ranks: NoticedRanks) -> str:
-    """What would have been noticed; NaN stands for nothing of the kind."""
+def power_message(probability: float, below: float, above: float, ranks: NoticedRanks) -> str:
+    """Return the sentence on the faults that would have been detected; NaN stands for none of a kind."""
     bounds = {"at most": below, "at least": above}
     coverages = [f"{bound} {share:.1%}" for bound, share in bounds.items() if np.isfinite(share)]
     faults = [f"coverage of {' or '.join(coverages)} in place of {probability:.0%}"] if coverages else []
@@ -83,8 +85,8 @@ def power_in_words(probability: float, below: float, above: float, ranks: Notice
     return f"What would have been noticed with a probability of {POWER:.0%}: {', '.join(faults)}."
 
 
-def lost_in_words(messages: Mapping[int, str]) -> str:
-    """How many replicates are lost, the numbers of the first, and how to see why; from their messages by number."""
+def lost_message(messages: Mapping[int, str]) -> str:
+    """Return the sentence on lost replicates, and how to see the reason, from their messages by number."""
     numbers = list(messages)
     first = ", ".join(map(str, numbers[:_NAMED])) + (", …" if len(numbers) > _NAMED else "")
     kinds = ", ".join(dict.fromkeys(message.partition(":")[0] for message in messages.values()))

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
+    from tactile_bayes.calibration.misspecification import World
     from tactile_bayes.calibration.replicate import Replicate
-    from tactile_bayes.calibration.world import World
 
 __all__ = ["calibrate"]
 
@@ -106,7 +106,7 @@ def calibrate(
 
 
 def _world(options: Sequence[str] | None) -> World:
-    from tactile_bayes.calibration.world import NUMBERS, World
+    from tactile_bayes.calibration.misspecification import NUMBERS, World
 
     given: dict[str, Any] = {}
     for name, value in assigned("--world", options, known=NUMBERS).items():

@@ -203,12 +203,12 @@ def _loaded(posterior: xr.DataTree) -> NDArray[np.bool_]:
     """Return True for samples between first contact and snap-off, at the posterior medians of these events."""
     record = record_of(posterior)
     events = posterior["events"].to_dataset().median(("chain", "draw"))
-    strokes = RecordLikelihood(record, LoadCell.from_record(record) or LoadCell()).strokes
+    segments = RecordLikelihood(record, LoadCell.from_record(record) or LoadCell()).segments
     angle = record.drive_angle.values
     loaded = np.zeros(angle.size, dtype=bool)
     ends = np.sort(np.stack([events.first_drive_angle.values, events.snap_off_drive_angle.values]), axis=0)
-    for stroke, low, high in zip(strokes, *ends, strict=True):
-        loaded[stroke.samples] = (angle[stroke.samples] >= low) & (angle[stroke.samples] <= high)
+    for segment, low, high in zip(segments, *ends, strict=True):
+        loaded[segment.samples] = (angle[segment.samples] >= low) & (angle[segment.samples] <= high)
     return loaded
 
 

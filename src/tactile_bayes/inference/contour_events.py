@@ -1,4 +1,4 @@
-"""Where contact begins and ends on many contours, in every stroke of a record."""
+"""First contact and snap-off on many contours, in every sweep segment of a record."""
 
 from __future__ import annotations
 
@@ -14,20 +14,34 @@ __all__ = ["events_of"]
 def events_of(
     likelihood: RecordLikelihood, contours: Contour, rig: Rig | None = None, *, exact: bool = True
 ) -> dict[str, Floats]:
-    """First contact and snap-off in every stroke, in the record's units, each of shape (n, strokes).
+    """Return drive angle and contact point of first contact and snap-off in every sweep segment.
 
-    What is not exact is right to 1e-6 rad and 1e-5 rod lengths, at a quarter of the cost.
+    Parameters
+    ----------
+    likelihood : RecordLikelihood
+    contours : Contour
+        Contours with parameters of shape (n,).
+    rig : Rig, optional
+        Deviations from the stated rig.
+    exact : bool
+        Whether events are exact to rounding; otherwise their errors are below 1e-6 rad and 1e-5 rod lengths, at a
+        quarter of the cost.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n, segments)
+        first_drive_angle [rad], first_contact_x, first_contact_y [length], and likewise snap_off_.
     """
     count = contours.shape[0]
     paths = likelihood.paths(contours, rig, exact=exact)
-    lanes = np.arange(paths.sweep_frame.size)
+    batch = np.arange(paths.sweep_frame.size)
     backward = paths.sweep_frame.mirrored
     out = {}
     for label, angle, parameter in (
         ("first", paths.first_angle, paths.first_parameter),
         ("snap_off", paths.snap_angle, paths.snap_parameter),
     ):
-        locus = paths.sweep_frame.contour.take(lanes).locate(np.where(backward, -parameter, parameter))
+        locus = paths.sweep_frame.contour.take(batch).locate(np.where(backward, -parameter, parameter))
         out[f"{label}_drive_angle"] = np.where(backward, np.pi - angle, angle)
         out[f"{label}_contact_x"], out[f"{label}_contact_y"] = locus.x, locus.y
     return {name: values.reshape(-1, count).T for name, values in out.items()}

@@ -1,4 +1,4 @@
-"""The evidence of a family of contours: how likely a record is before any contour of it is preferred."""
+"""The evidence of a family of contours: the density of a record under the prior of the family."""
 
 from __future__ import annotations
 
@@ -19,51 +19,52 @@ from tactile_bayes.inference.priors import Prior
 __all__ = ["WIDTHS", "ContourEvidence", "contour_evidence"]
 
 WIDTHS = (0.5, 1.0, 2.0)
-"""Of the priors of sizes, exponents, amplitude and length scale: factors on what is stated."""
+"""Factors on the widths of the priors of sizes, exponents, amplitude and length scale."""
 
 _DRAWS = 8000
-"""Of the posterior that are used, evenly spread: what neighbours add is little."""
+"""Number of posterior draws that are used, evenly spread, since neighbours add little."""
 
 _PRIOR_DRAWS, _OTHER_DRAWS = 4000, 1000
-"""From the prior, and from one of another width, for the share of contours within reach."""
+"""Numbers of draws from the prior, and from one of another width, for the share of contours within reach."""
 
 
 class ContourEvidence(NamedTuple):
-    """Of one family, the logarithm of the density of the record under its prior."""
+    """Evidence of one family."""
 
     log_evidence: Floats
-    """For each of `WIDTHS`, shape (3,)."""
+    """Logarithm of the density of the record under the prior, for each of `WIDTHS`, shape (3,)."""
     standard_error: float
+    """Standard error of `log_evidence`."""
     overlap: float
-    """See `Evidence`."""
+    """Overlap of the density and its approximation, see `Evidence`."""
 
 
 def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Generator) -> ContourEvidence:
-    """Evidence by bridge sampling, in the coordinates in which walkers walked.
+    """Return the evidence of a model by bridge sampling, in the coordinates of the sampler.
 
-    The prior is that of contours within reach, which is what the generator draws from, so that the integral over all
-    contours is divided by the share that are. With priors of other widths, the evidence follows from the same draws.
+    The prior is restricted to contours within reach, as in the generator, so that the integral over all contours is
+    divided by their share. With priors of other widths, the evidence follows from the same draws by importance weights.
 
     Parameters
     ----------
     model : ContourModel
     sampled : Sampled
-        Its posterior.
+        Posterior of the model.
     rng : np.random.Generator
 
     Raises
     ------
     InferenceError
-        If the draws are too few or the posterior is nothing like a normal one, so that the integral is not to be had.
+        If the draws are too few, or the posterior is too far from normal for an estimate.
     """
     coordinates, (chains, _, size) = sampled.coordinates, sampled.draws.samples.shape
     kept = sampled.draws.evenly(_DRAWS // chains)
     points = sampled.draws.samples[:, kept].reshape(-1, size)
-    places = coordinates.of(points)
-    _, growth = coordinates.parameters(places)
+    transformed = coordinates.of(points)
+    _, growth = coordinates.parameters(transformed)
     bridge = bridge_evidence(
         in_coordinates(model.log_probability, coordinates),
-        places.reshape(chains, -1, size),
+        transformed.reshape(chains, -1, size),
         sampled.draws.log_probability[:, kept] + growth.reshape(chains, -1),
         rng,
     )
@@ -86,7 +87,7 @@ def contour_evidence(model: ContourModel, sampled: Sampled, rng: np.random.Gener
 def _share_within_reach(
     model: ContourModel, priors: Mapping[str, Prior], rng: np.random.Generator, count: int
 ) -> float:
-    """Of contours from a prior, at least the share that one of them would be."""
+    """Return the share of the prior's contours that are within reach, at least 1/count."""
     every = {**model.priors, **priors}
     points = np.stack([every[name].rvs(count, random_state=rng) for name in model.names], axis=1)
     points = points[((points > model.low) & (points < model.high)).all(axis=1)]

@@ -1,4 +1,4 @@
-"""A contour posterior's draws as the groups of a result, with what they predict."""
+"""Groups of a contour posterior: draws, predictions and events."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -21,17 +20,17 @@ from tactile_bayes.record import CHANNELS, COLUMNS, present_channels
 __all__ = ["drawn_groups", "predicted_groups", "prior_draws", "unit_of"]
 
 _KEPT_DRAWS = 250
-"""Draws of each chain for which predictions and events are stored, at most."""
+"""Largest number of draws of each chain for which predictions and events are stored."""
 
 _STORED_NUMBERS = 16_000_000
-"""Numbers in predictions and log-likelihoods, 128 MB, beyond which they are stored of fewer draws: from 4,000 samples
-on, with four chains."""
+"""Largest number of values in predictions and log-likelihoods, 128 MB; with four chains, fewer draws are stored from
+4,000 samples on."""
 
 _FEWEST_PREDICTIONS = 100
-"""As few as the check of the record can do with."""
+"""Least number of predictions that the check of the record requires."""
 
 _PATHS = 200
-"""Contours whose paths are followed at a time."""
+"""Number of contours whose paths are followed at a time."""
 
 _PRIOR_DRAWS = 1000
 
@@ -39,7 +38,7 @@ _BY_SAMPLE = ("chain", "draw", "sample")
 
 
 def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
-    """What is there as soon as walkers stand still: draws, how the ensembles fared, and the record."""
+    """Return the groups that are known when sampling ends: draws, statistics of the ensembles, and the record."""
     observed = {name: model.measured[name] for name in CHANNELS}
     return {
         "posterior": _labelled(model, draws.samples, np.arange(draws.samples.shape[1])),
@@ -50,8 +49,9 @@ def drawn_groups(model: ContourModel, draws: Draws) -> dict[str, xr.Dataset]:
 
 
 def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator) -> dict[str, xr.Dataset]:
-    """What some of the draws say: events of `_KEPT_DRAWS` of each chain, and predictions of as many, or of fewer where
-    the record is long, as attributes of these groups then say.
+    """Return events for `_KEPT_DRAWS` draws of each chain, and predictions for as many, or fewer if the record is long.
+
+    The attribute `stored` of the groups states a smaller number of draws.
     """
     kept = draws.evenly(_KEPT_DRAWS)
     chains, samples = len(draws.samples), len(model.likelihood.measured)
@@ -59,14 +59,13 @@ def predicted_groups(model: ContourModel, draws: Draws, rng: np.random.Generator
     fewer = draws.evenly(max(affordable, -(-_FEWEST_PREDICTIONS // chains))) if affordable < kept.size else kept
     groups = _predictions(model, draws, fewer, rng)
     if fewer.size < kept.size:
-        said = f"of {fewer.size} draws of each chain, not {kept.size}, since the record has {samples} samples"
-        groups = {name: group.assign_attrs(stored=said) for name, group in groups.items()}
+        stored = f"of {fewer.size} draws of each chain, not {kept.size}, since the record has {samples} samples"
+        groups = {name: group.assign_attrs(stored=stored) for name, group in groups.items()}
     return {**groups, "events": _events(model, draws, kept)}
 
 
-def _predictions(
-    model: ContourModel, draws: Draws, kept: NDArray[np.intp], rng: np.random.Generator
-) -> dict[str, xr.Dataset]:
+def _predictions(model: ContourModel, draws: Draws, kept: Index, rng: np.random.Generator) -> dict[str, xr.Dataset]:
+    """Return posterior predictions and log-likelihoods by sample."""
     points = draws.samples[:, kept].reshape(-1, len(model.names))
     likelihood, cell = model.likelihood, model.likelihood.load_cell
     samples = len(likelihood.measured)
@@ -92,7 +91,8 @@ def _predictions(
     }
 
 
-def _events(model: ContourModel, draws: Draws, kept: NDArray[np.intp]) -> xr.Dataset:
+def _events(model: ContourModel, draws: Draws, kept: Index) -> xr.Dataset:
+    """Return first contact and snap-off of some draws in every sweep segment."""
     points = draws.samples[:, kept].reshape(-1, len(model.names))
     found = [
         events_of(model.likelihood, model.contours(points[block]), model.rig(points[block]), exact=False)
@@ -112,16 +112,17 @@ def _labelled_events(model: ContourModel, events: Mapping[str, Floats], coords: 
     for name, values in events.items():
         column = COLUMNS[name.removeprefix("first_").removeprefix("snap_off_")]
         variables[name] = (("chain", "draw", "stroke"), values, {"units": column.unit_in(units)})
-    strokes = ["backward" if stroke.backward else "forward" for stroke in model.likelihood.strokes]
-    return xr.Dataset(variables, coords={**coords, "stroke": strokes})
+    sides = ["backward" if segment.backward else "forward" for segment in model.likelihood.segments]
+    return xr.Dataset(variables, coords={**coords, "stroke": sides})
 
 
 def prior_draws(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> xr.Dataset:
+    """Return draws from the prior of contours within reach, fewer if the deadline passes."""
     points, share = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
     return _labelled(model, points[None], np.arange(len(points))).assign_attrs(share_within_reach=share)
 
 
-def _labelled(model: ContourModel, samples: Floats, draw: NDArray[np.intp]) -> xr.Dataset:
+def _labelled(model: ContourModel, samples: Floats, draw: Index) -> xr.Dataset:
     coords = {"chain": np.arange(samples.shape[0]), "draw": draw}
     return xr.Dataset(
         {
@@ -133,7 +134,7 @@ def _labelled(model: ContourModel, samples: Floats, draw: NDArray[np.intp]) -> x
 
 
 def unit_of(model: ContourModel, name: str) -> str:
-    """The unit of a parameter, in words."""
+    """Return the unit of a parameter, like "N m"."""
     if model.measured.attrs["units"] == "dimensionless":
         return "rad" if name in ("drive_angle_offset", "backlash", "length_scale") else "1"
     if name in model.nuisances.names:

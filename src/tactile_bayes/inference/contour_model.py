@@ -1,4 +1,4 @@
-"""Prior times likelihood of a contour, and of what else is not known, given a record."""
+"""Prior times likelihood of a contour, the rig and the noise, given a record."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Contour
 from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import DriftWarning, ReachError
@@ -27,14 +26,43 @@ from tactile_bayes.record import CHANNELS
 __all__ = ["ContourModel"]
 
 _FEWEST_UNLOADED = 12
-"""Unloaded samples that tell zero and noise of a channel."""
+"""Least number of unloaded samples from which zero and noise of a channel are estimated."""
 
 _MOST_TRIALS = 50
-"""Draws from the prior for each that is wanted within reach, before fewer will do."""
+"""Largest number of draws from the prior for each requested draw within reach."""
 
 
 class ContourModel:
-    """Prior times likelihood, as a function of arrays of parameters."""
+    """Prior times likelihood, as a function of arrays of parameters.
+
+    Points, shape (n, d), have the parameters of the contour first, then those of the rig, then those of the noise.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    family : Family
+    nuisances : Nuisances
+        Parameters of the rig.
+    noise : Noise
+        Parameters of the noise, and the load cell.
+    priors : mapping of str to frozen scipy.stats distribution
+        Priors of all parameters by name, in the record's units.
+
+    Attributes
+    ----------
+    forward_parameters : tuple of str
+        Names of the parameters of the forward model: those of contour and rig.
+    names : tuple of str
+        Names of all parameters.
+    low, high : ndarray, shape (d,)
+        Bounds of the parameters, whatever the priors.
+    likelihood : RecordLikelihood
+    found : xr.Dataset
+        Zero and noise of the unloaded samples, from `zero_load`.
+    zero, deviation : ndarray, shape (3,)
+        Zero of each channel (NaN if unknown) and estimated standard deviation [EI/L, EI/L²].
+    """
 
     def __init__(
         self,
@@ -44,17 +72,16 @@ class ContourModel:
         noise: Noise,
         priors: Mapping[str, Prior],
     ) -> None:
-        """Points have the parameters of the contour first, then those of the rig, then those of the noise."""
         self.measured = measured
         self.family = family
         self.nuisances = nuisances
         self.noise = noise
         self.priors = priors
-        self.located = (*family.parameters, *nuisances.names)
-        self.names = (*self.located, *noise.names)
+        self.forward_parameters = (*family.parameters, *nuisances.names)
+        self.names = (*self.forward_parameters, *noise.names)
         bounds = [*family.bounds.values(), *(nuisances.bounds(name) for name in nuisances.names)]
         self.low, self.high = np.array([*bounds, *[(0.0, np.inf)] * len(noise.names)]).T
-        # Parameters that share a prior are asked for at once: a call takes longer than many numbers.
+        # Densities of parameters that share a prior come from one call, whose overhead exceeds many numbers.
         columns: dict[int, list[int]] = {}
         for i, name in enumerate(self.names):
             columns.setdefault(id(priors[name]), []).append(i)
@@ -71,71 +98,74 @@ class ContourModel:
         self.likelihood.noise = np.where(self.present, rough, np.inf)
 
     @property
-    def present(self) -> NDArray[np.bool_]:
-        """Which channels were measured, shape (3,)."""
+    def present(self) -> Flags:
+        """True for channels that were measured, shape (3,)."""
         return ~np.isnan(self.likelihood.measured).all(axis=0)
 
     @property
     def coordinates(self) -> Logarithms:
-        """In which posteriors are sought and walked: the logarithms of parameters that are positive and never zero."""
+        """Coordinates of optimisation and sampling: logarithms of the parameters that are strictly positive."""
         return Logarithms((self.low == 0.0) & ~self.may_vanish)
 
     @property
     def ends(self) -> Ends:
-        """Of the parameters, by what they are and by their priors."""
+        """Bounds of the parameters by definition and by their priors."""
         support = np.array([support_of(self.priors[name]) for name in self.names]).T
         return Ends(np.maximum(support[0], self.low), np.minimum(support[1], self.high))
 
     @property
     def walked_ends(self) -> Ends:
-        """The same of the coordinates."""
+        """Bounds of the coordinates."""
         ends = self.ends
-        with np.errstate(divide="ignore"):  # a size may be as small as it likes
+        with np.errstate(divide="ignore"):  # a size has no positive lower bound
             return Ends(self.coordinates.of(ends.low), self.coordinates.of(ends.high))
 
     @property
-    def may_vanish(self) -> NDArray[np.bool_]:
-        """Which parameters may be zero, and not less."""
+    def may_vanish(self) -> Flags:
+        """True for parameters that may be zero and not negative, shape (d,)."""
         return np.isin(self.names, MAY_VANISH)
 
     @property
     def loads_of_a_point(self) -> int:
-        """Numbers that are predicted of a point: a load for every channel, sample and error of the encoder."""
+        """Number of predicted loads of a point: one for every channel, sample and error of the encoder."""
         return self.likelihood.measured.size * self.likelihood.encoder.count
 
     def contours(self, points: Floats) -> Contour:
+        """Return the contours of points, with parameters of shape (n,)."""
         return self.family.build(*points[:, : len(self.family.parameters)].T)
 
     def values(self, points: Floats) -> dict[str, Floats]:
-        """Columns of points, shape (n, parameters), by name; those of the noise may be missing."""
+        """Return the columns of points, shape (n, d), by name; those of the noise may be missing."""
         return dict(zip(self.names, points.T, strict=False))
 
     def rig(self, points: Floats) -> Rig:
+        """Return the rig of every point."""
         return self.nuisances.rig(self.values(points))
 
     def loads(self, points: Floats) -> Floats:
-        """What the load cell senses at the drive angles read, shape (n, samples, 3)."""
+        """Return the loads that the load cell senses at the drive angles read, shape (n, samples, 3)."""
         loads, _ = self.likelihood.predict(self.contours(points), self.rig(points))
         return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell)
 
     def loads_and_events(self, points: Floats) -> tuple[Floats, Floats]:
-        """`loads`, and drive angles of first contact and snap-off, see `RecordLikelihood.predict_with_events`."""
+        """Return `loads`, and drive angles of events as from `RecordLikelihood.predict_with_events`."""
         loads, _, events = self.likelihood.predict_with_events(self.contours(points), self.rig(points))
         return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell), events
 
-    def loads_with_errors(self, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """`loads` for every error of the encoder, shape (n, errors, samples, 3), and which points are usable, (n,)."""
+    def loads_with_errors(self, points: Floats) -> tuple[Floats, Flags]:
+        """Return `loads` for every encoder error, shape (n, errors, samples, 3), and which points are usable, (n,)."""
         loads, reached = self.likelihood.predict_with_errors(self.contours(points), self.rig(points))
         return self.nuisances.sensed(loads, self.values(points), self.likelihood.load_cell), reached
 
     def noise_scale(self, points: Floats) -> Floats:
-        """Factors on the load cell's standard deviations, shape (n, 3)."""
+        """Return the factors on the load cell's standard deviations, shape (n, 3)."""
         scale = np.ones((points.shape[0], len(CHANNELS)))
         for name, channels in zip(self.noise.names, self.noise.channels, strict=True):
             scale[:, [CHANNELS.index(c) for c in channels]] = points[:, [self.names.index(name)]]
         return scale
 
     def log_prior(self, points: Floats) -> Floats:
+        """Return the logarithm of the prior density, shape (n,), without the exclusion of contours out of reach."""
         values = np.zeros(len(points))
         for log_density, columns in self._columns:
             values += log_density(points[:, columns]).sum(axis=1)
@@ -143,7 +173,10 @@ class ContourModel:
         return values
 
     def log_probability(self, points: Floats) -> Floats:
-        """Up to the prior's normalisation over contours within reach; −inf outside its support or reach."""
+        """Return the logarithm of prior times likelihood, shape (n,); −inf outside support or reach.
+
+        It lacks the prior's normalisation over contours within reach.
+        """
         values = self.log_prior(points)
         inside = np.flatnonzero(np.isfinite(values))
         for block in blocks(inside.size, self.loads_of_a_point) if inside.size else ():
@@ -152,9 +185,25 @@ class ContourModel:
         return values
 
     def draw_prior(self, rng: np.random.Generator, count: int, deadline: Deadline = NEVER) -> tuple[Floats, float]:
-        """Draws within reach, fewer where they are very rare or time is up, and the share of all draws that they are.
+        """Draw from the prior of contours within reach.
 
-        However late it is, the search for the first one goes on.
+        Parameters
+        ----------
+        rng : np.random.Generator
+        count : int
+            Number of draws; fewer are returned if they are very rare or the deadline passes, but at least one.
+        deadline : Deadline
+
+        Returns
+        -------
+        points : ndarray, shape (count, d)
+        share : float
+            Share of all draws that are within reach.
+
+        Raises
+        ------
+        ReachError
+            If none of many draws is within reach.
         """
         found, drawn = [np.empty((0, len(self.names)))], 0
         while (had := sum(map(len, found))) < count and drawn < _MOST_TRIALS * count:
@@ -179,7 +228,7 @@ class ContourModel:
             return zero_load(self.measured)
 
     def _unloaded(self) -> tuple[Floats, Floats]:
-        """Mean and standard deviation of each channel's unloaded samples, shape (3,); NaN where there are few."""
+        """Return mean and standard deviation of each channel's unloaded samples, shape (3,); NaN if they are few."""
         if int(self.found["unloaded"].sum()) < _FEWEST_UNLOADED:
             return np.full(len(CHANNELS), np.nan), np.full(len(CHANNELS), np.nan)
         rod = self.likelihood.rod
@@ -187,6 +236,6 @@ class ContourModel:
         return self.found["bias"].values / units, self.found["noise"].values / units
 
     def _rough_noise(self) -> Floats:
-        """Standard deviation of each channel from the median bend between neighbouring samples, shape (3,)."""
+        """Return the standard deviation of each channel from second differences of its samples, shape (3,)."""
         measured, stated = self.likelihood.measured, self.likelihood.load_cell.noise
         return np.array([rough_noise(v) if len(v) > 2 else s for v, s in zip(measured.T, stated, strict=True)])

@@ -94,8 +94,8 @@ def event_brackets(model: ContourModel) -> Brackets:
 
     Loads say nothing of where a rod lets go until a sample is on the other side: what is missed here leads there.
     """
-    angle = model.likelihood.seen_angles
-    of_sample = model.likelihood.stroke_of_sample
+    angle = model.likelihood.angles_in_sweep_frame
+    of_sample = model.likelihood.segment_of_sample
     rows = []
     for onset, snap_off in zip(model.found["onset"].values, model.found["snap_off"].values, strict=True):
         for ends, (before, after) in enumerate((onset, snap_off)):
@@ -151,7 +151,7 @@ class _Search:
     def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
         self.model = model
         self.deadline = deadline
-        size = len(model.located)
+        size = len(model.forward_parameters)
         self.located = Logarithms(model.coordinates.positive[:size])
         self.deviation = model.deviation[model.present]
         self.measured = model.likelihood.measured[:, model.present] / self.deviation
@@ -162,7 +162,7 @@ class _Search:
         self.drawn = self.located.of(self.candidates[:, :size])
         percentiles = np.quantile(self.drawn, [0.16, 0.84], axis=0)
         rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
-        stated = np.array([float(model.priors[name].std()) for name in model.located])
+        stated = np.array([float(model.priors[name].std()) for name in model.forward_parameters])
         self.middle = percentiles.mean(axis=0)
         self.spread = np.where(np.isfinite(stated) & ~self.located.positive, stated, rough)
         walked = model.walked_ends
@@ -220,7 +220,7 @@ class _Search:
         while not found.fits and not self.deadline.has_passed:
             point = self.points(found.point[None])[0]
             point = np.where(self.model.may_vanish[: point.size], np.maximum(point, 0.0), point)
-            by_contacts = contact_fit(self.model, dict(zip(self.model.located, point.tolist(), strict=True)))
+            by_contacts = contact_fit(self.model, dict(zip(self.model.forward_parameters, point.tolist(), strict=True)))
             if by_contacts is None:
                 break
             place = self.located.of(np.append(by_contacts, point[by_contacts.size :]))
@@ -252,7 +252,7 @@ class _Search:
         low, high = ends.low[: wanted.size], ends.high[: wanted.size]
         off = np.flatnonzero((wanted <= low) | (wanted >= high))
         return ", ".join(
-            f"{self.model.located[i]} = {wanted[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
+            f"{self.model.forward_parameters[i]} = {wanted[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
         )
 
 

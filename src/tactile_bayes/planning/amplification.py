@@ -1,4 +1,4 @@
-"""How errors of the sensor grow into errors of a contact point, along a sweep."""
+"""Amplification of errors of the sensor to errors of a contact point, along a sweep."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.mechanics.contact_coordinates import (
     ARCLENGTH,
     DRIVE_ANGLE,
@@ -32,44 +31,48 @@ _COLUMNS = ("sweep", "direction", "base_x", "base_y", "drive_angle")
 _TRUTHS = ("contact_x", "contact_y", "slope_angle", "contact_phase")
 
 _NEAR = np.geomspace(1e-5, 0.5, 41)
-"""Distances from first contact and from snap-off, over the sweep's length, where no drive angles are given."""
+"""Default distances of samples from first contact and from snap-off, over the sweep's length."""
 
 _EVENLY = (np.arange(60) + 0.5) / 60
-"""And between."""
+"""Default positions of further samples, over the sweep's length."""
 
 _POWER_LAW = (1e-5, 1e-3)
-"""Distances between which errors grow like a power of it, over the sweep's length."""
+"""Distances from an event between which errors follow a power of the distance, over the sweep's length."""
 
 _FREE = {True: (FORCE, PSI1), False: (FORCE, ARCLENGTH)}
-"""Of touching rods, in tip contact and in tangential contact."""
+"""Free contact coordinates, in tip contact (True) and in tangential contact (False)."""
 
 
 class _Forward(NamedTuple):
-    """Contacts of a sweep as forward ones, dimensionless."""
+    """Contacts of a sweep in the sweep frame, dimensionless."""
 
     side: Floats
+    """1 for forward and −1 for backward samples, shape (n,)."""
     coordinates: Floats
     """Force, ψ1, arc length and drive angle, shape (n, 4)."""
-    tip: NDArray[np.bool_]
+    tip: Flags
+    """True in tip contact, shape (n,)."""
     slope_angle: Floats
+    """Slope angle of the contour at the contact [rad], shape (n,)."""
     from_readings: Floats
-    """Errors of the loads by those of the three readings, shape (n, 3, 3)."""
+    """Derivatives of the loads by the three readings, shape (n, 3, 3)."""
     leaning: Floats
-    """Errors of the loads by that of the drive angle, for a load cell that turns with the drive, shape (n, 3)."""
+    """Derivatives of the loads by the drive angle, for a load cell that turns with the drive, shape (n, 3)."""
     covariance: Floats
-    """Of the readings, shape (n, 3, 3)."""
+    """Covariance of the readings, shape (n, 3, 3)."""
 
-    def take(self, where: NDArray[np.intp]) -> _Forward:
+    def take(self, where: Index) -> _Forward:
+        """Return some of the contacts."""
         return _Forward._make(column[where] for column in self)
 
 
 def amplification(plan: Plan) -> xr.Dataset:
-    """Errors of contact points by errors of the sensor, to first order, in closed form.
+    """Return the errors of contact points due to errors of the sensor, to first order, in closed form.
 
     Parameters
     ----------
     plan : Plan
-        Without drive angles of its own, a sweep is looked at closely where it begins and where it ends.
+        Plan of the sweeps. Without drive angles of its own, samples are dense near first contact and snap-off.
 
     Returns
     -------
@@ -78,21 +81,22 @@ def amplification(plan: Plan) -> xr.Dataset:
         contact (contact_x, contact_y, slope_angle), after_first_contact and before_snap_off [rad]:
 
         gain_along, gain_across (reconstruction, sample, source)
-            By how much the contact point moves along the contour, and across it, for an error of one in a reading
-            [length/(N m), length/N, length/rad]; NaN where the method has no answer.
+            Derivatives of the contact point, along the contour and across it, by a reading [length/(N m), length/N,
+            length/rad]; NaN if the method has no answer.
         sd_along, sd_across (reconstruction, sample)
             Standard deviations from all errors of the load cell and the encoder together [length].
         holds (reconstruction, sample)
-            Whether first order holds at this noise: `reconstruct` of an ideal sample has the status "ok".
+            Whether the first order holds at this noise: `reconstruct` of an ideal sample has the status "ok".
 
         Over "event" ("first contact", "snap-off") and "stroke": growth_along and growth_across (reconstruction, stroke,
         event), the power of the distance in drive angle with which the standard deviation grows toward the event: −1
-        doubles it at half the distance, 0 leaves it bounded.
+        doubles it at half the distance, 0 leaves it bounded; NaN if too few samples are close.
 
     Notes
     -----
-    Raw Step 2 is a function of four numbers, whose slopes are those of the closed form (`touching.place_by_wrench`).
-    The constrained estimate is, to first order, the weighted least-squares solution on the sheet of possible contacts.
+    Raw Step 2 is a function of four numbers, whose derivatives follow from the closed form (`place_by_wrench` of
+    `mechanics.contact_coordinates`). The constrained estimate is, to first order, the weighted least-squares solution
+    on the surface of possible contacts.
     """
     refined = plan if plan.drive_angles is not None else _refined(plan)
     record, rod = refined.scan.record, plan.taken_rod
@@ -103,7 +107,7 @@ def amplification(plan: Plan) -> xr.Dataset:
     gains = (_raw(contacts), _constrained(contacts, delta, of_angle))
     both = [_along_and_across(contacts, gain, 0.5 * rod.diameter / rod.length) for gain in gains]
     deviations = [[_deviation(gain, contacts, of_angle) for gain in of_method] for of_method in both]
-    # A reading is in the unit of the record, not in EI/L or EI/L².
+    # Readings are in the units of the record, not in EI/L or EI/L².
     per_unit = rod.length / np.array([rod.moment_unit, rod.force_unit, rod.force_unit, 1.0])
     distances = _distances(refined, chosen)
     sweeps = [chosen.sweep.values == k for k in range(len(refined.scan.sweeps))]
@@ -141,13 +145,13 @@ def amplification(plan: Plan) -> xr.Dataset:
     )
 
 
-def _holds(plan: Plan, method: Method) -> NDArray[np.bool_]:
-    """Which samples `reconstruct` finds no fault with."""
+def _holds(plan: Plan, method: Method) -> Flags:
+    """Return True for samples to which `reconstruct` gives the status "ok"."""
     return np.asarray(plan.reconstruct(plan.record, method).status.values == "ok")
 
 
 def _refined(plan: Plan) -> Plan:
-    """The same with drive angles that come ever closer to first contact and snap-off."""
+    """Return the plan with drive angles that are dense near first contact and snap-off."""
     angles = []
     for sweep in plan.scan.sweeps:
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
@@ -155,7 +159,8 @@ def _refined(plan: Plan) -> Plan:
     return replace(plan, drive_angles=np.unique(np.concatenate(angles)))
 
 
-def _forward(plan: Plan, record: xr.Dataset, chosen: NDArray[np.intp]) -> _Forward:
+def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
+    """Return some contacts of a record in the sweep frame."""
     rod, cell = plan.taken_rod, plan.cell.dimensionless(plan.taken_rod)
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     loads = np.stack([record[name].values for name in CHANNELS], axis=-1) / units
@@ -188,7 +193,7 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: NDArray[np.intp]) -> _Forwa
 
 
 def _raw(contacts: _Forward) -> Floats:
-    """Errors of place and slope (x, y, slope angle, arc length) by those of the four readings, shape (n, 4, 4)."""
+    """Return derivatives of (x, y, slope angle, arc length) by the four readings, of raw Step 2, shape (n, 4, 4)."""
     by_angle_and_loads = place_by_wrench(contacts.coordinates)
     by_loads = by_angle_and_loads[:, :, 1:]
     by_angle = by_angle_and_loads[:, :, :1] + by_loads @ contacts.leaning[:, :, None]
@@ -196,7 +201,7 @@ def _raw(contacts: _Forward) -> Floats:
 
 
 def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Floats:
-    """The same of the most likely contact on the sheet of its phase."""
+    """Return the same derivatives of the most likely contact on the surface of its phase, shape (n, 4, 4)."""
     _, slopes = contact_states_and_slopes(contacts.coordinates, delta)
     from_readings = contacts.from_readings
     covariance = from_readings @ contacts.covariance @ np.swapaxes(from_readings, 1, 2)
@@ -209,7 +214,7 @@ def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Fl
         known = np.concatenate([white @ loads[:, :, free], white @ by_angle[:, :, None]], axis=2)
         errors = np.concatenate([white @ from_readings[here], np.zeros((here.size, 3, 1))], axis=2)
         if angle_deviation:
-            # The drive angle is one more reading, and one more number to be found.
+            # The drive angle is an additional reading and an additional unknown.
             last = np.zeros((here.size, 1, 3))
             last[:, 0, 2] = 1.0 / angle_deviation
             found = np.linalg.pinv(np.concatenate([known, last], axis=1))
@@ -224,20 +229,21 @@ def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Fl
 
 
 def _along_and_across(contacts: _Forward, gain: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Of the contact on the object, in the world, shape (n, 4) each."""
+    """Return derivatives of the contact along and across the contour, in the laboratory frame, shape (n, 4) each."""
     cos, sin = np.cos(contacts.slope_angle)[:, None], np.sin(contacts.slope_angle)[:, None]
     along = cos * gain[:, 0] + sin * gain[:, 1] - radius * gain[:, 2]  # the surface turns with the slope
     return contacts.side[:, None] * along, cos * gain[:, 1] - sin * gain[:, 0]
 
 
 def _deviation(gain: Floats, contacts: _Forward, angle_deviation: float) -> Floats:
+    """Return standard deviations from all readings, shape (n,)."""
     by_loads = gain[:, :3]
     variance = np.einsum("ni,nij,nj->n", by_loads, contacts.covariance, by_loads)
     return np.asarray(np.sqrt(variance + (gain[:, 3] * angle_deviation) ** 2))
 
 
 def _distances(plan: Plan, chosen: xr.Dataset) -> tuple[Floats, Floats]:
-    """From first contact and from snap-off [rad]."""
+    """Return the distances in drive angle from first contact and from snap-off [rad]."""
     sweeps = plan.scan.sweeps
     first = np.array([sweep.first_contact.drive_angle for sweep in sweeps])[chosen.sweep.values]
     snap = np.array([sweep.snap_off.drive_angle for sweep in sweeps])[chosen.sweep.values]
@@ -246,7 +252,7 @@ def _distances(plan: Plan, chosen: xr.Dataset) -> tuple[Floats, Floats]:
 
 
 def _growth(deviation: Floats, distance: Floats) -> float:
-    """Power of the distance with which a deviation grows, from samples that are close; NaN where there are too few."""
+    """Return the exponent of a deviation as a power of the distance, from close samples; NaN if they are too few."""
     longest = distance.max(initial=0.0)
     near = (distance > _POWER_LAW[0] * longest) & (distance < _POWER_LAW[1] * longest) & (deviation > 0.0)
     near &= np.isfinite(deviation)

@@ -1,4 +1,4 @@
-"""A candidate for the next record: where to put the pivot, how fine to step, and what to expect of it."""
+"""A candidate for the next record: its pivot, its drive step, and its expected results."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import logsumexp
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import ReachError
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
@@ -23,54 +22,60 @@ from tactile_bayes.record import CHANNELS
 
 __all__ = ["Candidate", "Expected", "Question", "expected_of", "measured_of"]
 
-_ROUGH_STEP = 1e-3
-"""Of the differences by which loads are made linear, over the scale of each parameter: they are interpolated."""
+_COARSE_STEP = 1e-3
+"""Step of finite differences of interpolated loads, over the scale of each parameter."""
 
 _DEGREES_OF_FREEDOM = 8
 _WIDENING = 1.2
-"""Of the t distribution from which nested draws come, over that of Laplace's approximation."""
+"""Scale of the t distribution from which nested draws come, over that of Laplace's approximation."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Where and how the next record is made."""
+    """A pivot and a step of the drive for the next record."""
 
     base: Base
+    """The pivot [length]."""
     drive_step: float
+    """Step of the drive [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is asked of every candidate."""
+    """The design problem: knowledge, candidates, and the band of interest."""
 
     known: Knowledge
     candidates: tuple[Candidate, ...]
     x: Floats
-    """Places at which the band matters [length]."""
+    """Grid points at which the band matters [length]."""
     probability: float
-    """Of the pointwise band."""
+    """Probability of the pointwise band, in (0, 1)."""
     nested: int
-    """Draws of each nested posterior; 0 for Laplace's approximation alone."""
+    """Number of draws of each nested posterior; 0 for Laplace's approximation alone."""
     seed: int
 
 
 class Expected(NamedTuple):
-    """What is to be expected of a candidate: means over draws of what is known, each with its standard error."""
+    """Expected results of a candidate: means over draws of the truth, each with its standard error."""
 
     width: tuple[float, float]
+    """Mean width of the band [length]."""
     gap: tuple[float, float]
+    """Width of the arcs that no sweep touches [length]."""
     information: tuple[float, float]
-    """In nats."""
+    """Gain in information [nats]."""
     reached: float
     """Share of the draws that the rod reaches."""
     nested_width: tuple[float, float]
+    """Mean width of the band by nested Monte Carlo [length]."""
     nested_information: tuple[float, float]
+    """Gain in information by nested Monte Carlo [nats]."""
     nested_draws: float
-    """Effective draws of the nested posteriors, the median."""
+    """Median of the effective draws of the nested posteriors."""
 
 
 def expected_of(task: tuple[Question, int]) -> Expected:
-    """Of one candidate, by its number."""
+    """Return the expected results of one candidate, by its index."""
     question, number = task
     candidate = question.candidates[number]
     known = question.known
@@ -84,13 +89,13 @@ def expected_of(task: tuple[Question, int]) -> Expected:
     rng = np.random.default_rng([question.seed, *np.asarray([*candidate.base, candidate.drive_step]).view(np.uint32)])
     for point, is_usable in zip(known.points, usable, strict=True):
         slopes = height_slopes(model, point, question.x)
-        told = np.zeros_like(known.precision)
+        gained = np.zeros_like(known.precision)
         if is_usable:
             try:
-                told = record_information(model, point, slopes=reading_slopes(model, point, _ROUGH_STEP)).matrix
+                gained = record_information(model, point, slopes=reading_slopes(model, point, _COARSE_STEP)).matrix
             except ReachError:
-                told = np.zeros_like(known.precision)
-        precision = known.precision + told
+                gained = np.zeros_like(known.precision)
+        precision = known.precision + gained
         rows["width"].append(wide * float(deviation_of_heights(slopes, precision).mean()))
         rows["information"].append(0.5 * (_logdet(precision) - prior_logdet))
         if question.nested and is_usable:
@@ -113,14 +118,14 @@ def expected_of(task: tuple[Question, int]) -> Expected:
 def _nested(
     question: Question, model: ContourModel, point: Floats, precision: Floats, rng: np.random.Generator
 ) -> tuple[float, float, float]:
-    """Width of the band, information gained, and effective draws, of the posterior of one record of one truth.
+    """Return width of the band, information gained and effective draws of the posterior of one simulated record.
 
-    By importance sampling from a t distribution about the mode of the record that Laplace's approximation foresees.
+    The posterior is sampled by importance sampling from a t distribution about the mode of Laplace's approximation.
     """
     known = question.known
     measured = measured_of(model, point, rng)
     after = known.model(measured)
-    steps = _ROUGH_STEP * parameter_scales(after, point)
+    steps = _COARSE_STEP * parameter_scales(after, point)
 
     def densities(points: Floats) -> Floats:
         inside = ((points > after.low) & (points < after.high)).all(axis=1)
@@ -135,10 +140,10 @@ def _nested(
     covariance = np.linalg.inv(precision)
     centre = point + covariance @ (score + known.precision @ (middle - point))
     root = _WIDENING * np.linalg.cholesky(covariance)
-    law = stats.multivariate_t(centre, root @ root.T, _DEGREES_OF_FREEDOM)
-    points = law.rvs(question.nested, random_state=rng)
+    proposal = stats.multivariate_t(centre, root @ root.T, _DEGREES_OF_FREEDOM)
+    points = proposal.rvs(question.nested, random_state=rng)
     log_known = stats.multivariate_normal(middle, np.linalg.inv(known.precision)).logpdf(points)
-    log_weights = densities(points).sum(axis=1) + log_known - law.logpdf(points)
+    log_weights = densities(points).sum(axis=1) + log_known - proposal.logpdf(points)
     evidence = float(logsumexp(log_weights) - np.log(question.nested))
     weights = np.exp(log_weights - logsumexp(log_weights))
     likely = weights > 0.0
@@ -150,18 +155,18 @@ def _nested(
 
 
 def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) -> xr.Dataset:
-    """The model's record, as it may be measured of one truth."""
+    """Return a simulated measurement of the model's record, of one truth, shape (d,)."""
     loads = model.loads(point[None])[0]
     rod = model.likelihood.rod
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     cell = model.likelihood.load_cell
     readings = cell.simulate(loads, seed=rng, noise_scale=model.noise_scale(point[None])[0]) * units
-    blank = model.measured
-    return blank.assign({name: ("sample", readings[:, i], blank[name].attrs) for i, name in enumerate(CHANNELS)})
+    template = model.measured
+    return template.assign({name: ("sample", readings[:, i], template[name].attrs) for i, name in enumerate(CHANNELS)})
 
 
 def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats:
-    """Of central intervals at each place, from weighted draws, shape (places,)."""
+    """Return widths of central intervals at each grid point, from weighted draws, shape (grid points,)."""
     order = np.argsort(heights, axis=0)
     share = np.cumsum(weights[order], axis=0)
     ends = []
@@ -171,8 +176,8 @@ def _band_widths(heights: Floats, weights: Floats, probability: float) -> Floats
     return np.asarray(ends[1] - ends[0])
 
 
-def _gaps(question: Question, candidate: Candidate, usable: NDArray[np.bool_]) -> Floats:
-    """Width of what neither the sweeps so far nor the candidate's touch, between the outermost first contacts."""
+def _gaps(question: Question, candidate: Candidate, usable: Flags) -> Floats:
+    """Return the width that no sweep touches between the outermost first contacts, for each usable draw."""
     known = question.known
     model = known.model_from([*known.bases, candidate.base], COARSE)
     points = known.points[usable]
@@ -192,7 +197,7 @@ def _gaps(question: Question, candidate: Candidate, usable: NDArray[np.bool_]) -
 
 
 def _mean(values: Floats) -> tuple[float, float]:
-    """With its standard error."""
+    """Return the mean and its standard error; NaN if unknown."""
     if not values.size:
         return np.nan, np.nan
     error = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else np.nan

@@ -1,4 +1,4 @@
-"""Where to put the whisker, or its next base, and how fine to step the drive."""
+"""Experimental design: the pivot and the drive step of the next record."""
 
 from __future__ import annotations
 
@@ -52,10 +52,14 @@ CRITERIA: tuple[Criterion, ...] = ("band", "gap", "information")
 
 _LIBRARIES = ("tactile-bayes", "numpy", "scipy")
 
-_PLACES = 25
+_GRID_POINTS = 25
+"""Number of grid points of x over the span."""
+
 ACROSS, ABOVE = np.linspace(-0.5, 0.5, 11), np.array([-0.1, 0.0, 0.1])
-"""Places of pivots, over the rod's length."""
+"""Default positions of pivots, over the rod's length."""
+
 _NESTED = 400
+"""Number of draws of each nested posterior."""
 
 
 def design(
@@ -79,43 +83,43 @@ def design(
     scheduler: str | None = None,
     progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.Dataset:
-    """What to expect of the next record from every place a pivot could have, and which is the best.
+    """Return the expected results of the next record from every candidate pivot, and the best candidate.
 
-    Objects are drawn from what is known; of each the information of the next record is added to what is known, and the
-    band that results is averaged. Every record is a forward and a backward sweep.
+    Objects are drawn from the prior or the posterior so far; the information of the next record about each is added to
+    it, and the resulting band is averaged. Every record is a forward and a backward sweep.
 
     Parameters
     ----------
     known : xr.DataTree or str
-        What `infer_contour` made of the records so far, for the next base or a second whisker of the same kind; or the
-        name of a family, of which nothing but its prior is known.
+        Result of `infer_contour` for the records so far, for the next base or a second whisker of the same kind; or the
+        name of a family, of which only the prior is known.
     seed : int
+        Seed of all random numbers.
     bases : sequence of (float, float), optional
         Pivots to choose from [length]; by default eleven from half a rod's length to the left of the pivot so far to
         half to the right, at its height and a tenth of the rod's length below and above.
     drive_steps : sequence of float
         Steps of the drive to choose from [rad].
     criterion : {"band", "gap", "information"}
-        What the best is to have: the narrowest band, the smallest gap, or the most information.
+        Criterion of the best candidate: the narrowest band, the smallest gap, or the most information.
     nested : bool
-        Whether each candidate's posteriors are sampled, too, by nested Monte Carlo, which checks Laplace's
-        approximation, and counts what the snap-off tells.
+        Whether each candidate's posteriors are also sampled by nested Monte Carlo, which checks Laplace's
+        approximation, and includes the information of the snap-off.
     draws : int
-        Objects that are drawn.
+        Number of objects that are drawn, at least 2.
     span : (float, float), optional
-        Between which x the band matters [length]; by default between the outermost first contacts of the sweeps so far,
-        or, of a prior, of sweeps from the origin; medians over the draws.
+        Interval of x in which the band matters [length]; by default between the outermost first contacts of the sweeps
+        so far, or, for a prior, of sweeps from the origin; medians over the draws.
     probability : float
-        Of the pointwise band.
+        Probability of the pointwise band, in (0, 1).
     load_cell, rod, friction, nuisances, priors
-        As in `infer_contour`, where a family is given; a posterior has its own.
+        As in `infer_contour`, if a family is given; a posterior has its own.
     out : path-like, optional
-        Folder in which what was found of each candidate is kept, in candidates.json: the same call goes on where it was
-        stopped, or is made again at once.
+        Folder of the results store candidates.json: the same call resumes from it, or returns at once.
     workers, scheduler
         As in `calibrate`; by default in this process.
     progress : callable, optional
-        Is given a `TaskProgress` after each candidate.
+        Called with a `TaskProgress` after each candidate.
 
     Returns
     -------
@@ -123,19 +127,20 @@ def design(
         Over "candidate", with base_x, base_y [length] and drive_step [rad]:
 
         width, width_error
-            Mean width of the band over the span that is to be expected [length], and its standard error over draws. Of
-            objects that the rod does not reach it is the width of what is known, and few of them decide the mean: with
-            more draws, and a look at `reached`, it is told whether they are there.
+            Expected mean width of the band over the span [length], and its standard error over draws. For objects that
+            the rod does not reach it is the present width, and few of them dominate the mean: more draws, and
+            `reached`, show whether there are any.
         gap, gap_error
-            Width of what no sweep touches, those so far included, between the outermost contacts [length].
+            Width of the arcs that no sweep touches, those so far included, between the outermost contacts [length].
         information, information_error
             Expected gain in information [nats].
         reached
-            Share of the draws that the rod reaches from there.
+            Share of the draws that the rod reaches from the pivot.
         nested_width, nested_width_error, nested_information, nested_information_error, nested_draws
-            The same by nested Monte Carlo, of the draws that are reached; NaN without. Effective draws are the median.
+            The same by nested Monte Carlo, over the draws that are reached; NaN without. nested_draws is the median of
+            the effective draws.
 
-        Over "pivot", those of the records so far, present_base_x and present_base_y [length]. Numbers: present_width,
+        Over "pivot", those of the records so far, present_base_x and present_base_y [length]. Scalars: present_width,
         of the band without a further record [length]; best, the index of the best candidate.
 
     Raises
@@ -145,16 +150,18 @@ def design(
     InferenceError
         If the tree is no posterior of a contour.
     ReachError
-        If the rod hardly ever reaches a contour of the prior, or from none of the candidates.
+        If the rod hardly ever reaches a contour of the prior, or reaches none of the objects from any candidate.
     StudyError
         If the folder holds candidates of another design.
+    TaskError
+        If processes died repeatedly in a candidate.
 
     Notes
     -----
-    To first order, the precision of a posterior is what was known plus Fisher's information of the record (Laplace's
-    approximation); its mean over objects is that of the expected band, and half its logarithmic determinant over that
-    before is the expected information (Lindley 1956; Long et al. 2013, doi 10.1016/j.cma.2013.02.017). Nested Monte
-    Carlo draws a record of each object, and its posterior by importance sampling from a t distribution about the mode
+    To first order, the precision of a posterior is the prior precision plus Fisher's information of the record
+    (Laplace's approximation). The width of the band is averaged over objects, and so is the gain in information,
+    half the change of the logarithmic determinant (Lindley 1956; Long et al. 2013, doi 10.1016/j.cma.2013.02.017).
+    Nested Monte Carlo simulates a record of each object, and samples its posterior from a t distribution about the mode
     (Ryan 2003; Beck et al. 2018, doi 10.1016/j.cma.2018.01.053).
 
     Examples
@@ -174,23 +181,23 @@ def design(
         cell, own = load_cell or usual_load_cell(rod or Rod()), {} if priors is None else priors
         empty = empty_record([(0.0, 0.0)], COARSE, rod, cell)
         experiment = Experiment(empty, known, cell, own, rod, friction, nuisances)
-        told = known_from_prior(experiment, draws=int(draws), rng=rng)
+        knowledge = known_from_prior(experiment, draws=int(draws), rng=rng)
     else:
         given = {"load_cell": load_cell, "rod": rod, "priors": priors}
         taken = [name for name, value in given.items() if value is not None]
         if taken:
             raise ParameterError(f"{', '.join(taken)} and a posterior, which has its own: leave one of the two")
-        told = known_from_posterior(known, draws=int(draws), rng=rng)
-    remedy = "give positive angles in radians, at most 0.5"
+        knowledge = known_from_posterior(known, draws=int(draws), rng=rng)
+    correction = "give positive angles in radians, at most 0.5"
     several = drive_steps if np.iterable(drive_steps) else [drive_steps]
-    steps = check_numbers("drive_steps", several, remedy, shape=(None,), least=TINY, most=0.5)
-    candidates = tuple(Candidate(base, float(step)) for base, step in product(_bases(bases, told), steps))
-    x = np.linspace(*_span(span, told), _PLACES)
-    question = Question(told, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
+    steps = check_numbers("drive_steps", several, correction, shape=(None,), least=TINY, most=0.5)
+    candidates = tuple(Candidate(base, float(step)) for base, step in product(_bases(bases, knowledge), steps))
+    x = np.linspace(*_span(span, knowledge), _GRID_POINTS)
+    question = Question(knowledge, candidates, x, float(probability), _NESTED if nested else 0, int(seed))
     folder = None if out is None else check_path("out", out).resolve()
-    with open_results_store(_words(question), folder, CANDIDATES) as ledger:
+    with open_results_store(_identity(question), folder, CANDIDATES) as store:
         found = keep_outcomes(
-            ledger, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
+            store, expected_of, question, len(candidates), workers=workers, scheduler=scheduler, progress=progress
         )
     if not any(expected.reached for expected in found.values()):
         raise ReachError(_out_of_reach(question))
@@ -198,41 +205,46 @@ def design(
 
 
 def _out_of_reach(question: Question) -> str:
+    """Return the message that no candidate reaches an object."""
     known, pivots = question.known, np.array([candidate.base for candidate in question.candidates])
     unit = "" if known.rod.is_dimensionless else " m"
     (left, low), (right, high) = pivots.min(axis=0), pivots.max(axis=0)
-    here = f"x = {left:g}" if left == right else f"x from {left:g} to {right:g}"
-    there = f"y = {low:g}" if low == high else f"y from {low:g} to {high:g}"
+    across = f"x = {left:g}" if left == right else f"x from {left:g} to {right:g}"
+    above = f"y = {low:g}" if low == high else f"y from {low:g} to {high:g}"
     return (
-        f"from none of the candidates, at {here}{unit} and {there}{unit}, does the rod, {known.rod.length:g}"
+        f"from none of the candidates, at {across}{unit} and {above}{unit}, does the rod, {known.rod.length:g}"
         f"{unit or ' L'} long, reach an object that may be there: give pivots nearer to it, in that unit"
     )
 
 
-def _bases(bases: Sequence[Base] | None, told: Knowledge) -> list[Base]:
+def _bases(bases: Sequence[Base] | None, knowledge: Knowledge) -> list[Base]:
+    """Return the candidate pivots."""
     if bases is None:
-        x, y = told.bases[0] if told.bases else (0.0, 0.0)
-        return [(float(x + told.rod.length * dx), float(y + told.rod.length * dy)) for dy in ABOVE for dx in ACROSS]
+        x, y = knowledge.bases[0] if knowledge.bases else (0.0, 0.0)
+        length = knowledge.rod.length
+        return [(float(x + length * dx), float(y + length * dy)) for dy in ABOVE for dx in ACROSS]
     pivots = check_numbers("bases", bases, "give a list of pivots, [(x, y), (x, y)]", shape=(None, 2))
     if len(np.unique(pivots, axis=0)) < len(pivots):
         raise refused("bases", bases, "one of them is given twice")
     return [(x, y) for x, y in pivots.tolist()]
 
 
-def _span(span: tuple[float, float] | None, told: Knowledge) -> tuple[float, float]:
+def _span(span: tuple[float, float] | None, knowledge: Knowledge) -> tuple[float, float]:
+    """Return the interval of x in which the band matters."""
     if span is not None:
-        remedy = "give two values of x, the smaller first"
-        left, right = check_numbers("span", span, remedy, shape=(2,)).tolist()
+        correction = "give two values of x, the smaller first"
+        left, right = check_numbers("span", span, correction, shape=(2,)).tolist()
         if not left < right:
-            raise refused("span", span, remedy)
+            raise refused("span", span, correction)
         return left, right
-    model = told.experiment.model
-    events = events_of(model.likelihood, model.contours(told.points), model.rig(told.points), exact=False)
+    model, points = knowledge.experiment.model, knowledge.points
+    events = events_of(model.likelihood, model.contours(points), model.rig(points), exact=False)
     first = events["first_contact_x"]
     return float(np.nanmedian(np.nanmin(first, axis=1))), float(np.nanmedian(np.nanmax(first, axis=1)))
 
 
 def _labelled(question: Question, expected: Sequence[Expected], criterion: Criterion) -> xr.Dataset:
+    """Return the result of a design; see `design`."""
     known, candidates = question.known, question.candidates
     metres = {"units": "1" if known.rod.is_dimensionless else "m"}
 
@@ -268,15 +280,15 @@ def _labelled(question: Question, expected: Sequence[Expected], criterion: Crite
 
 
 def _present_width(question: Question) -> float:
-    """Of the band without a further record."""
+    """Return the mean width of the band without a further record."""
     known = question.known
     wide = band_factor(question.probability)
     slopes = [height_slopes(known.experiment.model, point, question.x) for point in known.points]
     return wide * float(np.mean([deviation_of_heights(of, known.precision).mean() for of in slopes]))
 
 
-def _words(question: Question) -> dict[str, str]:
-    """What the expectations follow from."""
+def _identity(question: Question) -> dict[str, str]:
+    """Return everything that determines the results, as text, for the results store."""
     known = question.known
     return known.experiment.assumptions | {
         "what is known": hashlib.sha256(known.points.tobytes()).hexdigest(),

@@ -1,4 +1,4 @@
-"""One cell of an error map: an object at a distance, swept and measured again and again."""
+"""One cell of an error map: an object at a distance, swept once and measured repeatedly."""
 
 from __future__ import annotations
 
@@ -26,46 +26,49 @@ from tactile_bayes.uncertainty.band import contour_band
 __all__ = ["CellOutcome", "MapCell", "MapTask", "error_cell"]
 
 _SETTINGS = SamplerSettings(ensembles=2, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=1000)
-"""Of posteriors, of which only a band is wanted."""
+"""Settings of posteriors, which only need to yield a band."""
 
 _FEWEST_WALKERS = 24
 
 
 @dataclass(frozen=True)
 class MapCell:
-    """Where a cell is in the map."""
+    """Coordinates of a cell in the map."""
 
     contour: str
+    """Name of the contour."""
     distance: float
-    """Of the contour's vertex above the pivot [length]."""
+    """Height of the contour's lowest point above the pivot [length]."""
     noise_factor: float
+    """Factor on the noise of the load cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class MapTask:
-    """The whole map: what every cell is made from."""
+    """The whole map: inputs of all cells."""
 
     contours: Mapping[str, Contour]
     cells: tuple[MapCell, ...]
     plan: Plan
-    """With any of the contours; its pivot is the lateral one."""
+    """Plan of the sweeps, for any of the contours; base_x of its pivot is used."""
     replicates: int
     posteriors: Mapping[int, int]
-    """How many replicates of a cell, by its number, are inferred as well."""
+    """Number of replicates for which posteriors are inferred, by index of the cell."""
     probability: float
     seed: int
 
 
 class CellOutcome(NamedTuple):
-    """What came of a cell."""
+    """Outcome of a cell."""
 
     numbers: Mapping[str, float]
+    """Results by name."""
     message: str
-    """"ok", or why there is nothing."""
+    """"ok", or the error by which the cell is empty."""
 
 
 def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
-    """Sweep, measure and reconstruct again and again, and infer some of it."""
+    """Return the outcome of one cell: measure and reconstruct repeatedly, and infer some of the records."""
     study, number = task
     cell = study.cells[number]
     contour = study.contours[cell.contour]
@@ -88,13 +91,13 @@ def error_cell(task: tuple[MapTask, int]) -> CellOutcome:
 
 
 def _pivot(contour: Contour, plan: Plan, distance: float) -> tuple[float, float]:
-    """Below the contour's lowest point by a distance; sideways where the plan has it."""
+    """Return the pivot: below the contour's lowest point by a distance, at base_x of the plan."""
     lowest = float(contour.point(0.0)[1])
     return float(np.atleast_2d(np.asarray(plan.base, dtype=float))[0, 0]), lowest - distance
 
 
 def _expected(plan: Plan, probability: float) -> dict[str, float]:
-    """Mean widths of the expected bands."""
+    """Return the mean widths of the expected bands."""
     model, point = plan.model, plan.point
     precision = record_information(model, point).matrix + np.diag(prior_precision(model))
     wide = band_factor(probability)
@@ -108,7 +111,7 @@ def _expected(plan: Plan, probability: float) -> dict[str, float]:
 
 
 def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
-    """Errors of contacts over all replicates: root mean squares of those that are "ok", beside those of first order."""
+    """Return root mean square errors of contacts with the status "ok" over all replicates, and those of first order."""
     record = plan.scan.record
     loaded = record.truth_contact_phase.values != "none"
     grown = amplification(replace(plan, drive_angles=np.unique(record.drive_angle.values)))
@@ -126,7 +129,7 @@ def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
     for m, method in enumerate(METHODS):
         sd = {name: np.array([of[key][m] for key in keys]) for name, of in first.items()}
         squares, counts = {"along": 0.0, "across": 0.0}, 0
-        foretold = {"along": 0.0, "across": 0.0}
+        predicted = {"along": 0.0, "across": 0.0}
         unanswered, every = 0, 0
         sizes: list[Floats] = []
         for one in measured:
@@ -137,14 +140,14 @@ def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
             errors = {"along": cos * x + sin * y, "across": cos * y - sin * x}
             for name, error in errors.items():
                 squares[name] += float(np.sum(error[ok] ** 2))
-                foretold[name] += float(np.sum(sd[name][ok] ** 2))
+                predicted[name] += float(np.sum(sd[name][ok] ** 2))
             counts += int(ok.sum())
             missing = np.isnan(x)
             unanswered, every = unanswered + int(missing.sum()), every + missing.size
             sizes.append(np.hypot(x, y)[~missing])
         for name in squares:
             numbers[f"{method}_rms_{name}"] = math.sqrt(squares[name] / counts) if counts else math.nan
-            numbers[f"{method}_first_order_{name}"] = math.sqrt(foretold[name] / counts) if counts else math.nan
+            numbers[f"{method}_first_order_{name}"] = math.sqrt(predicted[name] / counts) if counts else math.nan
         joined = np.concatenate(sizes)
         numbers[f"{method}_median_error"] = float(np.median(joined)) if joined.size else math.nan
         numbers[f"{method}_without_answer"] = unanswered / every if every else math.nan
@@ -153,7 +156,7 @@ def _reconstructed(plan: Plan, measured: list[xr.Dataset]) -> dict[str, float]:
 
 
 def _inferred(plan: Plan, measured: list[xr.Dataset], probability: float, seed: int) -> dict[str, float]:
-    """Mean widths of posterior bands, and in which share of the places they hold the contour."""
+    """Return mean widths of posterior bands, and the share of grid points at which they contain the contour."""
     numbers: dict[str, float] = {}
     widths: dict[str, list[float]] = {"touched": [], "gap": []}
     held: dict[str, list[float]] = {"touched": [], "gap": []}

@@ -1,14 +1,13 @@
-"""How errors of a load cell and an encoder belong together, over a whole record."""
+"""Covariance of the errors of a load cell and an encoder, over a whole record."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.load_cell.covariance import wandering_deviation
 
@@ -16,17 +15,17 @@ __all__ = ["Whitening", "whitening"]
 
 
 class Whitening(NamedTuple):
-    """What makes errors of readings independent, and of size one."""
+    """Linear map of readings to independent ones of unit variance."""
 
-    present: NDArray[np.bool_]
-    """Which channels were measured, shape (3,)."""
+    present: Flags
+    """True for channels that were measured, shape (3,)."""
     alone: Floats | None
-    """Of each sample by itself, shape (samples, channels, channels); None where samples share errors."""
+    """Inverse Cholesky factor of each sample, shape (samples, channels, channels); None if samples share errors."""
     together: Floats | None
-    """Root of the covariance of all readings, sample by sample, shape (samples · channels,) twice."""
+    """Cholesky factor of the covariance of all readings, shape (samples · channels, samples · channels), or None."""
 
     def __call__(self, readings: Floats) -> Floats:
-        """Independent ones, (samples, channels, k), of errors or slopes of readings, shape (samples, 3, k)."""
+        """Whiten errors or derivatives of readings, shape (samples, 3, k), to (samples, channels, k)."""
         kept = readings[:, self.present]
         if self.alone is not None:
             return np.asarray(self.alone @ kept)
@@ -35,17 +34,19 @@ class Whitening(NamedTuple):
         return np.asarray(solve_triangular(self.together, flat, lower=True)).reshape(kept.shape)
 
 
-def whitening(cell: LoadCell, loads: Floats, by_angle: Floats, present: NDArray[np.bool_]) -> Whitening:
-    """Of the readings of loads, errors of the encoder included to first order.
+def whitening(cell: LoadCell, loads: Floats, by_angle: Floats, present: Flags) -> Whitening:
+    """Return the whitening of the readings of loads, with errors of the encoder to first order.
 
     Parameters
     ----------
     cell : LoadCell
-        Dimensionless.
+        The load cell, dimensionless.
     loads : ndarray, shape (samples, 3)
+        Noise-free loads [EI/L, EI/L²].
     by_angle : ndarray, shape (samples, 3)
         Derivatives of the readings by the drive angle.
     present : ndarray of bool, shape (3,)
+        True for channels that were measured.
     """
     samples = len(loads)
     covariance = cell.covariance(loads)
@@ -69,13 +70,12 @@ def whitening(cell: LoadCell, loads: Floats, by_angle: Floats, present: NDArray[
 
 
 def _wandering(cell: LoadCell, samples: int) -> Floats:
-    """Covariance of bias and drift between samples, shape (samples, samples, 3)."""
+    """Return the covariance of bias and drift between samples, shape (samples, samples, 3)."""
     bias = np.square(np.asarray(cell.bias_uncertainty, dtype=float))
     shared = np.broadcast_to(bias, (samples, samples, 3)).copy()
     if cell.drift is not None:
-        gone = np.arange(samples)
-        kept = cell.drift.decay
+        index = np.arange(samples)
         variance = wandering_deviation(cell, samples) ** 2 - bias
-        apart = np.abs(gone[:, None] - gone)
-        shared += kept ** apart[..., None] * variance[np.minimum(gone[:, None], gone)]
+        lag = np.abs(index[:, None] - index)
+        shared += cell.drift.decay ** lag[..., None] * variance[np.minimum(index[:, None], index)]
     return shared

@@ -1,4 +1,4 @@
-"""How wrong contacts and bands are, over noise level, distance and shape: a Monte-Carlo study."""
+"""Error map: errors of contacts and bands over noise level, distance and shape, by Monte Carlo."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def error_map(
     scheduler: str | None = None,
     progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.Dataset:
-    """Errors of reconstruction over contour, distance and noise, by simulating records again and again.
+    """Return the errors of reconstruction over contour, distance and noise, from repeated simulations of records.
 
     Parameters
     ----------
@@ -86,69 +86,70 @@ def error_map(
         Objects by name, in the unit of the rod's length; or names of the paper's profiles, for the dimensionless rod or
         scaled to the rod's length.
     seed : int
-        The same seed, the same numbers, whatever the number of workers.
+        Seed of all random numbers; the results do not depend on the number of workers.
     distances : sequence of float
-        Of the lowest point of each contour above the pivot [rod lengths].
+        Heights of the lowest point of each contour above the pivot [rod lengths].
     noise_factors : sequence of float
-        On the noise of the load cell.
+        Factors on the noise of the load cell.
     load_cell : LoadCell, optional
         By default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
     rod, drive_step
         As in `scan`; every cell is a forward and a backward sweep.
     friction : float, optional
-        Where it is known; without there is none, to be found out.
+        Coulomb's coefficient if it is known; by default the truth has none, and inference treats it as unknown.
     base_x : float
-        Where the pivot is sideways [length].
+        Position of the pivot [length].
     nuisances, priors
         As in `infer_contour`, for expected bands and posteriors.
     replicates : int
-        Records in each cell.
+        Number of records in each cell.
     posterior_cells : int
-        In how many cells, evenly over the map, posteriors are inferred as well: they take seconds each.
+        Number of cells, evenly over the map, in which posteriors are inferred; each takes seconds.
     posterior_replicates : int
-        Records of such a cell that are inferred.
+        Number of posteriors in such a cell.
     probability : float
-        Of the bands.
+        Probability of the bands, in (0, 1).
     out : path-like, optional
-        Folder in which what is done is kept, in cells.json: a run that was killed goes on.
+        Folder of the results store cells.json: a run that was killed resumes.
     workers, scheduler
         As in `calibrate`.
     progress : callable, optional
-        Is given a `TaskProgress` after each cell.
+        Called with a `TaskProgress` after each cell.
 
     Returns
     -------
     xr.Dataset
-        Over "contour", "distance" and "noise_factor", and where it is named over "reconstruction" ("raw" and
-        "constrained"):
+        Over "contour", "distance" and "noise_factor", and if stated over "reconstruction" ("raw" and "constrained");
+        lengths in metres, or in rod lengths for a dimensionless rod:
 
         rms_along, rms_across (…, reconstruction)
-            Root mean square errors of contact points along and across the contour, of samples with the status "ok".
+            Root mean square errors of contact points along and across the contour, for samples with the status "ok".
         first_order_along, first_order_across (…, reconstruction)
-            What `amplification` foretells for the same samples.
+            Predictions of `amplification` for the same samples.
         median_error (…, reconstruction)
-            Median distance of contact points from the true ones, of all samples that have an answer.
+            Median distance of contact points from the true ones, for all samples that have an answer.
         without_answer, ok (…, reconstruction)
             Shares of loaded samples that have no answer, and that have the status "ok".
         gap_width
-            Of the arc in x that no sweep touches; 0 where there is none.
+            Width in x of the arc that no sweep touches; 0 if there is none.
         expected_touched_width, expected_gap_width
-            Mean widths of the bands that are to be expected, from Fisher's information.
+            Expected mean widths of the bands, from Fisher's information.
         posterior_touched_width, posterior_gap_width, posterior_touched_coverage, posterior_gap_coverage
-            Mean widths of posterior bands, and share of places at which they hold the contour; NaN in cells without.
+            Mean widths of posterior bands, and share of grid points at which they contain the contour; NaN in cells
+            without posteriors.
         posterior_failed
-            Share of records from which nothing could be inferred.
+            Share of records whose inference failed.
         message
-            "ok", or why a cell is empty: the rod does not reach.
+            "ok", or the error by which a cell is empty, for example because the rod does not reach the object.
 
     Raises
     ------
     ParameterError
         If an argument is impossible.
     StudyError
-        If `out` holds cells of another study, or is being worked on.
+        If `out` holds cells of another study, or another run uses it.
     TaskError
-        If processes died over a cell again and again.
+        If processes died repeatedly in a cell.
 
     Examples
     --------
@@ -190,9 +191,10 @@ def error_map(
         float(probability),
         int(seed),
     )
-    with open_results_store(_words(task), None if out is None else check_path("out", out).resolve(), CELLS) as ledger:
+    folder = None if out is None else check_path("out", out).resolve()
+    with open_results_store(_identity(task), folder, CELLS) as store:
         kept = keep_outcomes(
-            ledger, error_cell, task, len(cells), workers=workers, scheduler=scheduler, progress=progress
+            store, error_cell, task, len(cells), workers=workers, scheduler=scheduler, progress=progress
         )
     return _labelled(task, kept, list(objects), distances, noise_factors)
 
@@ -205,21 +207,21 @@ def _grid(name: str, values: Sequence[float]) -> list[float]:
 
 
 def _objects(contours: Mapping[str, Contour] | Sequence[str], rod: Rod) -> dict[str, Contour]:
-    remedy = "give names of the paper's profiles, or contours by name"
+    correction = "give names of the paper's profiles, or contours by name"
     if isinstance(contours, Mapping) and contours:
-        check_mapping("contours", contours, remedy)
+        check_mapping("contours", contours, correction)
         for contour in contours.values():
-            family_parameters(contour)  # or a refusal
+            family_parameters(contour)  # refuses contours without parameters
         return dict(contours)
     if isinstance(contours, str) or not check_names("contours", contours):
-        raise refused("contours", contours, remedy)
+        raise refused("contours", contours, correction)
     if len(set(contours)) < len(contours):
         raise refused("contours", contours, "one of them is given twice")
     return {name: enlarged(paper_profile(name, q=0.5), rod.length) for name in contours}  # type: ignore[arg-type]
 
 
-def _words(task: MapTask) -> dict[str, str]:
-    """What the cells follow from."""
+def _identity(task: MapTask) -> dict[str, str]:
+    """Return everything that determines the results, as text, for the results store."""
     plan = task.plan
     return {
         "contours": json.dumps({name: repr(contour) for name, contour in task.contours.items()}),
@@ -247,6 +249,7 @@ def _labelled(
     distances: Sequence[float],
     factors: Sequence[float],
 ) -> xr.Dataset:
+    """Return the result of an error map; see `error_map`."""
     shape = len(names), len(distances), len(factors)
     dims = ("contour", "distance", "noise_factor")
     si = not task.plan.taken_rod.is_dimensionless

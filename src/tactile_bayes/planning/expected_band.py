@@ -1,4 +1,4 @@
-"""The band of a contour that is to be expected, to first order."""
+"""The expected band of a contour, to first order."""
 
 from __future__ import annotations
 
@@ -16,23 +16,27 @@ from tactile_bayes.sweep import Scan
 __all__ = ["Stretch", "band_factor", "deviation_of_heights", "height_slopes", "stretches"]
 
 _STEP = 1e-5
-_PLACES = 25
-"""In every stretch."""
+"""Step of finite differences, over the scale of each parameter."""
+
+_GRID_POINTS = 25
+"""Number of grid points in every stretch."""
 
 
 class Stretch(NamedTuple):
-    """Places of one kind along x."""
+    """An interval of x that is touched or a gap, with its grid points."""
 
     name: str
     """"touched", or "gap"."""
     begin: float
+    """Left end [length]."""
     end: float
+    """Right end [length]."""
     x: Floats
-    """Evenly between the two, in a gap without them."""
+    """Grid points, evenly between the ends, in a gap without them [length]."""
 
 
 def stretches(scan: Scan) -> list[Stretch]:
-    """Where a contour is touched by the sweeps, and the gaps between: evenly in x, in its order."""
+    """Return the intervals of x that the sweeps touch, and the gaps between them, in ascending order."""
     arcs = sorted(sorted((sweep.first_contact.contact_x, sweep.snap_off.contact_x)) for sweep in scan.sweeps)
     merged = [list(arcs[0])]
     for begin, end in arcs[1:]:
@@ -42,20 +46,20 @@ def stretches(scan: Scan) -> list[Stretch]:
             merged.append([begin, end])
     found = []
     for k, (begin, end) in enumerate(merged):
-        found.append(Stretch("touched", begin, end, np.linspace(begin, end, _PLACES)))
+        found.append(Stretch("touched", begin, end, np.linspace(begin, end, _GRID_POINTS)))
         if k + 1 < len(merged):
             onward = merged[k + 1][0]
-            found.append(Stretch("gap", end, onward, np.linspace(end, onward, _PLACES + 2)[1:-1]))
+            found.append(Stretch("gap", end, onward, np.linspace(end, onward, _GRID_POINTS + 2)[1:-1]))
     return found
 
 
 def band_factor(probability: float) -> float:
-    """Width of a pointwise band of a normal distribution, over its standard deviation."""
+    """Return the width of a pointwise band of a normal distribution, over its standard deviation."""
     return 2.0 * float(stats.norm.ppf(0.5 + 0.5 * probability))
 
 
 def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
-    """Derivatives of the contour's heights at x by all parameters, shape (x, d)."""
+    """Return the derivatives of the contour's heights at x [length] by all parameters, shape (x, d)."""
     own = len(model.family.parameters)
 
     def heights(points: Floats) -> Floats:
@@ -70,9 +74,14 @@ def height_slopes(model: ContourModel, point: Floats, x: Floats) -> Floats:
 
 
 def deviation_of_heights(slopes: Floats, precision: Floats) -> Floats:
-    """Standard deviation of each height, given the precision (information) of the parameters, shape (x,).
+    """Return the standard deviation of each height [length], shape (x,).
 
-    Infinite where nothing is known of what a height depends on.
+    Parameters
+    ----------
+    slopes : ndarray, shape (x, d)
+        Derivatives of the heights, from `height_slopes`.
+    precision : ndarray, shape (d, d)
+        Precision (information) of the parameters; the result is infinite if it is singular.
     """
     scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
     scaled = precision / np.outer(scale, scale)

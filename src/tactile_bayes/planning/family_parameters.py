@@ -1,4 +1,4 @@
-"""What a contour is in the parameters of its family."""
+"""The family of a contour, and its parameters."""
 
 from __future__ import annotations
 
@@ -12,17 +12,23 @@ __all__ = ["enlarged", "family_parameters"]
 
 
 def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
-    """The family, by the name that `infer_contour` takes, and the parameters that it gives this contour.
+    """Return the name of a contour's family, as in `infer_contour`, and its parameters.
 
     Parameters
     ----------
     contour : Contour
-        A single one.
+        A single contour.
+
+    Returns
+    -------
+    family : str
+    parameters : dict of str to float
+        Values by name, lengths in the unit of the contour.
 
     Raises
     ------
     ParameterError
-        If it is of none of the families that have parameters.
+        If the object is no single contour, or of no family with parameters.
 
     Examples
     --------
@@ -52,7 +58,19 @@ def family_parameters(contour: Contour) -> tuple[str, dict[str, float]]:
 
 
 def enlarged(contour: Contour, factor: float) -> Contour:
-    """The contour, of a family with parameters, as many times larger, seen from the origin.
+    """Return a contour scaled by a factor about the origin.
+
+    Parameters
+    ----------
+    contour : Contour
+        A single contour of a family with parameters.
+    factor : float
+        Factor on all lengths, > 0.
+
+    Raises
+    ------
+    ParameterError
+        If the contour is of no family with parameters.
 
     Examples
     --------

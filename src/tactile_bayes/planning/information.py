@@ -1,4 +1,4 @@
-"""What a record will tell: Fisher's information, Cramér and Rao's bounds, and who carries it."""
+"""Fisher's information of a record: Cramér-Rao bounds, and the contributions of channels and samples."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ __all__ = ["information"]
 
 
 def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
-    """Bounds on what can be known of every parameter, and what they come from.
+    """Return bounds on the standard deviation of every parameter, and the contributions of channels and samples.
 
-    No unbiased estimate scatters less than Cramér and Rao's bound, and where noise is small a posterior is as wide as
-    the bound with the priors added (Bernstein and von Mises). To first order, and without what the snap-off alone says:
-    see `record_information`.
+    No unbiased estimate has a smaller standard deviation than the Cramér-Rao bound, and for small noise a posterior is
+    as wide as the bound with the priors added (Bernstein-von Mises theorem). The bounds are of first order and exclude
+    the information of the snap-off itself: see `record_information`.
 
     Parameters
     ----------
     plan : Plan
     probability : float
-        Of the expected bands.
+        Probability of the expected bands, in (0, 1).
 
     Returns
     -------
@@ -34,24 +34,32 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
         Over "parameter", those that `infer_contour` would infer, in the record's units:
 
         value
-            What it is.
+            Value of the plan.
         bound
-            Cramér and Rao's: standard deviation from the record alone, infinite where it says nothing.
+            Cramér-Rao bound: standard deviation from the record alone, infinite if it carries no information.
         bound_with_priors
-            With what the priors say as well: what a posterior will be like.
+            The bound with the information of the priors added, the expected posterior standard deviation.
         bound_if_rest_known
-            If all other parameters were known.
+            The bound if all other parameters were known.
+        prior_sd
+            Standard deviation of the prior.
         correlation (parameter, parameter_)
-            Of a posterior.
+            Expected correlation of the posterior.
 
         Over "channel": bound_of_channel (channel, parameter), with priors, from that channel alone, and
         bound_without_channel, from the other two. Over "sample", with the record's columns: leverage (sample, channel),
-        what a reading contributes to what is known, which sums to the number of parameters that the record tells, and
-        leverage_on (sample, parameter), the share of the bound's inverse square that is lost without the sample.
+        the diagonal of the hat matrix, which sums to the number of parameters that the record determines, the attribute
+        told; and leverage_on (sample, parameter), the share of the bound's inverse square that is lost without the
+        sample.
 
-        Over "x", in the stretches that are touched and in the gaps between: stretch, height, and height_sd, standard
-        deviation of the contour's height with priors. Numbers: touched_width and gap_width, the mean widths of the
-        pointwise bands of that `probability` there [length]; NaN where there is no gap.
+        Over "x", in the touched stretches and in the gaps between: stretch, height, and height_sd, standard deviation
+        of the contour's height with priors [length]. Scalars: touched_width and gap_width, the mean widths of the
+        pointwise bands of that `probability` there [length]; NaN if there is no gap.
+
+    Raises
+    ------
+    ReachError
+        If the rod does not reach the contour in every sweep.
     """
     model, point = plan.model, plan.point
     whole = record_information(model, point)
@@ -60,7 +68,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
     covariance = _inverse(matrix + prior)
     deviation = np.sqrt(np.diag(covariance))
     rows = whole.slopes.reshape(-1, point.size)
-    # Of a linear model the diagonal of the hat matrix: its sum counts the parameters that the record determines.
+    # The diagonal of the hat matrix of a linear model: its sum counts the parameters that the record determines.
     leverage = np.einsum("nci,ij,ncj->nc", whole.slopes, covariance, whole.slopes)
     of_channels: dict[str, list[Floats]] = {"alone": [], "without": []}
     for channel in range(len(CHANNELS)):
@@ -68,9 +76,9 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
         for kind, chosen in (("alone", only), ("without", ~only)):
             part = record_information(model, point, chosen).matrix + prior
             of_channels[kind].append(np.sqrt(np.diag(_inverse(part))))
-    places = stretches(plan.scan)
-    x = np.concatenate([stretch.x for stretch in places])
-    names = np.repeat([stretch.name for stretch in places], [stretch.x.size for stretch in places])
+    intervals = stretches(plan.scan)
+    x = np.concatenate([stretch.x for stretch in intervals])
+    names = np.repeat([stretch.name for stretch in intervals], [stretch.x.size for stretch in intervals])
     spread = deviation_of_heights(height_slopes(model, point, x), matrix + prior)
     wide = band_factor(probability)
     widths = {
@@ -116,7 +124,7 @@ def information(plan: Plan, *, probability: float = 0.95) -> xr.Dataset:
 
 
 def _leverage_on(slopes: Floats, covariance: Floats) -> Floats:
-    """Share of the precision of each parameter that is lost with each sample, shape (samples, d)."""
+    """Return the share of each parameter's precision that is lost without each sample, shape (samples, d)."""
     variance = np.diag(covariance)
     pulled = slopes @ covariance  # (samples, channels, d)
     channels = slopes.shape[1]
@@ -128,13 +136,13 @@ def _leverage_on(slopes: Floats, covariance: Floats) -> Floats:
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Of an information matrix whatever its units; infinite variances where it has none."""
+    """Invert an information matrix of any units; variances without information are infinite."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix / np.outer(scale, scale)
     values, axes = np.linalg.eigh(scaled)
     unknown = values < 1e-12 * values.max()
     inverse = (axes[:, ~unknown] / values[~unknown]) @ axes[:, ~unknown].T
-    # What lies in a direction that nothing is known of is not known.
+    # A parameter with a component along a direction without information is unknown.
     lost = np.sum(axes[:, unknown] ** 2, axis=1) > 1e-9
     inverse[lost, lost] = np.inf
     return np.asarray(inverse / np.outer(scale, scale))

@@ -1,4 +1,4 @@
-"""What is known of a contour and a rig before the next record: a prior, or a posterior so far."""
+"""Knowledge of a contour and a rig before the next record: a prior, or the posterior so far."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ __all__ = ["COARSE", "Base", "Knowledge", "empty_record", "known_from_posterior"
 Base = tuple[float, float]
 
 COARSE = float(np.radians(5.0))
-"""Step of a drive of which only the events are asked."""
+"""Step of the drive for records of which only the events are used [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Points that may be the truth, and what sweeps from other pivots would show of them.
+    """Draws of the possible truth, and models of records from other pivots.
 
     Attributes
     ----------
     experiment : Experiment
-        On an empty record from the pivots so far, or from the origin where there are none.
+        Experiment on an empty record from the pivots so far, or from the origin if there are none.
     points : ndarray, shape (n, d)
         Draws of the contour's parameters, the rig's and the noise's, in the order of the names of `model`.
     precision : ndarray, shape (d, d)
-        One over the covariance of what is known.
+        Inverse of the covariance of the draws.
     bases : tuple of (float, float)
-        From which the object was swept already.
+        Pivots of the sweeps so far [length].
     """
 
     experiment: Experiment
@@ -53,6 +53,7 @@ class Knowledge:
 
     @property
     def rod(self) -> Rod:
+        """The rod of the experiment."""
         return rod_of(self.experiment.record)
 
     def model_from(self, bases: Sequence[Base], drive_step: float) -> ContourModel:
@@ -75,7 +76,14 @@ def empty_record(bases: Sequence[Base], drive_step: float, rod: Rod | None, load
 
 
 def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Truths drawn from an experiment's prior, of those that the rod reaches.
+    """Draw truths from an experiment's prior, restricted to contours within reach.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    draws : int
+        Number of draws.
+    rng : np.random.Generator
 
     Raises
     ------
@@ -91,12 +99,19 @@ def known_from_prior(experiment: Experiment, *, draws: int, rng: np.random.Gener
 
 
 def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.Generator) -> Knowledge:
-    """Draws of a posterior of `infer_contour`, with the rig, the load cell and the pivots that it is of.
+    """Draw truths from a posterior of `infer_contour`, with its rig, load cell and pivots.
+
+    Parameters
+    ----------
+    posterior : xr.DataTree
+    draws : int
+        Number of draws, at most all.
+    rng : np.random.Generator
 
     Raises
     ------
     InferenceError
-        If the tree is none of a contour.
+        If the tree is no posterior of a contour.
     ParameterError
         If the contour is shape-free.
     """
@@ -120,7 +135,7 @@ def known_from_posterior(posterior: xr.DataTree, *, draws: int, rng: np.random.G
     empty, friction = empty_record(bases, COARSE, rod, cell), float(attrs["friction"])
     experiment = Experiment(empty, attrs["family"], cell, rod=rod, friction=friction, nuisances=nuisances)
     every = np.stack([columns[name] for name in experiment.model.names], axis=1)
-    if unknown:  # a scale that does not vary has no precision of its own
+    if unknown:  # a constant scale would make the covariance singular
         every[:, -1] *= np.exp(0.05 * rng.standard_normal(len(every)))
     chosen = rng.choice(len(every), min(draws, len(every)), replace=False)
     return Knowledge(experiment, every[chosen], _precision(every), bases)

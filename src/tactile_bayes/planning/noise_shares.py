@@ -1,4 +1,4 @@
-"""Whose noise it is that a contact point is off by: Sobol' indices over the noises of the readings."""
+"""Shares of the readings' noises in the error of a contact point: Sobol' indices."""
 
 from __future__ import annotations
 
@@ -19,32 +19,35 @@ from tactile_bayes.planning.plan import Plan
 
 __all__ = ["noise_shares"]
 
-_PLACES = 15
-"""Of each sweep, where none are given."""
+_STATES = 15
+"""Default number of states in each sweep."""
 
 _ERRORS = ("along", "across")
 
 
 def noise_shares(
-    plan: Plan, *, seed: int, samples: int = 1024, places: int = _PLACES, methods: tuple[Method, ...] = METHODS
+    plan: Plan, *, seed: int, samples: int = 1024, places: int = _STATES, methods: tuple[Method, ...] = METHODS
 ) -> xr.Dataset:
-    """Shares of the variance of a contact's error that come from each reading's noise (Sobol' 2001).
+    """Return the shares of each reading's noise in the variance of a contact's error (Sobol' 2001).
 
-    Noises of the three channels and of the encoder are independent of one another; the error is what `reconstruct`
-    makes of them, however crooked. To first order every share is gain² σ² over the sum of these, and shares sum to one;
-    what is missing of one comes from noises acting together, and tells how far first order is from the truth.
+    The noises of the three channels and of the encoder are independent, and the error is that of `reconstruct`, however
+    nonlinear. To first order every share is gain² σ² over the sum of these, and shares sum to one; a smaller sum comes
+    from interactions of noises, and measures the deviation from first order.
 
     Parameters
     ----------
     plan : Plan
-        Its load cell's white noise counts, as if that of every channel were independent of the others and of the load;
-        bias and drift do not.
+        Plan of the sweeps. Its load cell's white noise counts, as if that of every channel were independent of the
+        others and of the load; bias and drift do not.
     seed : int
+        Seed of the scrambled Sobol' sequences.
     samples : int
-        For each index, a power of two; `samples · (noises + 2)` contacts are reconstructed at each place.
+        Number of samples for each index, a power of two; `samples · (noises + 2)` contacts are reconstructed at each
+        state.
     places : int
-        Of each sweep, evenly in drive angle.
+        Number of states in each sweep, evenly in drive angle, at least 2.
     methods : tuple of str
+        Methods of reconstruction, "raw" and "constrained".
 
     Returns
     -------
@@ -53,14 +56,14 @@ def noise_shares(
         before_snap_off [rad]:
 
         share (reconstruction, sample, error, source)
-            First-order index of the error "along" and "across" the contour; NaN where a sample has no answer for some
-            of the noise.
+            First-order index of the error "along" and "across" the contour; NaN if some noise leaves a sample without
+            an answer.
         total_share (reconstruction, sample, error, source)
-            With all that the noise does together with others.
+            Total index, with all interactions of the noise with others.
         rms_error (reconstruction, sample, error)
-            Root mean square of the error [length], of the answers.
+            Root mean square of the error of the answers [length].
         without_answer (reconstruction, sample)
-            Share of samples without one.
+            Share of reconstructions without an answer.
 
     Raises
     ------
@@ -69,29 +72,30 @@ def noise_shares(
 
     Notes
     -----
-    By scrambled Sobol' sequences and the estimators of Saltelli et al. (2010), in `scipy.stats.sobol_indices`.
+    The estimators are those of Saltelli et al. (2010) with scrambled Sobol' sequences, as in
+    `scipy.stats.sobol_indices`.
     """
     if check_whole_number("samples", samples, 2, "give a power of two, like 1024") & (samples - 1):
         raise ParameterError(f"samples is {samples!r}: give a power of two, like 1024")
     check_whole_number("places", places, 2)
-    chosen = _places(plan, int(places))
+    chosen = _states(plan, int(places))
     quiet = plan.certain(chosen)
     noises = {**plan.cell.standard_deviations, "drive_angle": plan.cell.drive_angle_deviation}
     sources = [name for name in SOURCES if noises[name] > 0.0]
-    laws = [_law(plan, name, noises[name]) for name in sources]
+    distributions = [_distribution(plan, name, noises[name]) for name in sources]
     shape = (len(methods), quiet.sizes["sample"], len(_ERRORS), len(sources))
     first, total = np.full(shape, np.nan), np.full(shape, np.nan)
     rms, lost = np.full(shape[:3], np.nan), np.full(shape[:2], np.nan)
     for m, method in enumerate(methods):
-        seen: list[Floats] = []
+        evaluated: list[Floats] = []
 
-        def errors(drawn: Floats, method: Method = method, seen: list[Floats] = seen) -> Floats:
+        def errors(drawn: Floats, method: Method = method, evaluated: list[Floats] = evaluated) -> Floats:
             found = _errors(quiet, plan, method, dict(zip(sources, drawn, strict=True)))
-            seen.append(found)
+            evaluated.append(found)
             return np.nan_to_num(found).reshape(-1, drawn.shape[1])
 
-        found = first_and_total(errors, laws, int(samples), seed)
-        every = np.concatenate(seen, axis=-1)
+        found = first_and_total(errors, distributions, int(samples), seed)
+        every = np.concatenate(evaluated, axis=-1)
         missing = np.isnan(every)
         lost[m] = np.mean(missing[:, 0], axis=-1)
         with np.errstate(invalid="ignore"):
@@ -126,44 +130,46 @@ def noise_shares(
 
 
 def first_and_total(
-    function: Callable[[Floats], Floats], laws: Sequence[Any], samples: int, seed: int
+    function: Callable[[Floats], Floats], distributions: Sequence[Any], samples: int, seed: int
 ) -> tuple[Floats, Floats]:
-    """Sobol' indices of first order and total ones of a function's values, shape (values, laws) each.
+    """Return first-order and total Sobol' indices of a function's values, shape (values, inputs) each.
 
     Parameters
     ----------
     function : callable
-        From numbers (laws, n) to values (values, n).
-    laws : sequence of frozen scipy.stats distribution
-        Of independent numbers.
+        Maps inputs, shape (inputs, n), to values, shape (values, n).
+    distributions : sequence of frozen scipy.stats distribution
+        Distributions of the independent inputs.
     samples : int
-        A power of two.
+        Number of samples, a power of two.
     seed : int
+        Seed of the scrambled Sobol' sequences.
     """
-    found = stats.sobol_indices(func=function, n=samples, dists=laws, rng=np.random.default_rng(seed))
-    return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)  # of one value SciPy gives one row
+    found = stats.sobol_indices(func=function, n=samples, dists=distributions, rng=np.random.default_rng(seed))
+    return np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)  # SciPy squeezes a single value
 
 
-def _law(plan: Plan, source: str, deviation: float) -> Any:
+def _distribution(plan: Plan, source: str, deviation: float) -> Any:
+    """Return the frozen distribution of a reading's noise."""
     nu = plan.cell.degrees_of_freedom
     if source == "drive_angle" or math.isinf(nu):
         return stats.norm(0.0, deviation)
     return stats.t(nu, scale=deviation / math.sqrt(nu / (nu - 2.0)))
 
 
-def _places(plan: Plan, places: int) -> xr.Dataset:
-    """Samples evenly between first contact and snap-off of every sweep."""
+def _states(plan: Plan, count: int) -> xr.Dataset:
+    """Return loaded samples at even drive angles between first contact and snap-off of every sweep."""
     angles = []
     for sweep in plan.scan.sweeps:
         first, snap = sweep.first_contact.drive_angle, sweep.snap_off.drive_angle
-        angles.append(first + (snap - first) * (np.arange(places) + 0.5) / places)
+        angles.append(first + (snap - first) * (np.arange(count) + 0.5) / count)
     record = replace(plan, drive_angles=np.concatenate(angles)).scan.record
     near = np.array([np.isin(record.drive_angle.values[i], angles[s]) for i, s in enumerate(record.sweep.values)])
     return record.isel(sample=np.flatnonzero(near & (record.truth_contact_phase.values != "none")))
 
 
 def _errors(quiet: xr.Dataset, plan: Plan, method: Method, noise: dict[str, Floats]) -> Floats:
-    """Of contacts, along and across the contour, shape (samples, 2, draws); NaN without an answer."""
+    """Return errors of contacts along and across the contour, shape (samples, 2, draws); NaN without an answer."""
     draws, samples = next(iter(noise.values())).size, quiet.sizes["sample"]
     many = quiet.isel(sample=np.repeat(np.arange(samples), draws))
     values: dict[str, Any] = {}

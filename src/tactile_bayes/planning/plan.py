@@ -1,4 +1,4 @@
-"""A plan: which contour is swept how, and measured by what."""
+"""A plan of sweeps: contour, drive, rod, load cell, and what is unknown of the rig."""
 
 from __future__ import annotations
 
@@ -32,11 +32,12 @@ __all__ = ["Plan"]
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A contour, how it is swept, what measures it, and what is not known of the rig.
+    """A plan of sweeps: contour, drive, rod, load cell, and what is unknown of the rig.
 
     Parameters
     ----------
     contour : Contour
+        A contour of a family with parameters, in the unit of the rod's length.
     load_cell : LoadCell, optional
         In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
     rod : Rod, optional
@@ -44,13 +45,13 @@ class Plan:
     base, direction, drive_step, drive_angles
         As in `scan`.
     friction, nuisances, priors
-        As in `infer_contour`: a friction that is given is known, and without there is none, to be found out. Priors of
-        the contour's parameters may be given, too.
+        As in `infer_contour`: a friction that is given is known; by default there is none, and inference treats it as
+        unknown. Priors of the contour's parameters may be given, too.
 
     Raises
     ------
     ParameterError
-        If a channel has no noise, or none that has a variance, or an argument is none that is offered.
+        If a channel has no noise or noise without a variance, or an argument has a wrong type.
     """
 
     contour: Contour
@@ -79,19 +80,22 @@ class Plan:
 
     @property
     def taken_rod(self) -> Rod:
+        """The rod, or the dimensionless one by default."""
         return self.rod or Rod()
 
     @property
     def taken_friction(self) -> float:
+        """Coulomb's coefficient, 0 by default."""
         return self.friction or 0.0
 
     @cached_property
     def cell(self) -> LoadCell:
+        """The load cell, or the usual one by default."""
         return self.load_cell or usual_load_cell(self.taken_rod)
 
     @cached_property
     def scan(self) -> Scan:
-        """The sweeps, without errors."""
+        """The sweeps without errors."""
         return scan(
             self.contour,
             direction=self.direction,
@@ -104,43 +108,44 @@ class Plan:
 
     @cached_property
     def record(self) -> xr.Dataset:
-        """What the load cell would read without errors that are drawn."""
+        """The record that the load cell would read without random errors."""
         return self.certain(self.scan.record)
 
     def certain(self, record: xr.Dataset) -> xr.Dataset:
-        """An ideal record as the load cell reads it without errors that are drawn."""
+        """Return an ideal record as the load cell reads it without random errors."""
         certain = LoadCell(**{name: getattr(self.cell, name) for name in (*CERTAIN, "frame")})
         return certain.measure(record, seed=0)
 
     def reconstruct(self, record: xr.Dataset, method: Literal["raw", "constrained"]) -> xr.Dataset:
-        """Contact points of a record of this plan."""
+        """Return the contact points of a record of this plan; see `tactile_bayes.reconstruct`."""
         return reconstruct(record, method=method, load_cell=self.cell, rod=self.rod, friction=self.taken_friction)
 
     @cached_property
     def family(self) -> str:
+        """Family of the contour."""
         return family_parameters(self.contour)[0]
 
     @cached_property
     def experiment(self) -> Experiment:
-        """What is inferred from the record, of the contour's own family."""
+        """Inference from the record, with the contour's own family."""
         return Experiment(self.record, self.family, self.cell, self.priors, self.rod, self.friction, self.nuisances)
 
     @cached_property
     def model(self) -> ContourModel:
-        """The model of the experiment, to full accuracy."""
+        """The model of the experiment, with loads to full accuracy."""
         model = self.experiment.model
         model.likelihood.exact = True
         return model
 
     @cached_property
     def point(self) -> Floats:
-        """The model's parameters, the rig as stated."""
+        """True values of the model's parameters, with the rig as stated, shape (d,)."""
         own = family_parameters(self.contour)[1]
         as_stated = {name: 1.0 for name in self.model.names if name.endswith(("_scale", "_gain"))}
         return np.array([own.get(name, as_stated.get(name, 0.0)) for name in self.model.names])
 
     def with_noise(self, factor: float) -> Plan:
-        """The same with the load cell's noise larger by a factor, and nothing else of it."""
+        """Return the plan with force_noise and moment_noise of the load cell multiplied by a factor."""
         noisier = replace(
             self.cell,
             force_noise=factor * self.cell.force_noise,

@@ -1,4 +1,4 @@
-"""How good the load cell has to be for a band of some width, and which rod a load cell wants."""
+"""Requirements: the noise of the load cell for a band of given width, and the rod for a load cell."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ __all__ = ["Where", "required_noise", "required_rod"]
 
 Where = Literal["gap", "touched", "everywhere"]
 
-_SEEN = 0.5
-"""Share of what the plan's own rod touches that another has to touch."""
+_LEAST_TOUCHED = 0.5
+"""Least share of the grid points of the plan's own rod that another rod must touch."""
 
 _LEAST, _MOST = 1e-6, 1e4
-"""Factors on the noise between which the one that is wanted is sought."""
+"""Range of factors on the noise in which the required one is sought."""
 
 
 class _Band:
@@ -45,19 +45,19 @@ class _Band:
         self._wide = band_factor(probability)
 
     def width(self, factor: float) -> float:
-        """Mean over places."""
+        """Return the mean width over the grid points [length]."""
         plan, cell = self._plan, self._plan.with_noise(factor).cell
-        told = record_information(plan.model, plan.point, slopes=self._by, load_cell=cell).matrix
-        spread = deviation_of_heights(self._slopes, told + self._prior)
+        gained = record_information(plan.model, plan.point, slopes=self._by, load_cell=cell).matrix
+        spread = deviation_of_heights(self._slopes, gained + self._prior)
         return self._wide * float(spread.mean())
 
 
 def required_noise(
     plan: Plan, band_width: float | Sequence[float], *, where: Where = "everywhere", probability: float = 0.95
 ) -> xr.Dataset:
-    """Noise of the load cell at which the expected band is as narrow as is wanted.
+    """Return the noise of the load cell at which the expected band has a given width.
 
-    Force and moment keep the proportion that the plan's load cell has, and all else about it stays.
+    The ratio of force noise to moment noise and all other properties of the plan's load cell stay.
 
     Parameters
     ----------
@@ -65,26 +65,27 @@ def required_noise(
     band_width : float or sequence of float
         Mean width of the pointwise band [length].
     where : {"everywhere", "gap", "touched"}
+        Part of the contour over which the width is averaged.
     probability : float
-        Of the band.
+        Probability of the band, in (0, 1).
 
     Returns
     -------
     xr.Dataset
-        Over "band_width": noise_factor, over what the plan's load cell has; force_noise and moment_noise [N, N m, or
-        EI/L², EI/L]; infinite where the priors alone give such a band. Numbers: present_width, of the plan as it is,
-        and prior_width, without any record.
+        Over "band_width": noise_factor, relative to the plan's load cell; force_noise and moment_noise [N, N m, or
+        EI/L², EI/L]; infinite if the priors alone give such a band. Scalars: present_width, of the plan as it is,
+        and prior_width, without any record [length].
 
     Raises
     ------
     ParameterError
-        If a width is not positive, or no noise is small enough for it.
+        If a width is not positive, no noise is small enough for it, or the sweeps leave no gap and `where` is "gap".
     """
     check_kind("plan", plan, Plan, "give a Plan")
     check_probability("probability", probability)
     several = band_width if np.iterable(band_width) else [band_width]
     wanted = check_numbers("band_width", several, "give a positive length, or several", shape=(None,), least=TINY)
-    band = _Band(plan, _places(plan, where), probability)
+    band = _Band(plan, _grid_points(plan, where), probability)
     least, most = band.width(_LEAST), band.width(_MOST)
     if np.any(wanted <= least):
         raise ParameterError(
@@ -139,34 +140,34 @@ def required_rod(
     probability: float = 0.95,
     progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.Dataset:
-    """Which rod a load cell wants: the expected band of every length and diameter, and whether the rod bears it.
+    """Return the expected band of rods of every length and diameter, whether they stay elastic, and the best rod.
 
-    A thicker rod makes larger loads, which drown in less noise, and is bent closer to its elastic limit. The object and
+    A thicker rod makes larger loads, which are less noisy, and is bent closer to its elastic limit. The object and
     the pivot stay where they are.
 
     Parameters
     ----------
     plan : Plan
-        In SI units, with a load cell; its rod is one to compare with.
+        A plan in SI units, with a load cell; its rod is the reference.
     lengths, diameters : sequence of float
-        Of rods of solid circular cross-section [m].
+        Dimensions of rods of solid circular cross-section [m].
     youngs_modulus : float
-        [Pa].
+        Young's modulus [Pa].
     elastic_strain : float
-        Bending strain that the material takes without staying bent: about 0.005 for spring steel, 0.05 for nitinol.
+        Largest elastic bending strain of the material: about 0.005 for spring steel, 0.05 for nitinol.
     where, probability
         As in `required_noise`.
     progress : callable, optional
-        Is given a `TaskProgress` after each rod.
+        Called with a `TaskProgress` after each rod.
 
     Returns
     -------
     xr.Dataset
-        Over "length" and "diameter" [m]: width, the mean width of the expected band where the plan's own rod touches,
-        or leaves a gap [m]; strain, the largest on the way to the snap-offs; status, "ok", "bent too far", "touches
-        little" (less than half of what the plan's own rod does, gap included, so that the band is the family's affair
-        alone), "does not reach" or "cannot be swept". Numbers: best_length, best_diameter and best_width of the
-        rod with the narrowest band that is "ok"; NaN where none is.
+        Over "length" and "diameter" [m]: width, the mean width of the expected band over the part of the contour that
+        the plan's own rod touches, or leaves as a gap [m]; strain, the largest one up to the snap-offs; status, "ok",
+        "bent too far", "touches little" (less than half of what the plan's own rod does, gap included, so that the
+        family alone determines the band), "does not reach" or "cannot be swept". Scalars: best_length, best_diameter
+        and best_width of the rod with the narrowest band that is "ok" [m]; NaN if none is.
 
     Raises
     ------
@@ -181,19 +182,21 @@ def required_rod(
         raise ParameterError(
             "a rod is sought for a load cell in N and N m: give a plan with a rod in SI, and a load_cell"
         )
-    x = _places(plan, where)
-    sides = {
+    x = _grid_points(plan, where)
+    dimensions = {
         name: check_numbers(
             f"{name}s", np.atleast_1d(values), "give a list of positive numbers [m]", shape=(None,), least=TINY
         )
         for name, values in (("length", lengths), ("diameter", diameters))
     }
-    shape = (sides["length"].size, sides["diameter"].size)
+    shape = (dimensions["length"].size, dimensions["diameter"].size)
     width, strain = np.full(shape, np.nan), np.full(shape, np.nan)
     status = np.full(shape, "", dtype="U16")
     began = time.monotonic()
     for done, (i, j) in enumerate(np.ndindex(shape), start=1):
-        rod = Rod.circular(float(sides["length"][i]), float(sides["diameter"][j]), youngs_modulus, elastic_strain)
+        rod = Rod.circular(
+            float(dimensions["length"][i]), float(dimensions["diameter"][j]), youngs_modulus, elastic_strain
+        )
         width[i, j], strain[i, j], status[i, j] = _judged(replace(plan, rod=rod), elastic_strain, x, probability)
         if progress is not None:
             progress(TaskProgress(done, width.size, done, time.monotonic() - began))
@@ -206,17 +209,17 @@ def required_rod(
             "width": (("length", "diameter"), width, metres),
             "strain": (("length", "diameter"), strain),
             "status": (("length", "diameter"), status),
-            "best_length": ((), sides["length"][best[0]] if found else np.nan, metres),
-            "best_diameter": ((), sides["diameter"][best[1]] if found else np.nan, metres),
+            "best_length": ((), dimensions["length"][best[0]] if found else np.nan, metres),
+            "best_diameter": ((), dimensions["diameter"][best[1]] if found else np.nan, metres),
             "best_width": ((), width[best] if found else np.nan, metres),
         },
-        coords={name: (name, values, metres) for name, values in sides.items()},
+        coords={name: (name, values, metres) for name, values in dimensions.items()},
         attrs={"where": where, "probability": probability, "elastic_strain": elastic_strain},
     )
 
 
 def _judged(plan: Plan, elastic_strain: float, x: Floats, probability: float) -> tuple[float, float, str]:
-    """Width of the band and largest strain, NaN where there are none, and what speaks for or against a plan's rod."""
+    """Return width of the band, largest strain (NaN if unknown), and status of a plan's rod."""
     strain = math.nan
     try:
         with warnings.catch_warnings():
@@ -230,14 +233,14 @@ def _judged(plan: Plan, elastic_strain: float, x: Floats, probability: float) ->
     if strain > elastic_strain:
         return width, strain, "bent too far"
     arcs = stretches(plan.scan)
-    seen = np.mean((x >= arcs[0].begin) & (x <= arcs[-1].end))
-    return width, strain, "ok" if seen >= _SEEN else "touches little"
+    touched = np.mean((x >= arcs[0].begin) & (x <= arcs[-1].end))
+    return width, strain, "ok" if touched >= _LEAST_TOUCHED else "touches little"
 
 
-def _places(plan: Plan, where: Where) -> Floats:
-    """Values of x."""
+def _grid_points(plan: Plan, where: Where) -> Floats:
+    """Return grid points of x on a part of the contour."""
     check_choice("where", where, ("everywhere", "gap", "touched"))
-    places = [stretch.x for stretch in stretches(plan.scan) if where in ("everywhere", stretch.name)]
-    if not places:
+    grid = [stretch.x for stretch in stretches(plan.scan) if where in ("everywhere", stretch.name)]
+    if not grid:
         raise ParameterError("the sweeps leave no gap: ask for the band where the contour is touched")
-    return np.concatenate(places)
+    return np.concatenate(grid)

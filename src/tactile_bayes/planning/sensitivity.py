@@ -1,4 +1,4 @@
-"""How good a load cell must be: everything that errors of the sensor do to a contour, in one answer."""
+"""Sensitivity of contact points and of a contour to errors of the sensor, in one result."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tactile_bayes.planning.information import information
 from tactile_bayes.planning.noise_shares import noise_shares
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.planning.requirement import required_noise
-from tactile_bayes.planning.sensitivity_words import sensitivity_in_words
+from tactile_bayes.planning.sensitivity_summary import sensitivity_summary
 from tactile_bayes.tasks import TaskProgress
 
 __all__ = ["PARTS", "sensitivity"]
@@ -30,7 +30,7 @@ __all__ = ["PARTS", "sensitivity"]
 PARTS = ("amplification", "information", "noise_shares", "required_noise")
 
 _WIDTHS = (0.0005, 0.001, 0.0025, 0.005, 0.01)
-"""Of bands that are asked for where none are given [rod lengths]."""
+"""Default widths of bands [rod lengths]."""
 
 
 def sensitivity(
@@ -52,31 +52,32 @@ def sensitivity(
     parts: Sequence[str] = PARTS,
     progress: Callable[[TaskProgress], object] | None = None,
 ) -> xr.DataTree:
-    """What errors of the sensor do to contact points and to a contour, and how small they have to be.
+    """Return the effects of errors of the sensor on contact points and on a contour, and the required noise.
 
     Parameters
     ----------
     contour : Contour, optional
-        Of a family with parameters, in the unit of the rod's length; by default profile II of Merker et al. 2018 at the
-        distance 0.5 rod lengths.
+        Contour of a family with parameters, in the unit of the rod's length; by default profile II of Merker et al.
+        2018 (doi 10.1155/2018/1613945) at the distance 0.5 rod lengths.
     seed : int
-        Of the noise by which Sobol' indices are estimated.
+        Seed of the samples by which Sobol' indices are estimated.
     load_cell : LoadCell, optional
         In the units of the rod; by default force_noise 0.05 EI/L² and moment_noise 0.02 EI/L.
     rod, base, direction, drive_step, drive_angles
         As in `scan`.
     friction, nuisances, priors
-        As in `infer_contour`: a friction that is given is known, and without there is none, to be found out.
+        As in `infer_contour`: a friction that is given is known; by default there is none, and inference treats it as
+        unknown.
     band_widths : sequence of float, optional
-        Mean widths of bands for which the noise is sought [length]; by default 0.0005 to 0.01 rod lengths.
+        Mean widths of bands whose required noise is computed [length]; by default 0.0005 to 0.01 rod lengths.
     probability : float
-        Of the bands.
+        Probability of the bands, in (0, 1).
     samples : int
-        For Sobol' indices, a power of two.
+        Number of samples for Sobol' indices, a power of two.
     parts : sequence of str
-        Which of the groups are made.
+        Names of the groups to compute.
     progress : callable, optional
-        Is given a `TaskProgress` after each part.
+        Called with a `TaskProgress` after each part.
 
     Returns
     -------
@@ -87,15 +88,15 @@ def sensitivity(
             Errors of single contacts by errors of each reading along the sweep, to first order: see
             `tactile_bayes.planning.amplification.amplification`.
         information
-            Bounds on every parameter and on the contour, and which readings they come from: see
+            Bounds on every parameter and on the contour, and the contributions of readings: see
             `tactile_bayes.planning.information.information`.
         noise_shares
-            Sobol' indices: whose noise it is, also where first order does not hold: see
+            Sobol' indices: shares of the readings' noises, beyond first order: see
             `tactile_bayes.planning.noise_shares.noise_shares`.
         required_noise
-            Which noise a band of some width allows: see `tactile_bayes.planning.requirement.required_noise`.
+            Noise that a band of given width requires: see `tactile_bayes.planning.requirement.required_noise`.
 
-        Attribute words: what they say, in sentences.
+        Attribute words: a summary in sentences.
 
     Raises
     ------
@@ -150,6 +151,6 @@ def sensitivity(
         "rod_flexural_rigidity": taken.flexural_rigidity,
         "force_noise": plan.cell.force_noise,
         "moment_noise": plan.cell.moment_noise,
-        "words": "\n".join(sensitivity_in_words(tree, plan)),
+        "words": "\n".join(sensitivity_summary(tree, plan)),
     }
     return tree

@@ -106,7 +106,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     by_sweep = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
     samples = np.concatenate([rows[::every] for rows in by_sweep])
     batch_indices = np.empty(numbers.size, dtype=np.intp)
-    for index, segment in enumerate(likelihood.strokes):
+    for index, segment in enumerate(likelihood.segments):
         batch_indices[segment.samples] = index
     batch_index = batch_indices[samples]
     mirrored = paths.sweep_frame.mirrored[batch_index]

@@ -183,7 +183,7 @@ def contacts_of(
     Drive angles, shape (samples,), are readings corrected by the data sheet; NaN where no contact is sought. With
     ``exact=False`` the events are found to 1e-6 rad, at a quarter of the cost.
     """
-    count, segments = contours.shape[0], likelihood.strokes
+    count, segments = contours.shape[0], likelihood.segments
     read = angle - np.broadcast_to(likelihood.misread(rig), (count, angle.size))
     shape = (len(segments), max(segment.samples.size for segment in segments))
     samples = np.zeros(shape, dtype=np.intp)

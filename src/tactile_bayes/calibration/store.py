@@ -1,4 +1,4 @@
-"""The ledger of a calibration: which replicates are done, and what came of them."""
+"""Outcomes of replicates in the results store of a calibration."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _decode(row: dict[str, Any]) -> Outcome:
         {name: int(rank) for name, rank in row["ranks"].items()},
         {name: math.nan if v is None else float(v) for name, v in row["numbers"].items()},
         str(row["message"]),
-        str(row.get("traceback", "")),  # of older ledgers none was kept
+        str(row.get("traceback", "")),  # older stores have none
     )
 
 

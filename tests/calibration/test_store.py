@@ -1,4 +1,4 @@
-"""The ledger of a calibration: what is written is read, and nothing else is."""
+"""The results store of a calibration: what is written is read, and nothing else is."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import math
 import pytest
 
 from helpers.refusals import refused
-from tactile_bayes.calibration.ledger import REPLICATES
 from tactile_bayes.calibration.replicate import Outcome
+from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.errors import CalibrationError
 from tactile_bayes.tasks import ResultsStore, files, open_results_store
 
@@ -39,8 +39,8 @@ def _values(outcome):
 
 
 def filled(folder, words=WORDS):
-    with open_results_store(words, folder, REPLICATES) as ledger:
-        ledger.outcomes.update(ROWS)
+    with open_results_store(words, folder, REPLICATES) as store:
+        store.outcomes.update(ROWS)
     return folder / LEDGER
 
 
@@ -58,10 +58,10 @@ def left_alone(folder, *named, words=WORDS):
 def test_what_is_written_is_read(tmp_path):
     file = filled(tmp_path / "made" / "on the way")
     assert [path.name for path in file.parent.iterdir()] == [LEDGER]
-    with open_results_store(WORDS, file.parent, REPLICATES) as ledger:
-        assert list(ledger.outcomes) == sorted(ROWS)
-        assert all(equal(ledger.outcomes[number], row) for number, row in ROWS.items())
-        assert all(type(rank) is int for row in ledger.outcomes.values() for rank in row.ranks.values())
+    with open_results_store(WORDS, file.parent, REPLICATES) as store:
+        assert list(store.outcomes) == sorted(ROWS)
+        assert all(equal(store.outcomes[number], row) for number, row in ROWS.items())
+        assert all(type(rank) is int for row in store.outcomes.values() for rank in row.ranks.values())
     written = file.read_bytes()
     filled(file.parent)
     assert file.read_bytes() == written
@@ -75,7 +75,7 @@ def test_the_file_is_plain_json(tmp_path):
     assert table["replicates"][1]["numbers"]["width_in_gap"] is None
 
 
-def test_a_ledger_without_tracebacks_is_read(tmp_path):
+def test_a_store_without_tracebacks_is_read(tmp_path):
     """As older ones are; what was lost there is lost here."""
     file = filled(tmp_path)
     table = json.loads(file.read_text(encoding="utf-8"))
@@ -88,17 +88,17 @@ def test_a_ledger_without_tracebacks_is_read(tmp_path):
 
 def test_new_ones_are_added_to_those_that_are_there(tmp_path):
     filled(tmp_path)
-    with open_results_store(WORDS, tmp_path, REPLICATES) as ledger:
-        ledger.outcomes[4] = Outcome({"a": 7}, {}, "new")
+    with open_results_store(WORDS, tmp_path, REPLICATES) as store:
+        store.outcomes[4] = Outcome({"a": 7}, {}, "new")
     assert list(ResultsStore(WORDS, tmp_path, REPLICATES).outcomes) == [0, 3, 4, 11]
 
 
 def test_without_a_folder_it_is_kept_in_memory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with open_results_store(WORDS, None, REPLICATES) as ledger:
-        ledger.outcomes.update(ROWS)
-        ledger.write()
-    assert ledger.outcomes == ROWS
+    with open_results_store(WORDS, None, REPLICATES) as store:
+        store.outcomes.update(ROWS)
+        store.write()
+    assert store.outcomes == ROWS
     assert not list(tmp_path.iterdir())
 
 
@@ -116,10 +116,10 @@ def test_what_is_done_is_written_however_the_block_ends(tmp_path, error):
 def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path):
     file = filled(tmp_path)
     before = file.read_bytes()
-    ledger = ResultsStore(WORDS, tmp_path, REPLICATES)
-    ledger.outcomes[5] = Outcome({}, {}, object())  # which JSON cannot hold
+    store = ResultsStore(WORDS, tmp_path, REPLICATES)
+    store.outcomes[5] = Outcome({}, {}, object())  # which JSON cannot hold
     with pytest.raises(TypeError):
-        ledger.write()
+        store.write()
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {LEDGER: before}
 
 
@@ -130,8 +130,8 @@ def test_what_a_killed_run_left_behind_is_removed(tmp_path):
     half.mkdir()
     (half / LEDGER).write_text('{"format": 1, "exper')
     (tmp_path / "notes.json").write_text("{}")
-    with open_results_store(WORDS, tmp_path, REPLICATES) as ledger:
-        assert len(ledger.outcomes) == len(ROWS)
+    with open_results_store(WORDS, tmp_path, REPLICATES) as store:
+        assert len(store.outcomes) == len(ROWS)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.json", LEDGER]
 
 

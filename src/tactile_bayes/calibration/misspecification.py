@@ -1,4 +1,4 @@
-"""The world as it is, where inference takes it for something else."""
+"""Misspecification: differences between the simulated rig and what inference assumes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NUMBERS = {
     "further_base_shift": 2,
     "flat_spot": 2,
 }
-"""What of a world is numbers, and how many they are."""
+"""Numeric entries of a misspecification, and how many numbers each has."""
 
 _NOTHING: Triple = (0.0, 0.0, 0.0)
 
@@ -38,37 +38,42 @@ _SPOT = 0.1
 """Standard deviation of a flat spot in slope angle [rad]."""
 
 _ENDS, _KNOTS = 1.5, 121
-"""Of a contour with a flat spot, which is a spline over slope angle [rad]."""
+"""Largest slope angle [rad], and number of knots, of a contour with a flat spot, which is a spline."""
 
 
 @dataclass(frozen=True)
 class World:
-    """In what the world differs from what inference assumes; by default in nothing.
+    """Misspecification: differences between the simulated rig and what inference assumes, by default none.
 
     Parameters
     ----------
     friction : float
-        Coulomb's coefficient that the rod slides with, beyond that which inference knows of.
+        Coulomb's coefficient in addition to the one that inference knows or infers, >= 0.
     base_shift : (float, float)
-        By how much the pivots are off where the record has them [length].
+        Shift of all pivots from their recorded positions [length].
     further_base_shift : (float, float)
-        By how much all pivots but the first are off besides [length].
+        Additional shift of all pivots except the first [length].
     rigidity_scale : float
-        Flexural rigidity over that stated, beside what is inferred of it.
+        Flexural rigidity over the stated one, > 0, times the inferred factor.
     drive_angle_offset : float
-        What the encoder reads too much, beside what is inferred of it [rad].
+        Encoder offset in addition to the inferred one [rad].
     bias, drift : (float, float, float)
-        Of the readings of moment, force_x and force_y; a drift is what a zero moves by evenly from the first sample to
-        the last, a bias what it is in the middle; beside what is inferred of them.
+        Errors of the readings of moment, force_x and force_y, in the record's units, in addition to the inferred ones:
+        a drift is the linear change of a zero from the first sample to the last, a bias its value in the middle.
     load_cell : LoadCell, optional
-        That which measures, in place of the one that inference is told.
+        Load cell of the simulation, in place of the one that inference assumes.
     flat_spot : (float, float), optional
-        Slope angle [rad] and factor by which the radius of curvature is larger there, and within 0.1 rad of it (a bell
-        curve of that standard deviation), than that of any contour of the family.
+        Slope angle [rad], and factor, > 0, by which the radius of curvature is larger there than that of the drawn
+        contour; the factor's logarithm falls off as a bell curve with a standard deviation of 0.1 rad.
     family : str, optional
-        From which contours are drawn, in place of that which inference takes them for; its priors are its own.
+        Family from which contours are drawn, with its own priors, in place of the one that inference assumes.
     priors : mapping
-        Of some parameters, from which truths are drawn in place of those that inference takes.
+        Priors from which the truths of some parameters are drawn, in place of those of inference.
+
+    Raises
+    ------
+    ParameterError
+        If an entry is impossible, or there is no such family.
 
     Examples
     --------
@@ -92,9 +97,9 @@ class World:
         for name, size in NUMBERS.items():
             if name == "flat_spot" and self.flat_spot is None:
                 continue
-            remedy = f"give {size} finite numbers" if size > 1 else "give a finite number"
+            correction = f"give {size} finite numbers" if size > 1 else "give a finite number"
             shape = (size,) if size > 1 else ()
-            numbers = check_numbers(f"{name} of the world", getattr(self, name), remedy, shape=shape).tolist()
+            numbers = check_numbers(f"{name} of the world", getattr(self, name), correction, shape=shape).tolist()
             object.__setattr__(self, name, tuple(numbers) if size > 1 else numbers)
         check_number("friction of the world", self.friction, "give a coefficient from 0 up", least=0.0)
         if not self.rigidity_scale > 0.0 or (self.flat_spot is not None and not self.flat_spot[1] > 0.0):
@@ -108,13 +113,13 @@ class World:
         return f"World({', '.join(f'{name}={value!r}' for name, value in self._given().items())})"
 
     def _given(self) -> dict[str, Any]:
-        """What is not as by default."""
+        """Return the entries that differ from their defaults."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
         ideal: dict[str, Any] = {each.name: {} if each.name == "priors" else each.default for each in fields(self)}
         return {name: value for name, value in given.items() if value != ideal[name]}
 
     def contour(self, drawn: Contour) -> Contour:
-        """The object, of shape (1,), from a contour of the family."""
+        """Return the contour of the object, shape (1,), from a drawn one."""
         if self.flat_spot is None:
             return drawn
         slopes = np.linspace(-_ENDS, _ENDS, _KNOTS)
@@ -125,7 +130,7 @@ class World:
         return ShapeFree(slopes, flatter[None], x=x, y=y, at=0.0)
 
     def rig(self, drawn: Rig, pivots: int) -> Rig:
-        """The rig, of one contour, from what was drawn of it."""
+        """Return the misspecified rig of one contour from the drawn one."""
         shifts = np.zeros((1, pivots, 2))
         if drawn.base_shifts is not None:
             shifts[:, : drawn.base_shifts.shape[1]] += drawn.base_shifts

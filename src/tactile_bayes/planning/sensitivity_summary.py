@@ -1,4 +1,4 @@
-"""What a sensitivity analysis says, in sentences."""
+"""Summary of a sensitivity analysis in sentences."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import xarray as xr
 from tactile_bayes.arrays import Floats
 from tactile_bayes.planning.plan import Plan
 
-__all__ = ["sensitivity_in_words"]
+__all__ = ["sensitivity_summary"]
 
 _NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "force_y", "drive_angle": "the drive angle"}
 
 
-def sensitivity_in_words(tree: xr.DataTree, plan: Plan) -> tuple[str, ...]:
-    """One sentence for each thing that a user would ask."""
+def sensitivity_summary(tree: xr.DataTree, plan: Plan) -> tuple[str, ...]:
+    """Return sentences on the main results of a sensitivity analysis."""
     si = plan.record.attrs["units"] != "dimensionless"
     return tuple(_sentences(tree, plan, si))
 
@@ -56,18 +56,18 @@ def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
                 f"{float(mean.max()):.0%} of its variance on the mean over the sweep."
             )
     if "information" in tree:
-        told = tree["information"].to_dataset()
+        found = tree["information"].to_dataset()
         kinds = [("touched", "where it is touched"), ("gap", "in the gap")]
         parts = [
-            f"{_length(float(told[f'{kind}_width']), si)} wide {words}"
-            for kind, words in kinds
-            if np.isfinite(float(told[f"{kind}_width"]))
+            f"{_length(float(found[f'{kind}_width']), si)} wide {part}"
+            for kind, part in kinds
+            if np.isfinite(float(found[f"{kind}_width"]))
         ]
-        yield f"The {told.attrs['probability']:.0%} band of the contour is to be expected {' and '.join(parts)}."
-        lost = told.bound_without_channel.values / told.bound_with_priors.values
-        own = [i for i, name in enumerate(told.parameter.values) if str(name) != "noise_scale"]
+        yield f"The {found.attrs['probability']:.0%} band of the contour is to be expected {' and '.join(parts)}."
+        lost = found.bound_without_channel.values / found.bound_with_priors.values
+        own = [i for i, name in enumerate(found.parameter.values) if str(name) != "noise_scale"]
         worst = np.exp(np.log(lost[:, own]).mean(axis=1))
-        channel = str(told.channel.values[int(np.argmax(worst))])
+        channel = str(found.channel.values[int(np.argmax(worst))])
         yield (
             f"Most is lost without {_NAMES[channel]}: bounds on the parameters would be {worst.max():.1f} times as "
             "large, on the geometric mean."
@@ -84,7 +84,7 @@ def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
 
 
 def _spacing(grown: xr.Dataset) -> Floats:
-    """Of states in drive angle: they are close where a sweep begins and ends."""
+    """Return the spacing of states in drive angle: they are dense near first contact and snap-off."""
     spacing = np.empty(grown.sizes["sample"])
     for sweep in np.unique(grown.sweep.values):
         here = np.flatnonzero(grown.sweep.values == sweep)

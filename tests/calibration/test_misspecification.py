@@ -1,4 +1,4 @@
-"""The world as it is: what it may not be, and what it makes of contour and rig."""
+"""Misspecification: refused entries, and its effect on contour and rig."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from helpers.refusals import refused
-from tactile_bayes.calibration.world import World
+from tactile_bayes.calibration.misspecification import World
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import Rig
