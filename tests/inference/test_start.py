@@ -27,7 +27,7 @@ def test_optimum_of_a_linear_problem():
     noise = 0.1 * np.random.default_rng(2).normal(size=50)
     data = DESIGN @ (TRUE / SPREAD) + noise
     found = best_optimum(linear(data), np.zeros((1, 2)), MIDDLE, SPREAD)
-    # Residuals far below _BRAVE: robust and plain least squares agree to their square over 4 · 2².
+    # Residuals far below _HUBER_THRESHOLD: robust and plain least squares agree to their square over 4 · 2².
     expected = np.linalg.lstsq(DESIGN, data, rcond=None)[0] * SPREAD
     np.testing.assert_allclose(found.point, expected, rtol=0.02)
     information = DESIGN.T @ DESIGN + np.eye(2)

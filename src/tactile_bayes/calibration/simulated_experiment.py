@@ -19,7 +19,7 @@ from tactile_bayes.inference.contour_problem import ContourProblem, contour_prob
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment, priors_in_words
 from tactile_bayes.inference.likelihood import bases_of
-from tactile_bayes.inference.priors import refuse_strangers
+from tactile_bayes.inference.priors import refuse_unknown_priors
 from tactile_bayes.load_cell import LoadCell
 
 __all__ = ["SimulatedExperiment"]
@@ -50,7 +50,7 @@ class SimulatedExperiment:
                 "the load cell has no noise, so that there is nothing to calibrate: give "
                 "LoadCell(force_noise=0.05, moment_noise=0.02), in the record's units"
             )
-        refuse_strangers(self.world.priors, self.names, "of the world ")
+        refuse_unknown_priors(self.world.priors, self.names, "of the world ")
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: the model is built again where it is needed."""

@@ -82,7 +82,7 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     sensed = model.nuisances.sensed(loads, values, measures)[0]
     units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
     readings = measures.simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
-    course = model.nuisances.way[:, None]
+    course = model.nuisances.elapsed[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course
     template = experiment.assumed.record
     # The template has the readings without noise and resolution; systematic errors are in the angles of the rod.

@@ -42,7 +42,7 @@ from tactile_bayes.reconstruction import CONTACT_SIDES
 __all__ = ["Sampled", "contours_of", "infer_contour", "sampled"]
 
 _PRIOR_SECONDS = 3.0
-"""Time for draws from the prior [s] where time is limited: a rod may reach few of its contours."""
+"""Time limit for draws from the prior [s] if time is limited, since a rod may reach few contours."""
 
 
 def infer_contour(
@@ -61,72 +61,71 @@ def infer_contour(
     progress: Callable[[Progress], object] | None = None,
     keep: Callable[[xr.DataTree], object] | None = None,
 ) -> xr.DataTree:
-    """Posterior of a contour's parameters from a whole record, by independent emcee ensembles.
+    """Return the posterior of a contour's parameters from a whole record, by independent emcee ensembles.
 
-    Every sample counts, also the unloaded ones: a contour that would have been touched later, or let go earlier, than
+    The likelihood includes the unloaded samples: a contour whose first contact or snap-off is earlier or later than
     the record shows is unlikely. Contours that some sweep of the record could not reach are excluded. The walkers start
-    around a robust least-squares optimum that begins at the contact points of Step 2, or at the best of many draws from
-    the prior where channels are missing.
+    around a robust least-squares optimum, whose search begins at the contact points of Step 2, or, if channels are
+    missing, at the best of many draws from the prior.
 
     Parameters
     ----------
     measured : xr.Dataset
         A record; SI or dimensionless, channels may be missing.
     family : str
-        What shape the contour is known to have: parabola, circle, ellipse, power-law, or one for each flank, like
-        "parabola/power-law", on the left and on the right of a common vertex. Or "shape-free", any smooth one.
+        Family of the contour: parabola, circle, ellipse, power-law, or one for each flank, like "parabola/power-law",
+        on the left and on the right of a common vertex; or "shape-free", any smooth contour.
     load_cell : LoadCell, optional
-        The sensor, in the record's units; by default the data sheet that the record carries. Its noise is taken as
-        known up to the factor `noise_scale`, which is inferred. Without any, or if it states none for all channels,
-        `moment_noise` and `force_noise` are.
+        The sensor, in the record's units; by default the data sheet in the record. Its noise is known up to the factor
+        `noise_scale`, which is inferred. If no noise is stated for any channel, `moment_noise` and `force_noise` are
+        inferred.
     priors : mapping of str to frozen scipy.stats distribution, optional
-        In place of some of the default ones (see Notes), in the record's units. A nuisance parameter that has a prior
-        is inferred.
+        Priors in place of the default ones (see Notes), in the record's units. A nuisance parameter that has a prior is
+        inferred.
     seed : int or numpy.random.SeedSequence
-        The same seed, the same draws.
+        Seed of all random numbers; the same seed gives the same draws.
     rod : Rod, optional
-        In place of the rod that an SI record states.
+        Rod in place of the one that an SI record states.
     friction : float, optional
-        Coulomb's coefficient μ where it is known; by default it is among the nuisances, and there is none if they are
-        others.
+        Coulomb's coefficient μ if it is known. By default it is among the nuisances; if other nuisances are given, the
+        default is 0.
     nuisances : sequence of str
-        What is not known of the rig, and inferred beside the contour: "rigidity_scale" (flexural rigidity over that
-        stated), "drive_angle_offset" (what the encoder reads too much [rad]), "bias" (of all channels, or
-        "moment_bias", "force_x_bias", "force_y_bias"), "lever" (where the cell takes its moment, from the pivot along
-        its axes, or "lever_x", "lever_y"), "backlash" (what the encoder reads more in forward than in backward motion
-        [rad]), "drift" (of all, or "moment_drift" and so on: by how much a zero moves evenly from the first sample to
-        the last; a bias is that in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
-        "suspension_compliance" (turn of the pivot per holding moment). By default the first five and friction, but no
-        lever of a record without the moment, no backlash of one in a single direction, which cannot tell them, and no
-        friction that is given; an empty list takes all as stated. "base": how much the second and further pivots of a
-        record are off, as "base_2_x", "base_2_y", "base_3_x" and so on. The first one's place cannot be inferred,
-        since a shift of pivots and object together changes nothing that is measured: results are relative to it.
+        Parameters of the rig that are inferred beside the contour: "rigidity_scale" (flexural rigidity over the stated
+        one), "drive_angle_offset" (encoder offset [rad]), "bias" (of all channels, or "moment_bias", "force_x_bias",
+        "force_y_bias"), "lever" (the point of the moment's reference, from the pivot along the axes of the cell
+        [length], or "lever_x", "lever_y"), "backlash" (reading of the encoder in forward motion less that in backward
+        motion [rad]), "drift" (of all channels, or "moment_drift" and so on: linear change of a zero from the first
+        sample to the last; the bias is the zero in the middle), "gain" (likewise), "friction" (Coulomb's coefficient),
+        "suspension_compliance" (turn of the pivot per holding moment). By default the first five and friction, except
+        those that are not identifiable (the lever without the moment, the backlash in a single direction) and a given
+        friction; an empty list takes all as stated. "base": shifts of the second and further pivots of a record, as
+        "base_2_x", "base_2_y", "base_3_x" and so on. The position of the first pivot is not identifiable, since a
+        common shift of pivots and object changes no reading: results are relative to it.
     events : bool
-        Whether the samples without load count, which tell where contact begins and ends. Without them only those count
-        whose load noise does not explain: what a method knows that looks at contacts alone.
+        Whether unloaded samples count, which show where contact begins and ends. Otherwise only samples count whose
+        load exceeds the noise, as in methods that use contacts alone.
     settings : SamplerSettings, optional
-        When to stop, and how much to spend at most.
+        Criteria of convergence, and limits of steps and time.
     checkpoint : path-like, optional
-        Folder of its own, made if it is not there, in which every block of steps is kept as soon as it is done. A run
-        that was stopped, however it was, goes on from there when it is called again, and gives the draws of one that
-        was not; it is refused, saying what differs, if record, model, seed or settings are others. Only what ends a run
-        may change: max_steps, max_seconds, min_ess and max_r_hat of the settings.
+        Folder for this run alone, created if it does not exist, in which every finished block of steps is stored. A run
+        that was interrupted in any way resumes from it when it is called again, with the same draws as without the
+        interruption. A checkpoint of another record, model, seed or settings is refused with the difference, except
+        for max_steps, max_seconds, min_ess and max_r_hat of the settings.
     progress : callable, optional
-        Is given a `Progress` after each look at the diagnostics.
+        Called with a `Progress` after each evaluation of the diagnostics.
     keep : callable, optional
-        Is given the posterior as soon as it is drawn, without the groups that are made of it (predictions, events,
-        draws from the prior), so that it may be on disk before they can fail.
+        Called with the posterior as soon as it is drawn, without the derived groups (predictions, events, draws from
+        the prior), so that it can be stored before they can fail.
 
     Returns
     -------
     xr.DataTree
-        In ArviZ's layout and the record's units, a chain being an ensemble: `posterior`, `sample_stats`, `prior`,
-        `posterior_predictive` and `log_likelihood` (by sample; of some of the draws, and of fewer for more than 4,000
-        samples), `events` (first contact and snap-off of each sweep, of 250 draws of each chain), `observed_data`,
-        `constant_data`. Attributes: version, seed,
-        settings, hash of the data, `converged` and a `message` in words. A KeyboardInterrupt (Ctrl-C) while walkers
-        walk ends the run, and what they have drawn is returned, with `converged` 0 and a message that says so; before
-        that it is passed on.
+        Groups in ArviZ's layout and the record's units, with one chain for each ensemble: `posterior`, `sample_stats`,
+        `prior`, `posterior_predictive` and `log_likelihood` (by sample; for some of the draws, and for fewer with more
+        than 4,000 samples), `events` (first contact and snap-off of each sweep segment, for 250 draws of each chain),
+        `observed_data`, `constant_data`. Attributes: version, seed, settings, hash of the data, `converged` (0 or 1)
+        and a `message`. A KeyboardInterrupt (Ctrl-C) during sampling ends the run and returns the draws so far, with
+        `converged` 0 and a message to that effect; before sampling it is passed on.
 
     Raises
     ------
@@ -136,12 +135,12 @@ def infer_contour(
         If the family is unknown, a prior does not belong to a parameter, the seed is no whole number from 0 up, or the
         load cell has noise on some channels, and none on another.
     InferenceError
-        If no sample carries any load, no contour of the family is found that the rod can reach, or the checkpoint is of
+        If no sample carries a load, no contour of the family is found that the rod can reach, or the checkpoint is of
         another run, damaged or in use.
 
     Notes
     -----
-    The default priors follow from pivot and rod length L alone, never from what was measured. Vertex: within a rod
+    The default priors follow from pivot and rod length L alone, not from measured values. Vertex: within a rod
     length of the pivot sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r and the
     ellipse's semi-axes a (sideways) and b: log-normal around L/2, all with standard deviation 1 of the logarithm. The
     power law is (y − q)/w = (|x − x_c|/w)ⁿ, so that w is where the contour is as high as it is wide: log-normal around
@@ -157,8 +156,8 @@ def infer_contour(
     drive_angle_offset normal with 1°, biases and drifts normal with 0.1 EI/L and EI/L² (a bias of which the load cell
     states a bias_uncertainty is integrated out instead), lever_x and lever_y normal with 0.5 % of L, backlash normal
     with 0.2°, gains normal around 1 with 2 %, friction half-normal with scale 0.3, suspension_compliance half-normal
-    with 0.05 rad per EI/L, pivots normal with 1 % of L. Contours out of reach, and those that the rod would still cut
-    after snap-off, are excluded on top.
+    with 0.05 rad per EI/L, pivots normal with 1 % of L. In addition, contours out of reach are excluded, and those that
+    the rod would still cut after snap-off.
 
     Examples
     --------
@@ -183,7 +182,7 @@ def infer_contour(
 
 
 class Sampled(NamedTuple):
-    """A posterior, as it is handed out, and as it was drawn."""
+    """A posterior, its draws as arrays, and the coordinates of the sampler."""
 
     tree: xr.DataTree
     draws: Draws
@@ -201,14 +200,28 @@ def sampled(
     walk: Walk | None = None,
     with_prior: bool = True,
 ) -> Sampled:
-    """The posterior of a problem; see `infer_contour`. Walkers walk as they would anyway, or as is said; the group of
-    prior draws may be left out.
+    """Return the posterior of a problem.
+
+    Parameters
+    ----------
+    problem : ContourProblem
+    seed, settings, checkpoint, progress, keep
+        As in `infer_contour`.
+    walk : Walk, optional
+        Start and coordinates of the walkers, in place of those from a search for the optimum.
+    with_prior : bool
+        Whether the result has a group of draws from the prior.
+
+    Raises
+    ------
+    InferenceError, ReachError
+        As in `infer_contour`.
     """
     seeds = spawn(seed, 4)
     deadline = Deadline.after(settings.max_seconds)
     with threadpool_limits(1):  # the arrays are small: threads would only wait for one another
         if walk is None:
-            # A run that goes on from a checkpoint has to start where it did, however late it was then.
+            # A run that resumes from a checkpoint must start at the same points, whatever the time limit was.
             problem, walk = _likeliest(problem, seeds[0], settings, NEVER if checkpoint is not None else deadline)
         model = problem.model
         if walk.beyond:
@@ -243,9 +256,9 @@ def sampled(
 def _likeliest(
     problem: ContourProblem, seed: np.random.SeedSequence, settings: SamplerSettings, deadline: Deadline
 ) -> tuple[ContourProblem, Walk]:
-    """Of a problem and those with other sides of contact the one with the most evidence, and where its walkers start.
+    """Return the problem with the most evidence, of those with all sides of contact, and the start of its walkers.
 
-    The sides that are taken, and how probable they are, are among what is said about it.
+    Its attributes state the sides of contact and their probability.
     """
     if not problem.others:
         return problem, walk_of(problem.model, seed, settings, deadline)
@@ -261,13 +274,12 @@ def _likeliest(
     if not found and failure is not None:
         raise failure
     best, chosen, walk = max(found, key=lambda each: each[0])
-    known = np.isfinite(best)
-    shares = np.exp([each[0] - best for each in found]) if known else np.ones(len(found))
-    doubt = {"doubtful_sides": chosen.about[CONTACT_SIDES], "sides_probability": float(1.0 / shares.sum())}
+    ratios = np.exp([each[0] - best for each in found]) if np.isfinite(best) else np.ones(len(found))
+    doubt = {"doubtful_sides": chosen.about[CONTACT_SIDES], "sides_probability": float(1.0 / ratios.sum())}
     return chosen._replace(about={**chosen.about, **doubt}), walk
 
 
 def contours_of(draws: xr.Dataset, family: str) -> Contour:
-    """The contours of posterior or prior draws, with parameters of shape (all draws,)."""
+    """Return the contours of posterior or prior draws, with parameters of shape (all draws,)."""
     chosen = family_named(family)
     return chosen.build(*(draws[name].values.ravel() for name in chosen.parameters))

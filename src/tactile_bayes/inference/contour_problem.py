@@ -1,4 +1,4 @@
-"""A contour to be inferred from a measured record, and from the same with other sides of contact."""
+"""The inference problem of a contour, for the stated sides of contact and for the alternatives."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Flags
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.experiment import Experiment
@@ -21,43 +21,50 @@ __all__ = ["ContourProblem", "contour_problem"]
 
 
 _MOST_DOUBTFUL = 2
-"""Sweeps of which both sides are tried, the most doubtful: each of them doubles what there is to compare."""
+"""Largest number of sweeps of which both sides are tried, the most doubtful first: each doubles the problems."""
 
 _BELIEVED = float(np.log(10.0))
-"""Logarithm of how much likelier a direction is to say the side than not, where the record leaves doubt."""
+"""Logarithm of the prior odds that the direction of a doubtful sweep states its side of contact."""
 
 
 class ContourProblem(NamedTuple):
-    """Prior times likelihood, and in words what they are made from."""
+    """Prior times likelihood, and a description of both."""
 
     model: ContourModel
     about: Mapping[str, Any]
-    loaded: NDArray[np.bool_]
-    """Which of the record's samples carry a load that noise does not explain."""
+    """Attributes of the posterior."""
+    loaded: Flags
+    """True for samples with a load that noise does not explain, shape (samples,)."""
 
     others: tuple[ContourProblem, ...] = ()
-    """The same with other sides of contact, where the record leaves doubt of them."""
+    """Problems with other sides of contact, if these are doubtful."""
     log_prior_odds: float = 0.0
-    """Of its sides of contact over those that directions say."""
+    """Logarithm of the prior odds of the sides of contact over those that the directions state."""
 
     @property
     def identity(self) -> dict[str, str]:
-        """What a run that goes on must have in common with the one that was stopped."""
-        words = {"data_sha256": "record (its SHA-256)"}
-        return {words.get(name, name): str(value) for name, value in self.about.items()} | {
+        """Entries that a resumed run must have in common with the interrupted one."""
+        labels = {"data_sha256": "record (its SHA-256)"}
+        return {labels.get(name, name): str(value) for name, value in self.about.items()} | {
             "version of tactile-bayes": version("tactile-bayes")
         }
 
-    def without(self, samples: NDArray[np.bool_]) -> ContourModel:
-        """The model of the record without some of its samples."""
+    def without(self, samples: Flags) -> ContourModel:
+        """Return the model of the record without some samples, a mask of shape (samples,)."""
         model, kept = self.model, ~samples
-        rig = replace(model.nuisances, way=model.nuisances.way[kept])
+        rig = replace(model.nuisances, elapsed=model.nuisances.elapsed[kept])
         measured = model.measured.isel(sample=np.flatnonzero(kept))
         return ContourModel(measured, model.family, rig, model.noise, model.priors)
 
 
 def contour_problem(experiment: Experiment) -> ContourProblem:
-    """What is to be inferred from a record, with the problems of other sides of contact beside it."""
+    """Return the inference problem of an experiment, with the problems of other sides of contact if they are doubtful.
+
+    Raises
+    ------
+    InferenceError
+        If no sample carries a load.
+    """
     problem = _of_sides(experiment)
     record, cell = experiment.record, experiment.noise.cell
     doubtful = doubtful_sweeps(without_errors(problem.model.measured, cell), cell)[:_MOST_DOUBTFUL]
@@ -77,7 +84,7 @@ def contour_problem(experiment: Experiment) -> ContourProblem:
 
 
 def _of_sides(experiment: Experiment) -> ContourProblem:
-    """The problem of a record whose sides of contact are those that it states.
+    """Return the problem of an experiment with the sides of contact that its record states.
 
     Raises
     ------

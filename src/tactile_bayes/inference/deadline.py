@@ -1,4 +1,4 @@
-"""A deadline: the moment from which on a search is content with what it has found."""
+"""A deadline: the time at which a search ends with its best result so far."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ __all__ = ["NEVER", "Deadline"]
 
 
 class _PassedError(Exception):
-    """Ends a search from inside."""
+    """Exception that ends a search."""
 
 
 @dataclass(frozen=True)
 class Deadline:
-    """The moment from which on a search is content with what it has found.
+    """The time at which a search ends with its best result so far.
 
     Parameters
     ----------
     moment : float
-        On the clock `time.monotonic` [s].
+        Time on the clock `time.monotonic` [s]; infinite for no deadline.
 
     Examples
     --------
@@ -38,24 +38,25 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
-        """So many seconds from now; never, if None."""
+        """Return the deadline in so many seconds from now; never, if None."""
         return cls() if seconds is None else cls(time.monotonic() + seconds)
 
     @property
     def has_passed(self) -> bool:
+        """True after the deadline."""
         return time.monotonic() >= self.moment
 
     @property
     def seconds_left(self) -> float | None:
-        """A positive time, however short; None without a deadline."""
+        """Time left [s], at least 1e-9; None without a deadline."""
         return None if self.moment == math.inf else max(1e-9, self.moment - time.monotonic())
 
     def least_squares(
         self, residuals: Callable[..., Floats], start: Floats, jacobian: Callable[..., Floats], **options: Any
     ) -> OptimizeResult:
-        """`scipy.optimize.least_squares`, from whose best point so far all is told if the deadline passes.
+        """Apply `scipy.optimize.least_squares`, and return the result at the best point so far if the deadline passes.
 
-        It is exceeded by two calls of the residuals and of the Jacobian.
+        The deadline is exceeded by at most two calls of the residuals and of the Jacobian.
         """
         best = start
 
@@ -66,7 +67,7 @@ class Deadline:
 
         def watched_jacobian(point: Floats, *args: Any) -> Floats:
             nonlocal best
-            best = point.copy()  # slopes are asked for where the search has come to, no step that fails
+            best = point.copy()  # the Jacobian is only evaluated at accepted steps
             return jacobian(point, *args)
 
         try:
@@ -76,3 +77,4 @@ class Deadline:
 
 
 NEVER = Deadline()
+"""No deadline."""

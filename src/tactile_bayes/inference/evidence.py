@@ -1,4 +1,4 @@
-"""The evidence of a model: the integral of an unnormalised density, from draws of it, by bridge sampling."""
+"""The evidence of a model: the integral of an unnormalised density, from draws, by bridge sampling."""
 
 from __future__ import annotations
 
@@ -7,57 +7,57 @@ from typing import NamedTuple
 
 import numpy as np
 from arviz_stats.base.array import array_stats
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import brentq
 from scipy.special import expit, ndtr
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import InferenceError
 
 __all__ = ["Evidence", "bridge_evidence"]
 
 _KNOTS = np.linspace(-2.0, 2.0, 7)
-"""Normal scores between which a parameter's score is linear: more would follow noise, fewer would miss walls."""
+"""Knots of piecewise linear normal scores: more would follow noise, fewer would not resolve hard bounds."""
 
 _PROPOSALS = 4000
+"""Default number of proposals."""
 
 _LEAST_PROPOSALS = 20
 
 _MOST_DRAWS = 50_000
-"""Draws that are used, at even distances: beyond ten times the proposals, they add hardly anything."""
+"""Largest number of draws that are used, evenly spaced: more than ten times the proposals add little."""
 
 _LEAST_PER_CHAIN = 8
-"""Draws that ArviZ needs for an effective sample size."""
+"""Least number of draws that ArviZ needs for an effective sample size."""
 
 _LEAST_PER_PARAMETER = 5
-"""Draws in a half, per parameter: the covariance that is fitted to them would be worth nothing with fewer."""
+"""Least number of draws in a half, per parameter, for an estimate of the covariance."""
 
 _FLAT = 1e-13
-"""Variance of standardised parameters in one direction over that in another, from which on rounding makes it."""
+"""Smallest over largest variance of standardised parameters below which the variance is due to rounding."""
 
 _LEAST_TERMS = 5.0
-"""Effective number of draws, and of proposals, that the estimate must rest on."""
+"""Least effective number of draws, and of proposals, for an estimate."""
 
 _ROUNDS = 2
-"""Times that the number of effective draws is found: it hardly depends on the threshold, nor this on it."""
+"""Number of iterations for the effective number of draws, which hardly depends on the threshold, and vice versa."""
 
 _PROBES = 2
-"""Draws per chain whose density is computed again."""
+"""Number of draws per chain at which the density is recomputed."""
 
 _AGREES = 0.01
-"""Difference from the log-density that was given up to which they are the same."""
+"""Largest difference between given and recomputed log-densities."""
 
 
 class Evidence(NamedTuple):
-    """The logarithm of an integral, and how far to trust it."""
+    """The logarithm of an integral, with its standard error and overlap."""
 
     log_evidence: float
     standard_error: float
-    """Of `log_evidence`."""
+    """Standard error of `log_evidence`."""
     overlap: float
-    """∫ p q/(s p + (1 − s) q) of the density p and what it is compared with, q, both normalised, s the share of draws
-    of p: 1 if both are the same, 0 if they have nothing in common. Below some 0.1, do not trust the standard error."""
+    """∫ p q/(s p + (1 − s) q) of the density p and the proposal density q, both normalised, with s the share of draws
+    of p: 1 if both are the same, 0 if they are disjoint. Below some 0.1, the standard error is not reliable."""
 
 
 def bridge_evidence(
@@ -68,35 +68,35 @@ def bridge_evidence(
     *,
     proposals: int | None = None,
 ) -> Evidence:
-    """Logarithm of the integral of a density, from draws of it.
+    """Return the logarithm of the integral of a density, from draws of it.
 
     With density f = Z p and draws of p and of a normalised density q like it,
 
         Z = E_q[f h]/E_p[q h],  h = 1/(s f/Z + (1 − s) q),  s = n/(n + m),
 
-    for n draws of p, counted as effective ones, and m of q; this h has the least error (Meng & Wong 1996, Statistica
+    for n effective draws of p and m draws of q; this h has the least error (Meng & Wong 1996, Statistica
     Sinica 6, 831; Gronau et al. 2017, doi 10.1016/j.jmp.2017.09.005). q is fitted to one half of the chains and
-    compared with the other, since draws that it is fitted to would look too much like it (Overstall & Forster 2010,
-    doi 10.1016/j.csda.2010.03.008); the same with the halves exchanged, and the mean of both is the result.
+    compared with the other, since a comparison with the fitted draws is biased (Overstall & Forster 2010,
+    doi 10.1016/j.csda.2010.03.008). The result is the mean over both assignments of the halves.
 
     Parameters
     ----------
     log_density : callable
-        Takes points (m, d), returns (m,): log of the density, −inf where it is zero.
+        Maps points, shape (m, d), to logarithms of the density, shape (m,), −inf where it is zero.
     draws : ndarray, shape (chains, n, d)
-        From the density; chains are independent of each other, two at least, and within a chain draws are in the order
-        in which they were made, walker-major if there are walkers.
+        Draws from the density; there are at least two independent chains, each in the order of sampling, walker-major
+        if there are walkers.
     log_densities : ndarray, shape (chains, n)
-        `log_density` of them.
+        `log_density` of the draws.
     rng : np.random.Generator
     proposals : int, optional
-        Points, half of them from each fit, at which `log_density` is computed, by default 4000. To these come two draws
-        per chain, at which it must be what `log_densities` says.
+        Number of points, half of them from each fit, at which `log_density` is computed, by default 4000. It is also
+        recomputed at two draws per chain, where it must agree with `log_densities`.
 
     Returns
     -------
     Evidence
-        Its standard error has both parts of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with the
+        Its standard error has both terms of Frühwirth-Schnatter (2004, doi 10.1111/j.1368-423X.2004.00125.x), with the
         autocorrelation of the terms, and the correlation of the two results that are averaged (see Notes).
 
     Raises
@@ -107,17 +107,17 @@ def bridge_evidence(
 
     Notes
     -----
-    q is a normal distribution of normal scores, each piecewise linear in one parameter, so that walls and skewness of
-    single parameters cost little; or in one of the axes nearest to the parameters that are not correlated, if the draws
-    are more probable so. For normal densities in 40 dimensions and 500 independent draws in each half the error is a
-    sixth larger than with a plain normal fit, for 15 half-normal ones among them half. A t distribution and a density
-    made symmetric (Warp-III of Meng & Schilling 2002, at equal evaluations) gained nothing. Of more than 50 000 draws
-    every second, third, … is used.
+    q is a normal distribution of normal scores, each piecewise linear in one parameter, to account for hard bounds and
+    skewness of single parameters; or in one of the uncorrelated axes nearest to the parameters, if the draws are more
+    probable under that fit. For normal densities in 40 dimensions and 500 independent draws in each half the error is a
+    sixth larger than with a plain normal fit; with 15 half-normal parameters among them it is half as large. A t
+    distribution and a symmetrised density (Warp-III of Meng & Schilling 2002, at equal evaluations) gained nothing. Of
+    more than 50 000 draws every second, third, … is used.
 
-    The two results share what comes from the errors of the fits: to first order that is Σ k(x, y) over x in one half
-    and y in the other, with the same symmetric k for both, and does not average out. Only the error that another fit
-    would not change does. Its share is taken to be the correlation of the terms under one fit with those under the
-    other, which in tens of dimensions is a little too small, and the standard error up to a quarter too large.
+    The errors due to the fits are common to both results: to first order they are Σ k(x, y) over x in one half and y in
+    the other, with the same symmetric k, and do not average out. Only the error that is independent of the fit does.
+    Its share is estimated by the correlation of the terms under one fit with those under the other, which in tens of
+    dimensions is slightly too small, and makes the standard error up to a quarter too large.
 
     Examples
     --------
@@ -154,10 +154,10 @@ def bridge_evidence(
 
 
 def _fitted(points: Floats) -> _Fit:
-    """The fit to points (n, d) along the axes that make them more probable.
+    """Return the fit to points, shape (n, d), along the axes that make them more probable.
 
-    Along those of the parameters it follows walls. Where these depend on each other so much that errors of their scores
-    are larger than what is left free, it cannot, and follows the axes that are nearest to them and not correlated.
+    Axes along the parameters resolve hard bounds. If the parameters are so strongly correlated that errors of their
+    scores exceed the remaining variance, the nearest uncorrelated axes are better.
     """
     deviation = points.std(axis=0)
     same = np.flatnonzero(deviation <= 0.0)
@@ -181,10 +181,10 @@ def _covariance(points: Floats) -> Floats:
 
 
 class _Fit:
-    """A normal distribution of normal scores along some axes."""
+    """A normal distribution of normal scores along axes."""
 
     def __init__(self, points: Floats, axes: Floats) -> None:
-        """`points`: (n, d); `axes`: a column for each."""
+        """Fit to points, shape (n, d), along the columns of `axes`, shape (d, d)."""
         self._centre, self._axes, self._back = points.mean(axis=0), axes, np.linalg.inv(axes)
         self._knots = np.quantile(self._along(points), ndtr(_KNOTS), axis=0).T
         if not np.all(np.diff(self._knots, axis=1) > 0.0):
@@ -204,7 +204,7 @@ class _Fit:
         return along
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """Points, (count, d)."""
+        """Draw points, shape (count, d)."""
         scores: Floats = self._mean + rng.standard_normal((count, self._mean.size)) @ self._root.T
         along = np.empty_like(scores)
         for j, (knots, slopes) in enumerate(zip(self._knots, self._slopes, strict=True)):
@@ -214,14 +214,14 @@ class _Fit:
         return points
 
     def log_density(self, points: Floats) -> Floats:
-        """At points (n, d), (n,)."""
+        """Return the log-density at points, shape (n, d), as an array of shape (n,)."""
         scores, log_growth = self._scores(points)
         standard = solve_triangular(self._root, (scores - self._mean).T, lower=True)
         density: Floats = log_growth - self._scale - 0.5 * np.sum(standard**2, axis=0)
         return density
 
     def _scores(self, points: Floats) -> tuple[Floats, Floats]:
-        """Normal scores (n, d), and the logarithm of by how much they grow along the axes, (n,)."""
+        """Return normal scores, shape (n, d), and the logarithm of their Jacobian determinant, shape (n,)."""
         along, log_growth = self._along(points), np.zeros(len(points))
         scores = np.empty_like(along)
         for j, (knots, slopes) in enumerate(zip(self._knots, self._slopes, strict=True)):
@@ -231,29 +231,30 @@ class _Fit:
         return scores, log_growth
 
 
-def _piece(knots: Floats, values: Floats) -> NDArray[np.intp]:
-    """Of which knot a value is right, the outer pieces going on without end."""
-    piece: NDArray[np.intp] = np.clip(np.searchsorted(knots, values) - 1, 0, knots.size - 2)
+def _piece(knots: Floats, values: Floats) -> Index:
+    """Return the index of the piece between knots that contains each value; the outer pieces are unbounded."""
+    piece: Index = np.clip(np.searchsorted(knots, values) - 1, 0, knots.size - 2)
     return piece
 
 
 class _Bridge(NamedTuple):
-    """One fit compared with the draws of the other half."""
+    """Bridge estimate of one fit and the draws of the other half."""
 
     log_evidence: float
     threshold: float
-    """Of log f − log q, at which draw and proposal are equally likely."""
+    """Value of log f − log q at which draw and proposal are equally likely."""
     of_draws: float
-    """Part of the variance."""
+    """Variance due to the draws."""
     of_proposals: float
+    """Variance due to the proposals."""
     overlap: float
 
 
 def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
-    """From log f − log q at draws of f, (chains, n), and of q, (m,).
+    """Return the bridge estimate from log f − log q at draws of f, shape (chains, n), and of q, shape (m,).
 
-    Draws and proposals enter by logistic functions, whose sums over the ones and the others are equal at the threshold
-    log Z + log(m/n), one growing with it and one falling (Bennett 1976, doi 10.1016/0021-9991(76)90078-4).
+    Draws and proposals enter by logistic functions, whose sums over both are equal at the threshold log Z + log(m/n);
+    one increases with the threshold and the other decreases (Bennett 1976, doi 10.1016/0021-9991(76)90078-4).
     """
     if not np.any(np.isfinite(proposed)):
         raise InferenceError(
@@ -264,7 +265,7 @@ def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
     for _ in range(_ROUNDS):
         threshold = _threshold(drawn, proposed, effective)
         from_draws, from_proposals = expit(threshold - drawn), expit(proposed - threshold)
-        if min(_terms_that_count(from_draws), _terms_that_count(from_proposals)) < _LEAST_TERMS:
+        if min(_effective_number(from_draws), _effective_number(from_proposals)) < _LEAST_TERMS:
             raise InferenceError(
                 "density and fit do not overlap: a handful of points would decide; do all chains sample the same place?"
             )
@@ -279,6 +280,8 @@ def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
 
 
 def _threshold(drawn: Floats, proposed: Floats, effective: float) -> float:
+    """Return the threshold at which both sums are equal."""
+
     def difference(threshold: float) -> float:
         return float(effective * expit(threshold - drawn).mean() - proposed.size * expit(proposed - threshold).mean())
 
@@ -288,25 +291,26 @@ def _threshold(drawn: Floats, proposed: Floats, effective: float) -> float:
 
 
 def _effective_size(terms: Floats) -> float:
-    """Of terms (chains, n), with their autocorrelation."""
+    """Return the effective sample size of terms, shape (chains, n), from their autocorrelation."""
     ess: Callable[..., float] = array_stats.ess
     return float(min(ess(terms, chain_axis=0, draw_axis=1, method="mean"), terms.size))
 
 
-def _terms_that_count(terms: Floats) -> float:
-    """Kish's effective number of weights."""
+def _effective_number(terms: Floats) -> float:
+    """Return Kish's effective number of weights."""
     total, squares = terms.sum(), np.sum(terms**2)
     return float(total**2 / squares) if squares > 0.0 else 0.0
 
 
 def _correlation(both: tuple[Floats, Floats], halves: tuple[slice, slice]) -> float:
-    """Of terms (chains, n) with others of the same draws, within halves of the chains; 0 if negative."""
+    """Return the correlation of two terms of the same draws, shape (chains, n), within halves; 0 if negative."""
     a, b = (np.concatenate([(terms[half] - terms[half].mean()).ravel() for half in halves]) for terms in both)
     scale = np.linalg.norm(a) * np.linalg.norm(b)
     return float(np.clip(a @ b / scale, 0.0, 1.0)) if scale > 0.0 else 0.0
 
 
 def _values(log_density: Callable[[Floats], Floats], points: Floats) -> Floats:
+    """Return the log-density at points; refuse wrong shapes, NaN and +inf."""
     values = np.asarray(log_density(points), dtype=float)
     if values.shape != (len(points),):
         raise InferenceError(f"log_density of points {points.shape} has shape {values.shape}: return ({len(points)},)")

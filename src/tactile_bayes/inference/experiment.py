@@ -1,4 +1,4 @@
-"""An experiment: a record, what is known of the rig that made it, and priors of all else."""
+"""An experiment: a record, the knowledge of its rig, and priors of all unknown parameters."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tactile_bayes.contours.families import family_named
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.noise import Noise, noise_of
 from tactile_bayes.inference.nuisances import STANDARD, Nuisances, nuisances_of
-from tactile_bayes.inference.priors import Prior, check_priors, refuse_strangers
+from tactile_bayes.inference.priors import Prior, check_priors, refuse_unknown_priors
 from tactile_bayes.inference.priors import default_priors as contour_priors
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
@@ -30,19 +30,19 @@ __all__ = ["Experiment", "default_priors", "prior_in_words", "priors_in_words", 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """A record, what is known of the contour and of the rig that touched it, and priors of what is not known.
+    """A record, the knowledge of contour and rig, and priors of all unknown parameters.
 
     Parameters
     ----------
     record : xr.Dataset
-        Measured, or the template of one that is to be made.
+        Measured record, or a template.
     family, load_cell, priors, rod, friction, nuisances, events
         As in `infer_contour`.
 
     Raises
     ------
     RecordError, ParameterError
-        As `infer_contour`.
+        As in `infer_contour`.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class Experiment:
         check_priors("priors", self.priors)
         object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
         more = ", and of what is not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
-        refuse_strangers(self.priors, self.default_priors, more=more)
+        refuse_unknown_priors(self.priors, self.default_priors, more=more)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: the model is built again where it is needed."""
@@ -77,12 +77,12 @@ class Experiment:
 
     @cached_property
     def noise(self) -> Noise:
-        """The parameters of the noise."""
+        """Parameters of the noise."""
         return noise_of(self.record, self.load_cell)
 
     @cached_property
     def rig(self) -> Nuisances:
-        """The nuisance parameters."""
+        """Nuisance parameters of the rig."""
         return nuisances_of(self.record, self.nuisances, self.priors, self.noise.cell, self.friction)
 
     @cached_property
@@ -100,7 +100,7 @@ class Experiment:
 
     @property
     def about(self) -> dict[str, Any]:
-        """The attributes of a posterior: what it follows from."""
+        """Attributes of a posterior: record, assumptions and priors."""
         attrs, cell = self.record.attrs, self.noise.cell
         rod = ("rod_length", "rod_flexural_rigidity", "rod_diameter")
         return {
@@ -119,7 +119,7 @@ class Experiment:
 
     @property
     def assumptions(self) -> dict[str, str]:
-        """What simulations follow from besides their records, for the results store."""
+        """Assumptions of simulations, as text, for the results store."""
         cell = self.load_cell or self.noise.cell
         return {
             "family": self.family,
@@ -143,7 +143,21 @@ def default_priors(
     load_cell: LoadCell | None = None,
     nuisances: Sequence[str] = STANDARD,
 ) -> dict[str, Prior]:
-    """The priors that `infer_contour` takes where it is given none, in the record's units; its notes say which.
+    """Return the default priors of `infer_contour`, in the record's units; its notes describe them.
+
+    Parameters
+    ----------
+    measured, family, load_cell, nuisances
+        As in `infer_contour`.
+
+    Returns
+    -------
+    dict of str to frozen scipy.stats distribution
+
+    Raises
+    ------
+    RecordError, ParameterError
+        As in `infer_contour`.
 
     Examples
     --------
@@ -156,17 +170,17 @@ def default_priors(
 
 
 def prior_in_words(prior: Prior) -> str:
-    """Return a distribution as an attribute."""
-    law = getattr(prior, "dist", None)
-    if law is None:
+    """Return a distribution as text, for an attribute."""
+    distribution = getattr(prior, "dist", None)
+    if distribution is None:
         return repr(prior)
-    if isinstance(law, rv_histogram):
-        counts, edges = law._histogram  # type: ignore[attr-defined]
+    if isinstance(distribution, rv_histogram):
+        counts, edges = distribution._histogram  # type: ignore[attr-defined]
         return f"histogram of {len(counts)} bins ({zlib.crc32(np.concatenate([counts, edges]).tobytes()):08x})"
     arguments = [f"{a:g}" for a in prior.args] + [f"{k}={v:g}" for k, v in prior.kwds.items()]  # type: ignore[attr-defined]
-    return f"{law.name}({', '.join(arguments)})"
+    return f"{distribution.name}({', '.join(arguments)})"
 
 
 def priors_in_words(priors: Mapping[str, Prior]) -> str:
-    """Return distributions by name as an attribute."""
+    """Return distributions by name as text, for an attribute."""
     return json.dumps({name: prior_in_words(prior) for name, prior in priors.items()})

@@ -1,4 +1,4 @@
-"""Priors of families that expect alike: contours as bent as each other, as far as a rod can tell before it sees any."""
+"""Matched priors: the same prior distribution of a flank's mean radius of curvature in all families."""
 
 from __future__ import annotations
 
@@ -21,28 +21,30 @@ _SLOPES = np.linspace(0.0, 0.25 * np.pi, 9, endpoint=False) + np.pi / 72.0
 """Slope angles over which a flank's radius of curvature is averaged [rad]."""
 
 _MEDIAN, _SPREAD = 0.5, 1.0
-"""Of the geometric mean of a flank's radius of curvature: median, in rod lengths, and standard deviation of its
+"""Median [rod lengths] of the geometric mean of a flank's radius of curvature, and standard deviation of its
 logarithm."""
 
 _DRAWS = 2048
+"""Number of quasi-random draws from a prior."""
 
 _NARROWEST, _WIDEST = 0.05, 3.0
+"""Range of factors on standard deviations in which the matching one is sought."""
 
 
 def matched_priors(family: str, length: float) -> dict[str, Prior]:
-    """Priors of a family's own parameters, for rods of a length, all families' expecting the same of a flank.
+    """Return priors of a family's own parameters under which a flank is as curved as in all other families.
 
-    The default priors say the same of every parameter of a kind, so that of an ellipse, which has two sizes, wider and
-    rounder contours are expected than of a circle. Here, sizes have priors for which the geometric mean of the radius
-    of curvature between level and a slope of 45° on one side has its median at half the rod's length, and a standard
-    deviation of 1 of its logarithm. Exponents, amplitude and length scale keep their default priors.
+    The default priors are the same for all parameters of a kind, so that an ellipse, which has two sizes, is expected
+    to be wider and rounder than a circle. Here, sizes have priors for which the geometric mean of the radius of
+    curvature between slopes of 0° and 45° on one side has its median at half the rod's length, and its logarithm a
+    standard deviation of 1. Exponents, amplitude and length scale keep their default priors.
 
     Parameters
     ----------
     family : str
-        As of `infer_contour`.
+        As in `infer_contour`.
     length : float
-        Of the rod, in the unit of the record.
+        Length of the rod, in the unit of the record.
 
     Returns
     -------
@@ -66,12 +68,12 @@ def matched_priors(family: str, length: float) -> dict[str, Prior]:
 
 
 def mean_log_radius(contours: Contour) -> Floats:
-    """Logarithm of the geometric mean of the radius of curvature of the right flank up to 45°, shape (n,)."""
+    """Return the logarithm of the geometric mean radius of curvature of the right flank up to 45°, shape (n,)."""
     return np.mean([np.log(contours.radius_of_curvature(np.full(contours.shape, a))) for a in _SLOPES], axis=0)
 
 
 def widened(priors: Mapping[str, Prior], factor: float) -> dict[str, Prior]:
-    """Log-normal priors about the same median, with so many times the standard deviation; others as they are."""
+    """Return priors whose log-normal ones have the same median and a standard deviation multiplied by a factor."""
     return {name: _log_normal(prior, factor) if _is_log_normal(prior) else prior for name, prior in priors.items()}
 
 
@@ -87,7 +89,7 @@ def _of_flank(name: str, length: float) -> dict[str, Prior]:
 
 @functools.cache
 def _matching(name: str) -> tuple[float, float]:
-    """By how much sizes' medians and the standard deviations of their logarithms are to be multiplied."""
+    """Return the factors on the medians of sizes, and on the standard deviations of their logarithms."""
     family = family_named(name)
     priors = own_priors(family, 1.0)
     uniform = stats.qmc.Sobol(len(priors), seed=0).random(_DRAWS).T
@@ -108,7 +110,7 @@ def _matching(name: str) -> tuple[float, float]:
 
 
 def _built(family: Family, values: Mapping[str, Floats]) -> Contour:
-    """With the vertex at the origin; what no contour has is brought to the nearest that one has."""
+    """Return contours with the vertex at the origin; parameters out of bounds are moved to the nearest bound."""
     zeros = np.zeros(_DRAWS)
     inside = {name: np.clip(value, *family.bounds[name]) for name, value in values.items()}
     return family.build(*(inside.get(name, zeros) for name in family.parameters))

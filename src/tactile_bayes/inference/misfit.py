@@ -1,4 +1,4 @@
-"""Misfit: what may be at fault where a record is not as family and rig predict, and what to try."""
+"""Misfit of a record and its model: possible causes, and what to try."""
 
 from __future__ import annotations
 
@@ -10,16 +10,23 @@ CHECK_RIG = (
     "check the rod (length, flexural rigidity; straight, uniform), unit, sign and axes of each load, the zero of the "
     "drive angle and its backlash, the point where the load cell takes its moment, and the friction"
 )
-"""What to do where loads contradict one another whatever the contour: it is the rig."""
+"""Advice if loads contradict one another for any contour: the cause is the rig."""
 
 _SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance")
-"""Nuisance parameters, or groups of them, that misfit may be due to."""
+"""Nuisance parameters, or groups of them, that may cause a misfit."""
 
 _SMOOTH = "shape-free"
 
 
 def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
-    """Return whether a nuisance parameter, or one of its group, is among those that a run infers.
+    """Return True if a nuisance parameter, or one of its group, is among the inferred ones.
+
+    Parameters
+    ----------
+    suspect : str
+        Name of a parameter or of a group.
+    nuisances : collection of str
+        Names of the inferred parameters.
 
     Examples
     --------
@@ -30,16 +37,16 @@ def is_inferred(suspect: str, nuisances: Collection[str]) -> bool:
 
 
 def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, friction: float = 0.0) -> str:
-    """Return the sentences that name both whom a misfit may be due to, family and rig, and what to try.
+    """Return sentences on the possible causes of a misfit, family and rig, and on what to try.
 
     Parameters
     ----------
     families : collection of str
-        That were tried.
+        Families that were tried.
     nuisances : collection of str
-        That were inferred: they are not suggested again.
+        Nuisance parameters that were inferred: they are not suggested again.
     friction : float
-        That was stated: it is not inferred as well.
+        Stated coefficient of friction: if it is not 0, friction is not suggested.
 
     Examples
     --------

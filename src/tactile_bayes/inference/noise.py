@@ -1,4 +1,4 @@
-"""What is inferred about the noise of a load cell beside a contour."""
+"""Parameters of a load cell's noise that are inferred beside a contour."""
 
 from __future__ import annotations
 
@@ -17,33 +17,42 @@ __all__ = ["Noise", "noise_of"]
 
 
 class Noise(NamedTuple):
-    """What is inferred about the load cell's noise."""
+    """Parameters of a load cell's noise, with their priors."""
 
     cell: LoadCell
-    """In the record's units; the scale's factor applies to it."""
+    """Load cell in the record's units, whose noise the parameters scale."""
     names: tuple[str, ...]
+    """Names of the parameters."""
     channels: tuple[tuple[str, ...], ...]
-    """The channels that each parameter scales."""
+    """Channels that each parameter scales."""
     priors: dict[str, Prior]
+    """Default priors by name, in the record's units."""
 
     @property
     def stated_cell(self) -> LoadCell | None:
-        """The cell, if its noise is stated but for a factor; None where nothing is."""
+        """The cell, if its noise is stated up to a factor; otherwise None."""
         return self.cell if self.names == ("noise_scale",) else None
 
     @property
     def inferred(self) -> tuple[str, ...]:
-        """Entries of the cell that are not known beforehand, or stated elsewhere."""
+        """Entries of the cell that are inferred, and the frame, which is an attribute of its own."""
         return ("frame", *self.names)
 
 
 def noise_of(measured: xr.Dataset, load_cell: LoadCell | None) -> Noise:
-    """What is to be inferred of the noise in a record: a factor on what is stated, or else its scales.
+    """Return the noise parameters of a record: a factor on the stated noise, or the scales if none is stated.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    load_cell : LoadCell, optional
+        In the record's units; by default the data sheet in the record.
 
     Raises
     ------
     ParameterError
-        If the load cell states noise in proportion to the load alone.
+        If the load cell states only noise in proportion to the load.
     """
     cell = load_cell or LoadCell.from_record(measured)
     present = present_channels(measured)

@@ -1,4 +1,4 @@
-"""What is not as stated about a rig, and inferred beside a contour."""
+"""Nuisance parameters: deviations of a rig from the stated one that are inferred beside a contour."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from tactile_bayes.record import present_channels, rod_of
 __all__ = ["BIAS", "BIASES", "MAY_VANISH", "STANDARD", "Nuisances", "nuisances_of"]
 
 STANDARD = ("rigidity_scale", "drive_angle_offset", "bias", "lever", "backlash", "friction")
-"""What is inferred unless something else is asked for, as far as the record can tell it."""
+"""Default nuisance parameters, of which those that a record cannot identify are left out."""
 
 MAY_VANISH = ("friction", "suspension_compliance")
-"""What is not negative, and likely none."""
+"""Parameters that are zero or positive, and probably zero."""
 
 _SHORT = {"holding_moment": "moment", "force_x": "force_x", "force_y": "force_y"}
 _GROUPS = {what: tuple(f"{name}_{what}" for name in _SHORT.values()) for what in ("bias", "drift", "gain")}
@@ -44,17 +44,18 @@ _LEVER, _BACKLASH = 0.005, np.radians(0.2)
 
 
 _BASE = re.compile(r"base_(\d+)_([xy])")
-"""How much a pivot of the record, counted from 1, is off."""
+"""Shift of a pivot of the record, counted from 1, along an axis."""
 
 
 class _Kind(NamedTuple):
-    """One nuisance parameter."""
+    """Bounds and unit of a nuisance parameter."""
 
     low: float
     high: float
     power_of_moment: int = 0
-    """Of the unit of moments in its unit; for zeros of forces that of forces stands in for it."""
+    """Power of the unit of moments (for zeros of forces: of forces) in the parameter's unit."""
     power_of_length: int = 0
+    """Power of the unit of length in the parameter's unit."""
 
 
 _KINDS = {
@@ -69,7 +70,7 @@ _KINDS = {
 }
 _RIG = {name: name for name in ("drive_angle_offset", "rigidity_scale", "suspension_compliance", "friction")}
 _RIG["backlash"] = "drive_angle_backlash"
-"""What changes the path, or where a drive angle is read, by its name in `Rig`."""
+"""Parameters that change the path or the reading of the drive angle, and their names in `Rig`."""
 
 
 @dataclass(frozen=True)
@@ -79,23 +80,24 @@ class Nuisances:
     Parameters
     ----------
     names : tuple of str
-    priors : mapping
-        By name, in the record's units.
+        Names of the parameters.
+    priors : mapping of str to frozen scipy.stats distribution
+        Default priors by name, in the record's units.
     rod : Rod
-        As stated.
+        The stated rod.
     friction : float
-        Coulomb's coefficient where it is not inferred.
-    way : ndarray, shape (samples,)
-        How far each sample is on the way from the record's first (−½) to its last (½).
+        Coulomb's coefficient if it is not inferred.
+    elapsed : ndarray, shape (samples,)
+        Position of each sample in the record, linear from the first (−½) to the last (½), for drift.
     """
 
     names: tuple[str, ...]
     priors: Mapping[str, Prior]
     rod: Rod
     friction: float
-    way: Floats = field(default_factory=lambda: np.zeros(1))
+    elapsed: Floats = field(default_factory=lambda: np.zeros(1))
     units: Mapping[str, float] = field(init=False)
-    """Of each name, in the record's units, what is one inside."""
+    """Unit of each parameter in dimensionless calculations, in the record's units."""
 
     def __post_init__(self) -> None:
         moment, force, length = self.rod.moment_unit, self.rod.force_unit, self.rod.length_unit
@@ -103,16 +105,16 @@ class Nuisances:
             n: (force if n.startswith("force") else moment) ** k.power_of_moment * length**k.power_of_length
             for n, k in _KINDS.items()
         }
-        units |= {n: 1.0 for n in self.names if _BASE.fullmatch(n)}  # lengths are the record's inside, too
+        units |= {n: 1.0 for n in self.names if _BASE.fullmatch(n)}  # shifts stay in the record's unit of length
         object.__setattr__(self, "units", units)
 
     def bounds(self, name: str) -> tuple[float, float]:
-        """Between which values it lies, whatever a prior says."""
+        """Return the bounds of a parameter, whatever its prior."""
         kind = _KINDS.get(name)
         return (-np.inf, np.inf) if kind is None else (kind.low, kind.high)
 
     def unit(self, name: str) -> str:
-        """Of an SI record, in words."""
+        """Return the SI unit of a parameter, like "N m"."""
         if name in (*_GROUPS["bias"], *_GROUPS["drift"]):
             return "N m" if name.startswith("moment") else "N"
         if _BASE.fullmatch(name) or name in _GROUPS["lever"]:
@@ -121,7 +123,7 @@ class Nuisances:
         return units.get(name, "1")
 
     def rig(self, values: Mapping[str, Floats]) -> Rig:
-        """The rig of every point, from values by name, each of shape (n,)."""
+        """Return the rig of every point, from values by name in the record's units, each of shape (n,)."""
         known = {"friction": self.friction} if "friction" not in self.names else {}
         return Rig(
             base_shifts=self._base_shifts(values),
@@ -130,7 +132,7 @@ class Nuisances:
         )
 
     def _base_shifts(self, values: Mapping[str, Floats]) -> Floats | None:
-        """Shape (n, pivots, 2), to the last that is off."""
+        """Return the shifts of pivots, shape (n, pivots, 2), up to the last one that is inferred; None without any."""
         shifted = [(name, _BASE.fullmatch(name)) for name in self.names]
         off = [(name, int(found[1]) - 1, "xy".index(found[2])) for name, found in shifted if found]
         if not off:
@@ -141,31 +143,34 @@ class Nuisances:
         return shifts
 
     def sensed(self, loads: Floats, values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Loads, shape (n, ..., 3), with errors of calibration, and with what the cell will read as a bias."""
+        """Apply inferred gains, levers and zeros to loads, shape (n, ..., 3) [EI/L, EI/L²], in place.
+
+        Zeros are given as readings, and enter as the loads that the cell reads as such.
+        """
         gains = [values.get(name) for name in _GROUPS["gain"]]
         levers = [values[name] / self.units[name] if name in self.names else None for name in _GROUPS["lever"]]
-        # Gains are those of what is read at the lever's end, of which the cell's own part comes later.
+        # Gains act on readings at the lever's end, to which the cell's own lever is applied later.
         own = cell.lever if any(gain is not None for gain in gains) else (0.0, 0.0)
         _take_at(loads, *(known if lever is None else known + lever for known, lever in zip(own, levers, strict=True)))
         for channel, gain in enumerate(gains):
             if gain is not None:
                 loads[..., channel] *= gain.reshape(-1, *(1,) * (loads.ndim - 2))
         _take_at(loads, *(-known for known in own))
-        for what, course in (("bias", np.ones(1)), ("drift", self.way)):
+        for what, course in (("bias", np.ones(1)), ("drift", self.elapsed)):
             if not set(self.names).isdisjoint(_GROUPS[what]):
                 zeros = self._zeros(_GROUPS[what], values, cell)
-                for channel, zero in enumerate(zeros.T):  # an axis of three is several times slower
+                for channel, zero in enumerate(zeros.T):  # broadcasting over an axis of three is several times slower
                     loads[..., channel] += zero.reshape(-1, *(1,) * (loads.ndim - 2)) * course
         return loads
 
     def _zeros(self, names: Sequence[str], values: Mapping[str, Floats], cell: LoadCell) -> Floats:
-        """Loads that the cell reads as what is named, by channel, shape (n, 3)."""
+        """Return the loads that the cell reads as the named zeros, shape (n, 3)."""
         read = [values[name] / self.units[name] if name in self.names else 0.0 for name in names]
         return np.linalg.solve(cell.gain_matrix, np.array(np.broadcast_arrays(*read))).T
 
 
 def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
-    """Take the moment of loads, shape (n, ..., 3), at points beside the pivot; numbers, or one for each of n."""
+    """Move the reference point of the moment of loads, shape (n, ..., 3), from the pivot to (x, y), in place."""
     for channel, arm in ((2, -np.asarray(x)), (1, np.asarray(y))):
         if np.any(arm):
             loads[..., 0] += arm.reshape(-1, *(1,) * (loads.ndim - 2)) * loads[..., channel]
@@ -174,21 +179,34 @@ def _take_at(loads: Floats, x: Floats | float, y: Floats | float) -> None:
 def nuisances_of(
     measured: xr.Dataset, chosen: Sequence[str], priors: Mapping[str, Prior], cell: LoadCell, friction: float | None
 ) -> Nuisances:
-    """Nuisance parameters that are asked for by name, or by having a prior; with default priors for the others.
+    """Return the nuisance parameters that are chosen by name or have a prior, with default priors.
 
-    A bias that the load cell states an uncertainty of is not among them: the likelihood integrates it out already. Of
-    those that are `STANDARD` the ones that the record cannot tell are left out, and friction where it is known.
+    A bias with a bias_uncertainty of the load cell is not among them: the likelihood integrates it out already. Of the
+    `STANDARD` ones those that are not identifiable are left out, and friction if it is given.
+
+    Parameters
+    ----------
+    measured : xr.Dataset
+        A valid record.
+    chosen : sequence of str
+        Names of parameters or groups.
+    priors : mapping of str to frozen scipy.stats distribution
+        Given priors; names of other parameters are ignored.
+    cell : LoadCell
+        In the record's units.
+    friction : float, optional
+        Coulomb's coefficient if it is known.
 
     Raises
     ------
     ParameterError
-        If a name is none of a nuisance parameter, or cannot be identified.
+        If a name is no nuisance parameter, or the parameter is not identifiable.
     """
     chosen = check_names("nuisances", chosen)
-    untold = _untold(measured)
+    unidentifiable = _unidentifiable(measured)
     if tuple(chosen) == STANDARD:
         known = set() if friction is None else {"friction"}
-        chosen = [name for name in chosen if name not in untold.keys() | known]
+        chosen = [name for name in chosen if name not in unidentifiable.keys() | known]
     present = [_SHORT[name] for name in present_channels(measured)]
     uncertain = dict(zip(_GROUPS["bias"], cell.bias_uncertainty, strict=True))
     names: list[str] = []
@@ -200,8 +218,8 @@ def nuisances_of(
             raise ParameterError(
                 f"there is no nuisance parameter {name!r}: choose from {', '.join([*_GROUPS, *_KINDS])}, or base"
             )
-        if name in untold:
-            raise ParameterError(f"{name} cannot be inferred: {untold[name]}")
+        if name in unidentifiable:
+            raise ParameterError(f"{name} cannot be inferred: {unidentifiable[name]}")
         members = [n for n in _GROUPS[name] if _is_measured(n, present)] if name in _GROUPS else [name]
         for member in members:
             if not _is_measured(member, present):
@@ -226,33 +244,33 @@ def nuisances_of(
             "measure the same; leave one of them"
         )
     rod = rod_of(measured)
-    way = np.linspace(-0.5, 0.5, measured.sizes["sample"])
-    nuisances = Nuisances(tuple(names), {}, rod, friction, way)
+    elapsed = np.linspace(-0.5, 0.5, measured.sizes["sample"])
+    nuisances = Nuisances(tuple(names), {}, rod, friction, elapsed)
     defaults = {name: _default_prior(name, rod.length if "base" in name else nuisances.units[name]) for name in names}
     return replace(nuisances, priors=defaults)
 
 
-def _untold(measured: xr.Dataset) -> dict[str, str]:
-    """What the record cannot tell, whatever is known besides, and why."""
-    untold: dict[str, str] = {}
+def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
+    """Return the parameters that a record cannot identify, with the reasons."""
+    reasons: dict[str, str] = {}
     if "holding_moment" not in present_channels(measured):
-        untold |= dict.fromkeys(("lever", *_GROUPS["lever"]), "it shows in the moment, which was not measured")
+        reasons |= dict.fromkeys(("lever", *_GROUPS["lever"]), "it shows in the moment, which was not measured")
     if len(np.unique(measured.direction.values)) == 1:
         only = str(measured.direction.values[0])
-        untold["backlash"] = (
+        reasons["backlash"] = (
             f"every sweep is {only}, and in one direction it cannot be told from drive_angle_offset; infer that"
         )
-    return untold
+    return reasons
 
 
 def _is_measured(name: str, present: Sequence[str]) -> bool:
-    """Whether the channel that a parameter belongs to, if any, is among those measured."""
+    """Return True if the channel of a parameter, if any, was measured."""
     channel, _, what = name.rpartition("_")
     return channel in present or name not in _GROUPS.get(what, ())
 
 
 def _bases_off(name: str, measured: xr.Dataset) -> list[str]:
-    """Names of the pivots' shifts that a name stands for."""
+    """Return the names of the pivots' shifts that a name stands for."""
     number, found = len(bases_of(measured)), _BASE.fullmatch(name)
     if number == 1 or (found and found[1] == "1"):
         raise ParameterError(
@@ -268,6 +286,7 @@ def _bases_off(name: str, measured: xr.Dataset) -> list[str]:
 
 
 def _default_prior(name: str, unit: float) -> Prior:
+    """Return the default prior of a parameter, from its unit in the record's units."""
     match name:
         case "rigidity_scale":
             return stats.lognorm(s=_RIGIDITY)

@@ -1,7 +1,7 @@
-"""A rod clamped in a sensor and pushed at a known point: where its clamp is, how soft it sits, how the sensor reads.
+"""Calibration of a clamped rod from point loads: clamp, suspension compliance and sensor curve.
 
-A thin probe is a contour that has shrunk to a point, so that the curvature at the base, κ0 = M0/(EI) [1/mm], follows
-from its position alone (`clamped_rod`). The sensor reads a cubic in κ0, with independent normal noise:
+A thin probe is a contour of size zero, so that the curvature at the base, κ0 = M0/(EI) [1/mm], follows from its
+position alone (`mechanics.clamped_rod`). The sensor reads a cubic in κ0, with independent normal noise:
 
     reading = b0 + b1 κ0 + b2 κ0² + b3 κ0³ + ε.
 
@@ -49,13 +49,13 @@ _VAGUE = 100.0
 """Prior sd of a sensor coefficient, in full scales of the reading per power of 3/reach."""
 
 _GUESSES = 400
-"""Draws of the prior among which the search for a start begins."""
+"""Number of draws of the prior among which the search for a start begins."""
 
 _REFINED = 4
-"""How many of the best of them are refined."""
+"""Number of the best of them that are refined."""
 
-_ROUGH = 0.01
-"""Noise over range of the readings that the search begins with."""
+_INITIAL_NOISE = 0.01
+"""Noise over range of the readings at the beginning of the search."""
 
 _INFLATION = 2.0
 """Scatter of the walkers' starts over the sd of the normal approximation; halved until enough of them are possible."""
@@ -63,14 +63,14 @@ _INFLATION = 2.0
 _LEAST_INFLATION = 1e-3
 
 _DROP = 10.0
-"""Log-probability per parameter that a start may lie below the centre: farther down a poor mode might hold it."""
+"""Log-probability per parameter by which a start may be below the centre, lest a minor mode captures it."""
 
 _SETTINGS = SamplerSettings(walkers=64)
 """Most of an evaluation does not depend on the number of points, so many walkers are cheap."""
 
 
 class Prior(Protocol):
-    """What is used of a frozen distribution of scipy.stats."""
+    """Protocol of a prior, which frozen distributions of scipy.stats satisfy."""
 
     def logpdf(self, x: Any, /) -> Any: ...
     def ppf(self, q: Any, /) -> Any: ...
@@ -79,11 +79,12 @@ class Prior(Protocol):
 
 
 def _reach(axial: Floats, lateral: Floats) -> float:
+    """Return the distance of the farthest probe point from the origin."""
     return float(np.hypot(axial, lateral).max())
 
 
 def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -> dict[str, Prior]:
-    """Priors that follow from where the probe goes, and from the sensor's full scale.
+    """Return the default priors, from the probe points and the sensor's full scale.
 
     With reach R, the distance of the farthest probe point from the origin of the coordinates:
 
@@ -94,7 +95,7 @@ def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -
     ``clamp_lateral``    normal(0, R/4) [mm]
     ``clamp_angle``      normal(0, 0.2) [rad]                   `axial` runs roughly along the undeflected rod
     ``compliance``       half-normal(R/4) [mm]                  the suspension is stiffer than the rod
-    ``noise_sd``         log-uniform, 1e-6 to 1 full scale      nothing known but that there is some noise
+    ``noise_sd``         log-uniform, 1e-6 to 1 full scale      only that there is some noise is known
     ===================  =====================================  ====================================================
 
     Parameters
@@ -106,8 +107,7 @@ def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -
 
     Returns
     -------
-    dict
-        Frozen distributions of scipy.stats by name.
+    dict of str to frozen scipy.stats distribution
 
     Examples
     --------
@@ -127,13 +127,13 @@ def default_priors(axial: ArrayLike, lateral: ArrayLike, *, full_scale: float) -
 
 @dataclass(frozen=True)
 class _Model:
-    """Readings given geometry and noise, the sensor's coefficients integrated out."""
+    """Distribution of the readings given geometry and noise, with the sensor's coefficients integrated out."""
 
     axial: Floats
     lateral: Floats
     reading: Floats
     unit_curvature: float
-    """3/reach: the sensor's powers are counted in it."""
+    """3/reach, the unit of the curvature in the powers of the sensor curve."""
     coefficient_sd: float
     priors: Mapping[str, Prior]
     known: Mapping[str, float]
@@ -144,26 +144,26 @@ class _Model:
         return tuple(self.priors)
 
     def column(self, points: Floats, name: str) -> Floats:
-        """One parameter of (n, parameters), known or not."""
+        """Return one parameter of points, shape (n, parameters), known or not, as an array of shape (n,)."""
         if name in self.known:
             return np.full(len(points), self.known[name])
         return points[:, self.names.index(name)]
 
     def curvature(self, points: Floats) -> Floats:
-        """Base curvature (n, probe point) [1/mm]."""
+        """Return the base curvature [1/mm], shape (n, probe points)."""
         x, y, angle, compliance = (self.column(points, name)[:, None] for name in _GEOMETRY)
         dx, dy = self.axial - x, self.lateral - y
         along, across = dx * np.cos(angle) + dy * np.sin(angle), dy * np.cos(angle) - dx * np.sin(angle)
         return base_curvature(along, across, compliance, small_deflection=self.small_deflection)
 
     def powers(self, curvature: Floats) -> Floats:
-        """(n, probe point) → (n, probe point, power)."""
+        """Return the powers of curvatures, shape (n, probe points), as an array of shape (n, probe points, powers)."""
         return (curvature / self.unit_curvature)[..., None] ** np.arange(_POWERS)
 
     def coefficients(self, curvature: Floats, noise_sd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Posterior mean of the sensor's coefficients, R of its precision RᵀR/σ², and the least sum of squares.
+        """Return the posterior mean of the sensor's coefficients, R of its precision RᵀR/σ², and the sum of squares.
 
-        Least squares with the prior as four more observations of zero, by QR: no digits are lost in normal equations.
+        The prior is four more observations of zero; QR loses fewer digits than normal equations.
         """
         powers = self.powers(curvature)
         ridge = (noise_sd / self.coefficient_sd)[:, None, None] * np.eye(_POWERS)
@@ -174,7 +174,7 @@ class _Model:
         return mean, r, squares
 
     def log_probability(self, points: Floats) -> Floats:
-        """Log of prior times marginal likelihood, (n, parameters) → (n,).
+        """Return the log of prior times marginal likelihood of points, shape (n, parameters), in shape (n,).
 
         The readings are normal with covariance σ² I + S² B Bᵀ, B the powers of the curvature and S the coefficients'
         prior sd; with λ = σ²/S² its determinant is σ^(2n) λ^(−4) det(BᵀB + λ I).
@@ -198,7 +198,7 @@ class _Model:
         return values
 
     def misfit(self, points: Floats, noise_sd: float) -> Floats:
-        """Residuals over the noise, the sensor fitted, followed by the distances from the priors' centres."""
+        """Return residuals over the noise with the sensor fitted, and distances from the priors' centres."""
         curvature = self.curvature(points)
         impossible = ~np.all(np.isfinite(curvature), axis=1)
         curvature = np.where(impossible[:, None], self.unit_curvature, curvature)
@@ -210,7 +210,7 @@ class _Model:
 
     @cached_property
     def geometry(self) -> list[int]:
-        """Which of the parameters say where the rod is, and how it is held."""
+        """Indices of the parameters of clamp and suspension."""
         return [i for i, name in enumerate(self.names) if name != "noise_sd"]
 
     @cached_property
@@ -225,10 +225,10 @@ class _Model:
 
 
 def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[Floats, Floats]:
-    """Centre and covariance of the free parameters by least squares, from the best of many draws of the prior."""
+    """Return centre and covariance of the parameters by least squares, from the best of many draws of the prior."""
     rng = np.random.default_rng(seed)
     guesses = np.column_stack([prior.rvs(size=_GUESSES, random_state=rng) for prior in model.priors.values()])
-    noise = _ROUGH * float(np.ptp(model.reading))
+    noise = _INITIAL_NOISE * float(np.ptp(model.reading))
     best = guesses[np.argsort((model.misfit(guesses, noise) ** 2).sum(-1))[:_REFINED]]
     centre, covariance = model.centre.copy(), np.zeros((model.centre.size, model.centre.size))
     geometry = model.geometry
@@ -264,7 +264,7 @@ def _normal_approximation(model: _Model, seed: np.random.SeedSequence) -> tuple[
 def _scatter(
     model: _Model, centre: Floats, covariance: Floats, top: float, *, seed: Seed, settings: SamplerSettings
 ) -> Floats:
-    """Walkers around the centre, as widely as the posterior allows: it may bend where its approximation is straight."""
+    """Return starts around the centre, as wide as the posterior allows, which may be bent."""
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
 
@@ -289,7 +289,7 @@ def _scatter(
 
 
 def _rms(residuals: Floats, fitted: int) -> float:
-    """Root mean square of residuals over the noise, not quite zero where the fit is perfect."""
+    """Return the root mean square of residuals over the noise, at least 1e-9."""
     return max(float(np.sqrt((residuals**2).sum() / (residuals.size - fitted))), 1e-9)
 
 
@@ -320,12 +320,12 @@ def _checked(axial: ArrayLike, lateral: ArrayLike, reading: ArrayLike) -> tuple[
 def _split_priors(
     priors: Mapping[str, Prior | float] | None, defaults: Mapping[str, Prior]
 ) -> tuple[dict[str, Prior], dict[str, float]]:
-    """Priors of what is unknown, and values of what is known."""
+    """Return priors of unknown parameters, and values of known ones."""
     check_mapping("priors", priors, "give distributions, or numbers, by name")
     given = dict(priors or {})
-    unheard = sorted(set(given) - set(defaults))
-    if unheard:
-        raise ParameterError(f"no such parameter: {', '.join(unheard)}; there are {', '.join(defaults)}")
+    surplus = sorted(set(given) - set(defaults))
+    if surplus:
+        raise ParameterError(f"no such parameter: {', '.join(surplus)}; there are {', '.join(defaults)}")
     known: dict[str, float] = {}
     unknown: dict[str, Prior] = {}
     for name, default in defaults.items():
@@ -356,39 +356,39 @@ def infer_point_load(
 ) -> xr.DataTree:
     """Infer clamp, suspension and sensor curve of a rod from readings at known probe points.
 
-    The model and its equations are in the module's text. `axial` should run roughly along the undeflected rod and be
-    counted roughly from its clamp; else give priors.
+    The docstring of the module describes the model and its equations. `axial` should run approximately along the
+    undeflected rod, from its clamp; otherwise give priors.
 
     Parameters
     ----------
     axial, lateral : array_like, shape (n,)
         Probe points [mm].
     reading : array_like, shape (n,)
-        What the sensor read there [its own unit], n at least 10.
+        Readings of the sensor [its own unit], n at least 10.
     seed : int or numpy.random.SeedSequence
         The same seed gives the same posterior.
     priors : mapping, optional
         Frozen distributions of scipy.stats that replace those of `default_priors`; a number instead of a distribution
-        says that the parameter is known (``{"compliance": 0.0}``: a rigid clamp). The prior of each coefficient of the
+        declares the parameter known (``{"compliance": 0.0}``: a rigid clamp). The prior of each coefficient of the
         sensor is normal with mean 0 and sd 100 full scales per power of 3/R, R the reach of the probe: vague.
     full_scale : float, optional
         A reading that the sensor hardly exceeds; sets the scale of the priors of sensor and noise. By default the power
         of ten above the largest reading, the one thing for which the priors look at the data.
     small_deflection : bool
-        Take the linear beam instead of the large-deflection rod, for comparison.
+        Whether the model is the linear beam instead of the large-deflection rod, for comparison.
     settings : SamplerSettings, optional
-        By default 64 walkers, and else the defaults.
+        By default 64 walkers, otherwise the defaults of `SamplerSettings`.
     progress : callable, optional
-        Is given a `Progress` after each look at the diagnostics.
+        Called with a `Progress` after each evaluation of the diagnostics.
 
     Returns
     -------
     xarray.DataTree
         In ArviZ's layout, dims chain and draw: ``posterior`` (``clamp_axial``, ``clamp_lateral`` [mm], ``clamp_angle``
-        [rad], ``compliance`` [mm], ``sensor_coefficient`` over ``power`` [reading · mm^power], ``noise_sd``; what is
-        known is left out), ``posterior_predictive`` (``reading``, and ``expected_reading`` without noise),
-        ``log_likelihood``, ``sample_stats``, ``observed_data``, ``constant_data``. The attributes of the root tell
-        version, seed, settings, whether and how the sampler converged, and a hash of the data.
+        [rad], ``compliance`` [mm], ``sensor_coefficient`` over ``power`` [reading · mm^power], ``noise_sd``; known
+        parameters are left out), ``posterior_predictive`` (``reading``, and ``expected_reading`` without noise),
+        ``log_likelihood``, ``sample_stats``, ``observed_data``, ``constant_data``. The attributes of the root state
+        version, seed, settings, convergence and message of the sampler, and a hash of the data.
 
     Raises
     ------
@@ -443,7 +443,7 @@ def infer_point_load(
 
 
 def _tree(model: _Model, draws: Draws, rng: np.random.Generator) -> xr.DataTree:
-    """The draws with coefficients, predictions and pointwise likelihood, in ArviZ's layout."""
+    """Return draws, coefficients, predictions and pointwise likelihood in ArviZ's layout."""
     by_power = model.unit_curvature ** np.arange(_POWERS)
     coefficients, expected, noises = [], [], []
     for points in draws.samples:  # one chain at a time bounds the memory

@@ -1,4 +1,4 @@
-"""Predictive checks: could the data have come from the posterior?"""
+"""Posterior predictive checks of a discrepancy."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ def _sum_of_squares(residuals: Floats) -> Floats:
 
 
 def predictive_p_value(tree: xr.DataTree, discrepancy: Callable[[Floats], Floats] = _sum_of_squares) -> float:
-    """How often data from the posterior are at least as discrepant as the real ones.
+    """Return the posterior predictive p-value of a discrepancy.
 
-    For each draw the residuals over the noise, of the real readings and of predicted ones, are put through a
-    discrepancy (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). The value is seldom extreme if the model holds:
-    it lies closer to one half than a uniform number does.
+    For each draw the discrepancy is computed from the residuals over the noise, of the real readings and of predicted
+    ones (Gelman, Meng and Stern 1996, Statistica Sinica 6, 733). If the model holds, the p-value lies closer to one
+    half than a uniform number does.
 
     Parameters
     ----------
     tree : xarray.DataTree
-        From `infer_point_load`.
+        Result of `infer_point_load`.
     discrepancy : callable
-        Takes residuals (…, n) in the order of the data, returns (…); large is bad. By default the sum of squares.
+        Maps residuals, shape (…, n), in the order of the data, to numbers, shape (…), which are large for a misfit. By
+        default the sum of squares.
 
     Returns
     -------

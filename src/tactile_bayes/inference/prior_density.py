@@ -1,4 +1,4 @@
-"""Densities of priors, without what `scipy.stats` asks of its arguments at every call."""
+"""Densities of priors, without the checks of arguments in every call of `scipy.stats`."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
 def log_density_of(prior: Prior) -> Callable[[Floats], Floats]:
-    """Logarithm of the density of a frozen distribution, as its `logpdf`; of the common ones ten times faster.
+    """Return the log-density of a frozen distribution, as its `logpdf`, for common ones ten times faster.
 
-    A call of `logpdf` takes longer than to sum up a whole record, of a few points at a time.
+    For a few points a call of `logpdf` takes longer than the likelihood of a whole record.
     """
-    law = getattr(prior, "dist", None)
-    closed = _CLOSED.get(type(law))
-    if law is None or closed is None:
+    distribution = getattr(prior, "dist", None)
+    closed = _CLOSED.get(type(distribution))
+    if distribution is None or closed is None:
         return prior.logpdf
-    names = [*(law.shapes.split(", ") if law.shapes else []), "loc", "scale"]
+    names = [*(distribution.shapes.split(", ") if distribution.shapes else []), "loc", "scale"]
     given = dict(zip(names, prior.args, strict=False)) | prior.kwds  # type: ignore[attr-defined]
     values = {"loc": 0.0, "scale": 1.0} | given
     if set(values) != set(names) or any(np.ndim(value) for value in values.values()):

@@ -12,12 +12,12 @@ from tactile_bayes.checks import check_kind, check_mapping, shown
 from tactile_bayes.contours.family import Family, FamilyParameter
 from tactile_bayes.errors import ParameterError
 
-__all__ = ["Prior", "check_priors", "default_priors", "own_priors", "refuse_strangers", "support_of"]
+__all__ = ["Prior", "check_priors", "default_priors", "own_priors", "refuse_unknown_priors", "support_of"]
 
 
 @runtime_checkable
 class Prior(Protocol):
-    """What is asked of a prior: a frozen distribution of scipy.stats has it."""
+    """Protocol of a prior, which frozen distributions of scipy.stats satisfy."""
 
     def logpdf(self, x: Any) -> Any: ...
     def rvs(self, size: int, random_state: np.random.Generator) -> Any: ...
@@ -25,36 +25,48 @@ class Prior(Protocol):
 
 
 def check_priors(name: str, priors: Any) -> None:
-    """Refuse what is no mapping of names to distributions with fixed parameters."""
-    remedy = "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}"
-    check_kind(name, priors, Mapping, remedy)
-    check_mapping(name, priors, remedy)
+    """Refuse an argument that is no mapping of names to frozen distributions.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    correction = "give distributions by name, like {'q': scipy.stats.norm(0.5, 0.1)}"
+    check_kind(name, priors, Mapping, correction)
+    check_mapping(name, priors, correction)
     for parameter, prior in priors.items():
         if not isinstance(prior, Prior) or isinstance(prior, stats.rv_continuous):
-            remedy = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
-            raise ParameterError(f"the prior of {parameter} is {shown(prior)}: {remedy}")
+            correction = "give a frozen distribution, like scipy.stats.norm(0.5, 0.1)"
+            raise ParameterError(f"the prior of {parameter} is {shown(prior)}: {correction}")
 
 
-def refuse_strangers(priors: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
-    """Refuse priors of what is no parameter."""
-    strangers = sorted(set(priors) - set(names))
-    if strangers:
+def refuse_unknown_priors(priors: Mapping[str, Any], names: Collection[str], whose: str = "", more: str = "") -> None:
+    """Refuse priors by names that are no parameters.
+
+    Raises
+    ------
+    ParameterError
+        If there are such names.
+    """
+    unknown = sorted(set(priors) - set(names))
+    if unknown:
         raise ParameterError(
-            f"there is a prior {whose}of {', '.join(strangers)}, which is no parameter: there are "
+            f"there is a prior {whose}of {', '.join(unknown)}, which is no parameter: there are "
             f"{', '.join(names)}{more}"
         )
 
 
 def support_of(prior: Prior) -> tuple[float, float]:
-    """Between what values it lies."""
+    """Return the ends of a prior's support."""
     ends = prior.support() if hasattr(prior, "support") else (-np.inf, np.inf)
     return float(ends[0]), float(ends[1])
 
 
 def own_priors(family: Family, length: float) -> dict[str, Prior]:
-    """Default priors of a family's parameters, except the vertex, from nothing but the rod's length.
+    """Return the default priors of a family's parameters, except the vertex, from the rod's length alone.
 
-    Parameters whose entry is one object have one prior, of which the densities are asked for at once.
+    Parameters with the same entry of the table share one prior object, so that their densities come from one call.
     """
     entries = {name: entry for name, entry in family.table.items() if entry.prior is not None}
     made = {id(entry): _prior(entry, length) for entry in entries.values()}
@@ -71,9 +83,9 @@ def _prior(entry: FamilyParameter, length: float) -> Prior:
 
 
 def default_priors(family: Family, base: tuple[float, float], length: float) -> dict[str, Prior]:
-    """Priors of a family's parameters by name, from pivot (x, y) and rod length alone.
+    """Return the default priors of a family's parameters by name, from pivot (x, y) and rod length alone [length].
 
-    The vertex lies within a rod length of the pivot, to the side and in height, anywhere alike.
+    The vertex is uniformly distributed within a rod length of the pivot, sideways and in height.
     """
     x, y = base
     vertex = {"q": stats.uniform(y - length, 2.0 * length), "x_c": stats.uniform(x - length, 2.0 * length)}

@@ -1,4 +1,4 @@
-"""What every posterior carries, how it is stored, and how it is handed to ArviZ."""
+"""Results of inference: provenance, groups, files, and the form of the installed ArviZ."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 _SOFTWARE = ("tactile-bayes", "numpy", "scipy", "emcee", "numba", "xarray", "arviz-stats", "h5netcdf")
-"""What a posterior is computed and stored with, beside Python."""
+"""Libraries by which a posterior is computed and stored, besides Python."""
 
 _EVENTS = ("first_contact_x", "snap_off_contact_x", "snap_off_drive_angle")
 
@@ -44,7 +44,7 @@ _NO_CONTOUR = "this is no result of infer_contour: give the tree that it returne
 
 
 def sample_stats(draws: Draws) -> xr.Dataset:
-    """The group `sample_stats`: log-probability of every draw, and how the ensembles fared."""
+    """Return the group `sample_stats`: log-probability of every draw, and diagnostics of the ensembles."""
     chains, count = draws.log_probability.shape
     return xr.Dataset(
         {
@@ -70,7 +70,7 @@ def sample_stats(draws: Draws) -> xr.Dataset:
 
 
 def provenance(draws: Draws, *, seed: Seed, settings: SamplerSettings, data_sha256: str, **more: Any) -> dict[str, Any]:
-    """Attributes of a result: software, seed, settings, hash of the data, and how the run ended."""
+    """Return attributes of a result: software, seed, settings, hash of the data, convergence and message."""
     return {
         "inference_library": "tactile-bayes",
         "inference_library_version": version("tactile-bayes"),
@@ -91,14 +91,20 @@ def _versions() -> str:
 
 
 def seed_words(seed: Seed) -> str:
-    """A seed as an attribute."""
+    """Return a seed as text, for an attribute."""
     if isinstance(seed, np.random.SeedSequence):
         return f"{seed.entropy}" + (f", spawn key {seed.spawn_key}" if seed.spawn_key else "")
     return str(seed)
 
 
 def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
-    """The posterior group of a result, or the dataset that is one already."""
+    """Return the posterior group of a result, or the dataset if it is one already.
+
+    Raises
+    ------
+    InferenceError
+        If the tree has no such group.
+    """
     if isinstance(result, xr.Dataset):
         return result
     if "posterior" not in result.children:
@@ -107,7 +113,7 @@ def posterior_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
 
 
 def record_of(posterior: xr.DataTree) -> xr.Dataset:
-    """The record that a contour was inferred from, with the rod and the load cell that were taken for it."""
+    """Return the record from which a contour was inferred, with the rod and the load cell of the inference."""
     refuse_no_contour(posterior, "constant_data", "observed_data")
     kept = {
         name: value
@@ -119,7 +125,7 @@ def record_of(posterior: xr.DataTree) -> xr.Dataset:
 
 
 def contact_draws(result: xr.DataTree | xr.Dataset) -> xr.Dataset:
-    """The posterior group of a result of `infer_contacts`."""
+    """Return the posterior group of a result of `infer_contacts`."""
     is_xarray = isinstance(result, xr.DataTree | xr.Dataset)
     draws = posterior_draws(result) if is_xarray else xr.Dataset()
     if not {"chain", "draw", "sample"} <= set(draws.dims) or "contact_x" not in draws:
@@ -146,13 +152,13 @@ def contour_events(result: xr.DataTree) -> xr.Dataset:
 
 
 def refuse_no_contour(result: Any, *groups: str) -> None:
-    """Refuse what is no result of `infer_contour` with these groups."""
+    """Refuse an object that is no result of `infer_contour` with these groups."""
     if not (isinstance(result, xr.DataTree) and set(groups) <= set(result.children)):
         raise InferenceError(_NO_CONTOUR)
 
 
 def _refuse_absent(group: xr.Dataset, names: Sequence[str], dims: Sequence[str]) -> None:
-    """Refuse a group that lacks numbers by these names along these dimensions."""
+    """Refuse a group without numeric variables of these names and dimensions."""
     for name in names:
         if name not in group or not set(dims) <= set(group[name].dims) or group[name].dtype.kind not in "iuf":
             raise InferenceError(f"{_NO_CONTOUR} (it has no numbers {name!r} by {', '.join(dims)})")
@@ -166,8 +172,14 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result : xr.DataTree
+        Result of `infer_contour`, `infer_contacts` or `infer_point_load`.
     path : path-like
-        Where to, with suffix .nc.
+        Path of the file, with suffix .nc.
+
+    Raises
+    ------
+    InferenceError
+        If the suffix is another, or the object is no posterior.
 
     Examples
     --------
@@ -188,12 +200,17 @@ def write_result(result: xr.DataTree, path: str | os.PathLike[str]) -> None:
 
 
 def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
-    """Read a posterior that `write_result` has written.
+    """Read a posterior from a file of `write_result`.
+
+    Parameters
+    ----------
+    path : path-like
+        Path of the file.
 
     Raises
     ------
     InferenceError
-        If the file is none, or damaged.
+        If there is no such file, or it holds no posterior or is damaged.
     """
     path = check_path("path", path)
     try:
@@ -207,7 +224,7 @@ def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
 
 
 def to_arviz(posterior: xr.DataTree) -> Any:
-    """A result in the form that the installed ArviZ works with.
+    """Return a result in the form that the installed ArviZ accepts.
 
     Parameters
     ----------
@@ -217,7 +234,12 @@ def to_arviz(posterior: xr.DataTree) -> Any:
     Returns
     -------
     arviz.InferenceData or xr.DataTree
-        ArviZ 0.23 wants the former, from 1.0 on the latter.
+        The former for ArviZ 0.23, the latter from 1.0 on.
+
+    Raises
+    ------
+    ParameterError
+        If the object is no tree.
 
     Examples
     --------
@@ -229,7 +251,7 @@ def to_arviz(posterior: xr.DataTree) -> Any:
 
     check_kind("posterior", posterior, xr.DataTree, "give a result of infer_contour or infer_contacts")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 announces its refactoring
+        warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 warns of its refactoring
         import arviz
 
     if int(arviz.__version__.split(".")[0]) >= 1:  # it answers for the names of former versions, too

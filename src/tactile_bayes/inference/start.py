@@ -1,4 +1,4 @@
-"""Where the walkers start: a robust optimum found from the record alone, and how far to scatter around it."""
+"""Start of the walkers: a robust least-squares optimum, and the distribution of starting points around it."""
 
 from __future__ import annotations
 
@@ -17,36 +17,38 @@ __all__ = ["Cloud", "Optimum", "descend", "gather", "optima"]
 
 Residuals = Callable[[Floats], Floats]
 
-_BRAVE = 2.0
-"""Residual in standard deviations from which on a sample pulls less than by its square."""
+_HUBER_THRESHOLD = 2.0
+"""Residual, in standard deviations, beyond which the loss grows linearly, in the final search."""
 
-_CLOSER = 0.2
-"""Factor from one such residual to the next, the first being as large as all of them are."""
+_THRESHOLD_FACTOR = 0.2
+"""Factor on the threshold from one search to the next; the first threshold is the root mean square of residuals."""
 
-_MOST_STEPS = 40
+_MOST_EVALUATIONS = 40
+"""Largest number of evaluations of the residuals in a search."""
 
-_ENOUGH, _ON_THE_WAY = 1e-4, 1e-2
-"""Share of its cost, or of its size, that a step has to gain or change for a search to go on; before the last one."""
+_FINAL_TOLERANCE, _EARLY_TOLERANCE = 1e-4, 1e-2
+"""Relative change of cost or point below which a search ends: the final one, and those before it."""
 
 _GAIN = 1.0
-"""Cost by which a search that begins where one ended has to be better to go on."""
+"""Least gain in cost for which a search is repeated from where it ended."""
 
 _WIDER = 2.0
-"""How many times wider than the posterior walkers start."""
+"""Standard deviation of the starting points over that of the posterior."""
 
 _DEFICIT = 12.0
-"""Log-probability per parameter that a walker may start below the best: three times what _WIDER makes on average."""
+"""Log-probability per parameter by which a start may be below the best: three times the mean that _WIDER causes."""
 
 _INSIDE = 1e-3
-"""Of the scale of a parameter, from its end, where a search begins that must not leave."""
+"""Distance from a bound at which a bounded search begins, over the scale of the parameter."""
 
 _ROUNDS = 30
+"""Largest number of rounds of the cross-entropy method."""
 
 _SOME = 0.05
-"""Share of a cloud that must be possible if time is up."""
+"""Least share of points with a finite log-probability after the deadline."""
 
 _FITS = 0.55
-"""Cost per residual that says that the noise explains the record: 0.4 if the noise is guessed right."""
+"""Cost per residual below which the noise explains the record: it is 0.4 if the estimate of the noise is right."""
 
 
 class Optimum(NamedTuple):
@@ -54,17 +56,19 @@ class Optimum(NamedTuple):
 
     point: Floats
     covariance: Floats
-    """From the Jacobian, as if noise were as stated."""
+    """Covariance from the Jacobian, for the stated noise, shape (d, d)."""
     residuals: Floats
+    """Residuals in standard deviations, shape (k,)."""
     cost: float
+    """Robust cost, with that of the priors."""
     beyond: Floats | None = None
-    """Where the search ended before it was told to stay where things are possible."""
+    """Optimum without bounds, if it is out of bounds."""
     excess: float = 0.0
-    """Cost above that there."""
+    """Cost above that of the optimum without bounds."""
 
     @property
     def fits(self) -> bool:
-        """Whether noise as it was guessed explains the record."""
+        """True if the estimated noise explains the record."""
         return self.cost < _FITS * self.residuals.size
 
 
@@ -77,34 +81,35 @@ def optima(
     high: Floats | float = np.inf,
     deadline: Deadline = NEVER,
 ) -> Iterator[Optimum]:
-    """Robust least squares from one candidate after the other.
+    """Yield robust least-squares optima, one from each candidate.
 
-    The way to an optimum may lead through what is impossible a priori; if it ends there, the search goes on from the
-    nearest place where that is not so, and stays there.
+    A search may pass through points that are a priori impossible; if it ends at one, it is repeated within the bounds
+    from the nearest possible point.
 
     Parameters
     ----------
     residuals : callable
-        From points (n, d) to residuals in standard deviations (n, k).
+        Maps points, shape (n, d), to residuals in standard deviations, shape (n, k).
     candidates : iterable of ndarray, shape (d,)
+        Starting points.
     middle, spread : ndarray, shape (d,)
-        Where each parameter lies a priori, and on which scale it varies there: it is drawn there like by one residual.
+        Prior mean and standard deviation of each parameter, each of which adds one residual.
     low, high : ndarray, shape (d,), or float
-        Between what each parameter can be.
+        Bounds of each parameter.
     deadline : Deadline
-        Past it, the search that is under way ends where it is, and no other begins.
+        Time at which the current search ends with its best point, and no other begins.
     """
     for candidate in candidates:
         found = descend(residuals, candidate, middle, spread, deadline=deadline)
         gain = np.inf
-        while gain > _GAIN and not deadline.has_passed:  # samples may have fallen on an event's other side on the way
+        while gain > _GAIN and not deadline.has_passed:  # samples may have crossed an event during the search
             again = descend(residuals, found.point, middle, spread, deadline=deadline)
             gain = found.cost - again.cost
             found = again if gain > 0.0 else found
         if not np.all((found.point > low) & (found.point < high)):
             inside = np.clip(found.point, low + _INSIDE * spread, high - _INSIDE * spread)
             bounded = descend(residuals, inside, middle, spread, low, high, deadline)
-            if not deadline.has_passed:  # else what the record wants is not known
+            if not deadline.has_passed:  # otherwise the unbounded optimum is unknown
                 bounded = bounded._replace(beyond=found.point, excess=bounded.cost - found.cost)
             found = bounded
         yield found
@@ -121,20 +126,23 @@ def descend(
     high: Floats | float = np.inf,
     deadline: Deadline = NEVER,
 ) -> Optimum:
-    """Robust least squares from one place, as in `optima`; in units of the spread, so that those of the record do not
-    matter.
+    """Return the robust least-squares optimum from one starting point.
+
+    Arguments are those of `optima`. The search is in units of `spread`, so that it does not depend on those of the
+    record. The loss is 2 (√(1 + z) − 1) of squared residuals z in units of the threshold (pseudo-Huber, `soft_l1` of
+    `scipy.optimize.least_squares`), and quadratic for the priors.
     """
 
     def one(point: Floats) -> Floats:
         return np.append(residuals((point * spread)[None])[0], point - middle / spread)
 
     def jacobian(point: Floats) -> Floats:
-        """Central differences; loads are interpolated, so the step must not be too small."""
+        """Return central differences, whose step must not be too small for interpolated loads."""
         slopes = central_slopes(lambda points: residuals(points * spread), point, 1e-4)
         return np.concatenate([slopes, np.eye(point.size)])
 
     def loss(squares: Floats) -> Any:
-        """Outliers are the record's: to be far from where a parameter lies a priori costs its square."""
+        """Return the robust loss of the record's residuals, and the quadratic one of the priors', with derivatives."""
         root = np.sqrt(1.0 + squares)
         found = np.stack([2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3])
         own = squares[-start.size :]
@@ -143,10 +151,10 @@ def descend(
 
     bounds = np.broadcast_to(low / spread, start.shape), np.broadcast_to(high / spread, start.shape)
     point, scale, robust = start / spread, np.inf, cast(Any, loss)
-    while scale > _BRAVE:  # far off, residuals all pull by their squares, or the way would be long
+    while scale > _HUBER_THRESHOLD:  # far from the optimum a quadratic loss converges faster
         typical = float(np.sqrt(np.mean(np.square(one(point)))))
-        scale = max(_BRAVE, min(typical, _CLOSER * scale))
-        enough = _ENOUGH if scale == _BRAVE else _ON_THE_WAY
+        scale = max(_HUBER_THRESHOLD, min(typical, _THRESHOLD_FACTOR * scale))
+        tolerance = _FINAL_TOLERANCE if scale == _HUBER_THRESHOLD else _EARLY_TOLERANCE
         solution = deadline.least_squares(
             one,
             point,
@@ -154,9 +162,9 @@ def descend(
             bounds=bounds,
             loss=robust,
             f_scale=scale,
-            max_nfev=_MOST_STEPS,
-            ftol=enough,
-            xtol=enough,
+            max_nfev=_MOST_EVALUATIONS,
+            ftol=tolerance,
+            xtol=tolerance,
         )
         point = solution.x
         if deadline.has_passed:
@@ -169,24 +177,28 @@ def descend(
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Where walkers may start: a normal distribution, and the log-probability that is asked of them."""
+    """Distribution of starting points: a normal distribution, and the least log-probability of a start."""
 
     centre: Floats
+    """Mean, shape (d,)."""
     root: Floats
-    """Times its transpose it is the covariance."""
+    """Square root of the covariance, shape (d, d): the covariance is `root @ root.T`."""
     floor: float
+    """Least log-probability of a start."""
     ends: Ends = ANYTHING
+    """Bounds of the points."""
 
     @property
     def narrow_covariance(self) -> Floats:
-        """Roughly the posterior's."""
+        """Approximate covariance of the posterior, shape (d, d)."""
         return np.asarray(self.root @ self.root.T / _WIDER**2)
 
     def floor_by(self, deadline: Deadline) -> float:
-        """The floor; past the deadline there is none, for of what is above it few points may be found."""
+        """Return the floor; past the deadline it is −inf, since points above it may be rare."""
         return -np.inf if deadline.has_passed else self.floor
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        """Draw points, shape (count, d)."""
         return self.ends.drawn(
             lambda count: self.centre + rng.normal(size=(count, self.centre.size)) @ self.root.T, count
         )
@@ -200,25 +212,26 @@ def gather(
     deadline: Deadline = NEVER,
     ends: Ends = ANYTHING,
 ) -> Cloud:
-    """A cloud that is wider than the posterior, but of which most is not hopeless.
+    """Return a distribution of starting points that is wider than the posterior and mostly of comparable probability.
 
     A walker that starts where a sample of the record is impossible, as just beyond a snap-off, inflates the noise to
-    live with it, and takes thousands of steps to come back. So points are drawn around the centre, and while most of
-    them are far less probable than the best, centre and covariance are taken from the best fifth (the cross-entropy
-    method). Half its covariance, or the cloud would not shrink: of points twice as wide the best fifth are as wide.
+    explain it, and takes thousands of steps to return. Points are therefore drawn around the centre, and while most of
+    them are far less probable than the best, centre and covariance are estimated from the best fifth (cross-entropy
+    method). The covariance is halved, since the best fifth of points that are twice as wide would not be narrower.
 
     Parameters
     ----------
     log_probability : callable
-        From points (n, d) to (n,); −inf where impossible.
+        Maps points, shape (n, d), to log-probabilities, shape (n,), −inf if impossible.
     centre : ndarray, shape (d,)
+        Estimate of the mode.
     covariance : ndarray, shape (d, d)
-        A guess at the posterior's.
+        Estimate of the posterior covariance.
     rng : np.random.Generator
     deadline : Deadline
-        Past it, a cloud will do of which `_SOME` is possible.
+        Time after which a distribution suffices of which the share `_SOME` is possible.
     ends : Ends
-        Of what is possible, as far as it is known.
+        Known bounds of possible points.
     """
     size = centre.size
     top = float(log_probability(centre[None])[0])
@@ -236,14 +249,14 @@ def gather(
         best = best[np.isfinite(values[best])]
         if np.count_nonzero(values > floor) > 2 * size:
             centre, covariance = points[best].mean(axis=0), 0.5 * np.cov(points[best].T)
-        else:  # nearly all are hopeless beside the centre, or beside the best that was found on the way
+        else:  # nearly all are far less probable than the best so far
             centre = points[best[-1]] if best.size and values[best[-1]] == top else centre
             covariance = 0.25 * covariance
     return replace(cloud, floor=float(min(floor, np.quantile(values, 0.8, method="lower"))))
 
 
 def _square_root(covariance: Floats) -> Floats:
-    """R with R Rᵀ the covariance, also where rounding has left that without an inverse."""
+    """Return R with R Rᵀ the covariance, even if rounding has made that singular."""
     scale = np.sqrt(np.diag(covariance))
     values, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
     return scale[:, None] * axes * np.sqrt(np.maximum(values, np.finfo(float).eps))
