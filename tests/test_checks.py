@@ -543,7 +543,7 @@ REFUSALS = {
 
 
 @pytest.mark.parametrize("name", REFUSALS)
-def test_a_check_takes_what_is_right_and_refuses_the_rest_by_name_and_with_a_remedy(name):
+def test_a_check_takes_what_is_right_and_refuses_the_rest_by_name_and_with_a_correction(name):
     check, right, wrong = REFUSALS[name]
     for value in right:
         check(name, value)

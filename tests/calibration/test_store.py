@@ -189,7 +189,7 @@ GARBAGE = {
 
 
 @pytest.mark.parametrize("content", GARBAGE.values(), ids=GARBAGE)
-def test_garbage_is_refused_with_path_and_remedy(tmp_path, content):
+def test_garbage_is_refused_with_path_and_correction(tmp_path, content):
     (tmp_path / LEDGER).write_bytes(content)
     left_alone(tmp_path, tmp_path / LEDGER, "read")
 

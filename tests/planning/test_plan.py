@@ -64,7 +64,7 @@ def test_an_enlarged_contour_has_all_lengths_enlarged(name, factor):
         (None, None),
     ],
 )
-def test_what_has_no_parameters_is_refused_with_the_remedy(contour, named):
+def test_what_has_no_parameters_is_refused_with_the_correction(contour, named):
     with refused(ParameterError, named):
         family_parameters(contour)
 

@@ -139,7 +139,7 @@ def test_a_channel_without_noise_is_refused_by_name():
         sensitivity(seed=1, load_cell=tb.LoadCell(moment_noise=0.02))
 
 
-def test_a_contour_of_no_family_is_refused_with_the_remedy():
+def test_a_contour_of_no_family_is_refused_with_the_correction():
     x = np.linspace(-1.0, 1.0, 41)
     for parts in (PARTS, ["information"]):
         with refused(ParameterError, "family", "parabola, circle, ellipse"):

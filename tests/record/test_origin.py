@@ -364,8 +364,8 @@ def test_what_looks_like_degrees_may_be_said_to_be_in_the_words_of_the_file(tmp_
     path = rig_file(tmp_path / "rig.csv", table)
     with refused(RecordError, message):
         read_record(path, columns={"drive_angle": given}, split_sweeps=True)
-    remedy = re.search(r"'drive_angle': '(.*?)'", message)[1]
-    record = read_record(path, columns={"drive_angle": remedy}, split_sweeps=True)
+    correction = re.search(r"'drive_angle': '(.*?)'", message)[1]
+    record = read_record(path, columns={"drive_angle": correction}, split_sweeps=True)
     offset, sign = {"A": (0, 1), "-A": (0, -1), "-A+90": (90, -1), "A-0.5": (-0.5, 1)}[given]
     np.testing.assert_allclose(record["drive_angle"], np.radians(offset + sign * table["A"]), rtol=1e-12)
 

@@ -103,7 +103,9 @@ class World:
             object.__setattr__(self, name, tuple(numbers) if size > 1 else numbers)
         check_number("friction of the world", self.friction, "give a coefficient from 0 up", least=0.0)
         if not self.rigidity_scale > 0.0 or (self.flat_spot is not None and not self.flat_spot[1] > 0.0):
-            raise ParameterError("rigidity_scale and the factor of a flat spot are positive numbers")
+            raise ParameterError(
+                "rigidity_scale or the factor of a flat spot of the world is not positive: give positive numbers"
+            )
         check_optional("load_cell of the world", self.load_cell, LoadCell)
         if self.family is not None:
             family_named(self.family)

@@ -73,8 +73,8 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
             break
     else:
         raise ReachError(
-            f"of {_TRIALS} contours from the prior the rod reaches none in the world as it is, or friction is too "
-            "large: make it differ less"
+            f"the misspecified rig reaches none of {_TRIALS} contours from the prior, or its friction is too large: "
+            "reduce the misspecification"
         )
     values = model.values(point)
     rod = likelihood.rod

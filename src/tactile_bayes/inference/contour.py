@@ -226,7 +226,7 @@ def sampled(
         model = problem.model
         if walk.beyond:
             raise InferenceError(
-                f"the record wants {walk.beyond}: give a wider prior, or are units, rod and base right? "
+                f"the best fit is outside the priors, at {walk.beyond}: give wider ones, or check units, rod and base. "
                 + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
             )
         draws = sample(

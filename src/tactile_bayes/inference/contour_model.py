@@ -217,8 +217,8 @@ class ContourModel:
         points = np.concatenate(found)
         if not len(points):
             raise ReachError(
-                f"of {drawn} contours from the prior the rod can reach none in every sweep: are base, rod length and "
-                "units right, and the priors in the record's units?"
+                f"the rod reaches none of {drawn} contours from the prior in every sweep: check base, rod length and "
+                "units, and give priors in the record's units"
             )
         return points[:count], len(points) / drawn
 

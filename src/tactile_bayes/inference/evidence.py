@@ -267,7 +267,7 @@ def _bridge(drawn: Floats, proposed: Floats) -> _Bridge:
         from_draws, from_proposals = expit(threshold - drawn), expit(proposed - threshold)
         if min(_effective_number(from_draws), _effective_number(from_proposals)) < _LEAST_TERMS:
             raise InferenceError(
-                "density and fit do not overlap: a handful of points would decide; do all chains sample the same place?"
+                "density and fit do not overlap: few points dominate it; do all chains sample the same place?"
             )
         used, effective = effective, _effective_size(from_draws)
     return _Bridge(

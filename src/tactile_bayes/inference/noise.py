@@ -59,7 +59,7 @@ def noise_of(measured: xr.Dataset, load_cell: LoadCell | None) -> Noise:
     if cell is not None and any(cell.standard_deviations[name] > 0.0 for name in present):
         return Noise(cell, ("noise_scale",), (CHANNELS,), {"noise_scale": stats.lognorm(s=0.5)})
     if cell is not None and cell.relative_noise:
-        raise ParameterError("the load cell has relative_noise alone: state its force_noise and moment_noise as well")
+        raise ParameterError("the load cell states only relative_noise: state its force_noise and moment_noise as well")
     rod = rod_of(measured)
     sources = {"moment_noise": (("holding_moment",), rod.moment_unit), "force_noise": (CHANNELS[1:], rod.force_unit)}
     sources = {name: source for name, source in sources.items() if set(source[0]) & set(present)}

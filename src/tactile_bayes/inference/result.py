@@ -254,6 +254,6 @@ def to_arviz(posterior: xr.DataTree) -> Any:
         warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 warns of its refactoring
         import arviz
 
-    if int(arviz.__version__.split(".")[0]) >= 1:  # it answers for the names of former versions, too
+    if int(arviz.__version__.split(".")[0]) >= 1:  # not by hasattr: it has names of former versions, too
         return posterior
     return arviz.from_datatree(posterior)

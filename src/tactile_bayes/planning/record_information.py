@@ -66,7 +66,10 @@ def reading_slopes(model: ContourModel, point: Floats, step: float = _STEP) -> R
     """
     cell, count = model.likelihood.load_cell, len(model.forward_parameters)
     if not model.likelihood.usable(model.contours(point[None]), model.rig(point[None]))[0]:
-        raise ReachError("the rod does not reach the contour in every sweep, or does not come free of it")
+        raise ReachError(
+            "the rod does not reach the contour in every sweep, or is not clear of it after snap-off: change the pivot "
+            "or the length of the rod"
+        )
     loads = model.loads(point[None])[0]
     scale = np.where(cell.noise > 0.0, cell.noise, 1.0)
 

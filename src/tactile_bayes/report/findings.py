@@ -165,14 +165,14 @@ def _contour_posterior(path: Path) -> xr.DataTree:
 
 def _comparison_in(run: Path, compare: Path | None, data_sha256: str) -> xr.Dataset | None:
     path = (compare or run) / "comparison.nc"
-    remedy = "give --compare the folder that `tactile-bayes compare RECORD --out FOLDER` has written"
+    correction = "give --compare the folder that `tactile-bayes compare RECORD --out FOLDER` has written"
     if not path.is_file():
         if compare is None:
             return None
-        raise InferenceError(f"{compare} holds no comparison.nc: {remedy}")
+        raise InferenceError(f"{compare} holds no comparison.nc: {correction}")
     found = read_netcdf(path, xr.open_dataset, lambda what: InferenceError(f"{path} {what}: compare again"))
     if "family" not in found.dims or not {*_COMPARISON} <= set(found.data_vars) or "verdict" not in found.attrs:
-        raise InferenceError(f"{path} is no comparison of shapes: {remedy}")
+        raise InferenceError(f"{path} is no comparison of shapes: {correction}")
     if "data_sha256" not in found.attrs:
         if compare is None:
             return None

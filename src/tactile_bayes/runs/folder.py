@@ -111,13 +111,13 @@ def posterior_in(run: Path) -> Path:
     ...
     tactile_bayes.errors.InferenceError: there is no folder no/such/run: give the folder that `tactile-bayes infer RECORD --out FOLDER` has written
     """  # noqa: E501
-    remedy = "give the folder that `tactile-bayes infer RECORD --out FOLDER` has written"
+    correction = "give the folder that `tactile-bayes infer RECORD --out FOLDER` has written"
     if not run.exists():
-        raise InferenceError(f"there is no folder {run}: {remedy}")
+        raise InferenceError(f"there is no folder {run}: {correction}")
     if not run.is_dir():
-        raise InferenceError(f"{run} is a file: {remedy}")
+        raise InferenceError(f"{run} is a file: {correction}")
     path = run / "posterior.nc"
     if not path.is_file():
         found = next((f", but {kind}" for name, kind in _OTHERS.items() if (run / name).exists()), "")
-        raise InferenceError(f"{run} holds no posterior.nc{found}: {remedy}")
+        raise InferenceError(f"{run} holds no posterior.nc{found}: {correction}")
     return path

@@ -394,7 +394,7 @@ def test_a_lost_description_is_refused(begun):
 
 
 @pytest.mark.slow
-def test_a_gap_is_refused_and_its_remedy_works(tmp_path):
+def test_a_gap_is_refused_and_its_correction_works(tmp_path):
     draw(tmp_path)
     (tmp_path / "block-00000030-00000040.npz").unlink()
     refuse(tmp_path, "step 30", "block-00000040-00000050.npz")

@@ -153,8 +153,8 @@ def infer_contacts(
     check_optional("load_cell", load_cell, LoadCell, "give LoadCell(force_noise=0.05, moment_noise=0.02)")
     check_function("progress", progress)
     most = float(np.tan(MAX_FRICTION_ANGLE))
-    remedy = f"the friction angle is that of no sliding rod, give Coulomb's coefficient from 0 to {most:.2f}"
-    check_number("friction", friction, remedy, least=0.0, most=most)
+    correction = f"the friction angle is that of no sliding rod, give Coulomb's coefficient from 0 to {most:.2f}"
+    check_number("friction", friction, correction, least=0.0, most=most)
     cell = load_cell or LoadCell.from_record(measured)
     if cell is None:
         raise ParameterError(
@@ -189,9 +189,9 @@ def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -
     check_optional("settings", settings, SamplerSettings, "give SamplerSettings(min_ess=400) and the like")
     if settings is not None and settings.ensembles != CHAINS:
         raise ParameterError(f"{settings.ensembles} ensembles: give {CHAINS}, one for each chain of the result")
-    remedy = f"give a multiple of {CHAINS}, one share for each chain, and at most {_MOST_DRAWS}"
-    if check_whole_number("draws", draws, CHAINS, remedy, most=_MOST_DRAWS) % CHAINS:
-        raise refused("draws", draws, remedy)
+    correction = f"give a multiple of {CHAINS}, one share for each chain, and at most {_MOST_DRAWS}"
+    if check_whole_number("draws", draws, CHAINS, correction, most=_MOST_DRAWS) % CHAINS:
+        raise refused("draws", draws, correction)
     check_choice("method", method, ("auto", "importance", "emcee"))
 
 

@@ -71,17 +71,17 @@ class SamplerSettings:
             check_whole_number(
                 name, getattr(self, name), 1, f"give a whole number, at least 1 and at most {_MOST}", most=_MOST
             )
-        remedy = (
+        correction = (
             "give a whole number of at least 2 (4 is better), since convergence is judged by comparing independent "
             "ensembles; walkers of one ensemble are not independent"
         )
-        check_whole_number("ensembles", self.ensembles, 2, remedy, most=_MOST)
+        check_whole_number("ensembles", self.ensembles, 2, correction, most=_MOST)
         if self.walkers is not None:
-            remedy = "give an even number of at least 4, or None for the default"
-            if check_whole_number("walkers", self.walkers, 4, remedy, most=_MOST) % 2:
-                raise refused("walkers", self.walkers, remedy)
-        remedy = "R̂ is 1 at best, give a little more, like 1.01"
-        check_number("max_r_hat", self.max_r_hat, remedy, least=math.nextafter(1.0, 2.0))
+            correction = "give an even number of at least 4, or None for the default"
+            if check_whole_number("walkers", self.walkers, 4, correction, most=_MOST) % 2:
+                raise refused("walkers", self.walkers, correction)
+        correction = "R̂ is 1 at best, give a little more, like 1.01"
+        check_number("max_r_hat", self.max_r_hat, correction, least=math.nextafter(1.0, 2.0))
         check_positive("min_ess", self.min_ess)
         if self.max_seconds is not None:
             check_positive("max_seconds", self.max_seconds, "give a positive time [s], or None for no limit")
