@@ -14,11 +14,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 import tactile_bayes as tb
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours import Circle, Contour, Joined
 from tactile_bayes.inference.ensembles import SamplerSettings
 from tactile_bayes.inference.experiment import Experiment
@@ -45,7 +44,7 @@ class Outcome(NamedTuple):
 
     probability: Floats
     """By family; NaN where there is none."""
-    fits: NDArray[np.bool_]
+    fits: Flags
     seconds: float
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 
 __all__ = [
@@ -83,7 +83,7 @@ def as_number(value: Any) -> float | None:
         return None
 
 
-def as_numbers(values: Any) -> NDArray[np.float64] | None:
+def as_numbers(values: Any) -> Floats | None:
     """Return real numbers as an array of their shape; None if one of them is not a real number.
 
     Examples
@@ -130,7 +130,7 @@ def check_numbers(
     shape: Sequence[int | None] | None = None,
     least: float = -math.inf,
     most: float = math.inf,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return finite numbers from `least` to `most` as an array; None in its shape stands for any size above 0.
 
     Examples

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_numbers, shown
@@ -222,7 +222,7 @@ class Contour(ABC):
         goal = np.broadcast_to(np.asarray(wanted, dtype=float), shape).ravel()
         many, place = self.broadcast_to(shape or (1,)), np.unravel_index(np.arange(goal.size), shape or (1,))
 
-        def short_of(i: NDArray[np.intp], parameter: Floats) -> tuple[Floats, Floats]:
+        def short_of(i: Index, parameter: Floats) -> tuple[Floats, Floats]:
             value, rate = measure(many.take(tuple(axis[i] for axis in place)).locate(parameter))
             return goal[i] - value, -rate
 

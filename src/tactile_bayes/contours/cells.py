@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.halves import CELLS, Half, Halves
 from tactile_bayes.numerics import chebyshev
@@ -73,7 +72,7 @@ def in_cells(contour: Contour, low: Floats, high: Floats) -> Halves:
     return Halves(left, right, np.zeros(count), np.zeros(count), tables)
 
 
-def _series(contour: Contour, owner: NDArray[np.intp], begin: Floats, end: Floats) -> Floats:
+def _series(contour: Contour, owner: Index, begin: Floats, end: Floats) -> Floats:
     """Coefficients of x, y and slope angle, shape (cells, 3, order).
 
     The series are fitted to differences from the values in the middle of the cell, to reduce rounding.

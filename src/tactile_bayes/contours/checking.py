@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.contours.base import Contour, Graph, Locus
 from tactile_bayes.contours.rates import Rate, mismatch, probes
 from tactile_bayes.errors import ContourError
@@ -127,7 +127,7 @@ class _Checked:
         least = np.maximum(np.where(begins, -np.inf, np.nanmin(angle, axis=0) + margin), -_STEEPEST)
         greatest = np.minimum(np.where(ends, np.inf, np.nanmax(angle, axis=0) - margin), _STEEPEST)
 
-        def bisected(inside: Floats, outside: Floats, within: Callable[[Floats], NDArray[np.bool_]]) -> Floats:
+        def bisected(inside: Floats, outside: Floats, within: Callable[[Floats], Flags]) -> Floats:
             for _ in range(60):
                 middle = 0.5 * (inside + outside)
                 good = within(self._located(parameter(middle)[None]).slope_angle[0])

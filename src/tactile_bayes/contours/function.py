@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.base import Graph, Single
@@ -18,7 +18,7 @@ from tactile_bayes.errors import ContourError
 
 __all__ = ["FunctionContour", "from_function"]
 
-Function = Callable[[NDArray[np.float64]], ArrayLike]
+Function = Callable[[Floats], ArrayLike]
 
 _MAX_DEGREE = 1024
 _RESOLVED = 1e-14

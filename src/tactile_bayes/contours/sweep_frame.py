@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.base import Contour, Locus, Parameter
 
 __all__ = ["SweepFrame"]
@@ -42,7 +41,7 @@ class SweepFrame:
     base_y: Floats
     length: Parameter
     standoff: Parameter
-    mirrored: NDArray[np.bool_]
+    mirrored: Flags
 
     @property
     def size(self) -> int:

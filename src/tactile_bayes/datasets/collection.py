@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from tactile_bayes.arrays import Index
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.record.netcdf import reading
@@ -104,7 +105,7 @@ class _Shards(BackendArray):
                 found[run] = self._of_shard(number, [rows[run] - self.starts[number], *map(np.atleast_1d, rest)])
         return found.reshape([places.size for places in (wanted, *rest) if np.ndim(places)])
 
-    def _of_shard(self, number: int, places: list[NDArray[np.intp]]) -> NDArray[Any]:
+    def _of_shard(self, number: int, places: list[Index]) -> NDArray[Any]:
         """Read values at the outer product of indices, from one contiguous piece."""
         path = self.folder / self.files[number]
         with _reading(path), h5py.File(path, "r") as file:

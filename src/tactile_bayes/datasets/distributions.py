@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_number
 from tactile_bayes.errors import SpecificationError
 
@@ -98,7 +97,7 @@ class Distribution:
             return f"each of {', '.join(numbers)}" + (f", on the axis {self.axis}" if self.axis else "")
         return _KINDS[self.kind].text.format(*numbers) if self.kind in _KINDS else numbers[0]
 
-    def at(self, share: Floats, turn: NDArray[np.intp]) -> Floats:
+    def at(self, share: Floats, turn: Index) -> Floats:
         """Return the quantiles at probabilities in [0, 1), for records with given positions in the list."""
         if self.kind == "choice":
             return np.array(self.numbers)[(share * len(self.numbers)).astype(np.intp)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.sweep_frame import SweepFrame
@@ -161,7 +161,7 @@ def _keep(
     records: Records,
     candidates: _Candidates,
     tried: Mapping[int, _Tried],
-    is_kept: NDArray[np.bool_],
+    is_kept: Flags,
 ) -> None:
     """Write accepted candidates to their records."""
     count, sweeps = records.index.size, len(spec.sweeps)

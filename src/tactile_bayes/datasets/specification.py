@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Index
 from tactile_bayes.checks import as_number, check_choice, check_kind, check_number, check_whole_number, refused
 from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
 from tactile_bayes.contours.family import Family
@@ -183,7 +183,7 @@ class Specification:
         """Base and direction of each sweep of a record."""
         return tuple((base, direction) for base in range(len(self.bases)) for direction in self.directions)
 
-    def blocks(self, records: int) -> list[NDArray[np.intp]]:
+    def blocks(self, records: int) -> list[Index]:
         """Split the indices of records into blocks whose samples fit into a processor's cache."""
         samples = records * len(self.sweeps) * self.drive.samples
         return np.array_split(np.arange(records), max(1, -(-samples // _AT_HAND)))

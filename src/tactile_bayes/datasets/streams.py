@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["CONTOUR", "NOISE", "Together", "streams"]
 
@@ -26,7 +26,7 @@ _LEFT, _RIGHT = np.uint32(0xCA01F9DD), np.uint32(0x4973F715)
 _HALF = np.uint32(16)
 
 
-def streams(seed: int, records: NDArray[np.intp], purpose: int) -> list[np.random.Generator]:
+def streams(seed: int, records: Index, purpose: int) -> list[np.random.Generator]:
     """Make the generators of many records, each as `default_rng(SeedSequence(seed, spawn_key=(record, purpose)))`.
 
     Seeding them together takes a tenth of the time.

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.likelihood import RecordLikelihood
@@ -44,7 +43,7 @@ class Residuals(NamedTuple):
     """Shape (1 + predictions, samples); row 0 is the record itself."""
     scale: Floats
     """Predictive spread in the record's units, shape (samples,)."""
-    loaded: NDArray[np.bool_]
+    loaded: Flags
     """True for samples that the posterior expects to carry a load, shape (samples,)."""
     sweeps: tuple[Index, ...]
     """Rows of each sweep, in the order of measurement."""
@@ -199,7 +198,7 @@ def residuals_of(posterior: xr.DataTree) -> dict[str, Residuals]:
     return residuals
 
 
-def _loaded(posterior: xr.DataTree) -> NDArray[np.bool_]:
+def _loaded(posterior: xr.DataTree) -> Flags:
     """Return True for samples between first contact and snap-off, at the posterior medians of these events."""
     record = record_of(posterior)
     events = posterior["events"].to_dataset().median(("chain", "draw"))

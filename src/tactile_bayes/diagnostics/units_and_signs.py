@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, to_dimensionless, turned
@@ -90,9 +89,7 @@ def check_units_and_signs(measured: xr.Dataset, load_cell: LoadCell | None = Non
     return tuple(found)
 
 
-def _of_size(
-    record: xr.Dataset, measured: xr.Dataset, force: Floats, firm: NDArray[np.bool_], *, has_all: bool
-) -> list[str]:
+def _of_size(record: xr.Dataset, measured: xr.Dataset, force: Floats, firm: Flags, *, has_all: bool) -> list[str]:
     """Return a message on loads that are too large or too small for the rod."""
     unit = rod_of(measured).force_unit
     largest = _largest(force)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import betainc, betaln, fdtri, stdtrit
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 
 __all__ = ["FEWEST", "ContactBounds", "contact_bounds"]
 
@@ -189,7 +188,7 @@ def _refined(
     return (begin, first), (last, end if end < n else -1)
 
 
-def _neighboured(z: Floats) -> NDArray[np.bool_]:
+def _neighboured(z: Floats) -> Flags:
     """Return whether the sample before or after deviates to the same side by more than three deviations."""
     padded = np.concatenate([np.zeros((1, z.shape[1])), z, np.zeros((1, z.shape[1]))])
     return np.asarray(np.maximum(padded[:-2] * np.sign(z), padded[2:] * np.sign(z)) > _CLIP)

@@ -9,9 +9,9 @@ from itertools import combinations, product
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import as_number, check_choice, check_number, check_numbers, check_positive, refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.drift import Drift, OrnsteinUhlenbeck, RandomWalk
@@ -159,7 +159,7 @@ class DataSheet:
         return self.degrees_of_freedom > 2.0 and bool(np.all(self.noise > 0.0))
 
     @property
-    def unrest(self) -> NDArray[np.bool_]:
+    def unrest(self) -> Flags:
         """True for channels whose readings vary without load, shape (3,)."""
         drift = 0.0 if self.drift is None else self.drift.sizes
         return np.asarray(self.noise + self.resolution + np.array(self.bias_uncertainty) + drift > 0.0)
@@ -223,7 +223,7 @@ class DataSheet:
         sense = np.where(np.asarray(direction) == "backward", -0.5, 0.5)
         return np.asarray(self.drive_angle_offset + self.drive_angle_backlash * sense)
 
-    def cuts_off(self, readings: Floats, present: slice | NDArray[np.intp] = slice(None)) -> NDArray[np.bool_]:
+    def cuts_off(self, readings: Floats, present: slice | Index = slice(None)) -> Flags:
         """Return which readings of the present channels are at the end of the range, and stand for values beyond."""
         return np.asarray(np.abs(readings) >= (self.limit * (1.0 - 1e-9) - 0.5 * self.resolution)[present])
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaln, gammaln, hyp2f1, log_ndtr, stdtr
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.record import CHANNELS
@@ -236,7 +236,7 @@ def _wandering_sizes(sheet: DataSheet) -> Floats:
     return bias if sheet.drift is None else np.hypot(bias, sheet.drift.sizes)
 
 
-def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: NDArray[np.intp], given: Given) -> Floats:
+def _wandering(sheet: DataSheet, residual: Floats, noise: Floats, present: Index, given: Given) -> Floats:
     """Log-density of each sample given others, for independent noise of the channels."""
     bias = np.array(sheet.bias_uncertainty)[present] ** 2
     if sheet.drift is None:
@@ -259,7 +259,7 @@ def _wandering_together(
     residual: Floats,
     deviation: Floats,
     steps: Floats,
-    present: NDArray[np.intp],
+    present: Index,
     correlation: Floats,
     given: Given,
 ) -> Floats:
@@ -394,7 +394,7 @@ def _checked(measured: ArrayLike, predicted: ArrayLike, noise_scale: ArrayLike) 
     return readings, loads, checked_noise_scale(noise_scale, loads.shape)
 
 
-def _present(sheet: DataSheet, readings: Floats) -> NDArray[np.intp]:
+def _present(sheet: DataSheet, readings: Floats) -> Index:
     """Indices of the channels that are not missing."""
     absent = np.isnan(readings)
     present = np.flatnonzero(~absent.all(axis=0))
@@ -420,7 +420,7 @@ def refuse_silent(sheet: DataSheet, index: int) -> None:
         )
 
 
-def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: NDArray[np.intp]) -> None:
+def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: Index) -> None:
     over = np.abs(readings) > limit * (1.0 + _AT_LIMIT) + 0.5 * step
     if np.any(over):
         sample, channel = np.argwhere(over)[0]
@@ -430,9 +430,7 @@ def _refuse_beyond(readings: Floats, step: Floats, limit: Floats, present: NDArr
         )
 
 
-def refuse_inexact(
-    sheet: DataSheet, readings: Floats, present: NDArray[np.intp], wanders: bool, correlated: bool
-) -> None:
+def refuse_inexact(sheet: DataSheet, readings: Floats, present: Index, wanders: bool, correlated: bool) -> None:
     """Refuse combinations whose likelihood has no exact or nearly exact form."""
     what = "drift or an unknown bias" if wanders else "correlated noise"
     if math.isfinite(sheet.degrees_of_freedom):

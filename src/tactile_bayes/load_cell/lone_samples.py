@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.load_cell.covariance import wandering_deviation
 from tactile_bayes.load_cell.data_sheet import DataSheet
 from tactile_bayes.load_cell.likelihood import (
@@ -49,7 +48,7 @@ class LoneSamples:
         if self._wanders:
             refuse_inexact(sheet, readings, np.arange(len(CHANNELS)), wanders=True, correlated=False)
 
-    def take(self, where: NDArray[np.intp]) -> LoneSamples:
+    def take(self, where: Index) -> LoneSamples:
         """Select samples."""
         some = object.__new__(LoneSamples)
         some._sheet, some._wanders = self._sheet, self._wanders

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_angles, corrupted_loads
 from tactile_bayes.load_cell.data_sheet import CERTAIN, DataSheet
@@ -84,7 +84,7 @@ def stated_entries(record: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _put(made: xr.Dataset, name: str, readings: NDArray[np.float64]) -> None:
+def _put(made: xr.Dataset, name: str, readings: Floats) -> None:
     """Replace a column by readings, and store it as the truth unless there is one."""
     ideal, truth = made[name], column_of(f"truth_{name}")
     if truth is not None and truth.name not in made:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
 
 __all__ = ["rough_noise"]
 
 
-def rough_noise(signal: NDArray[np.float64]) -> float:
+def rough_noise(signal: Floats) -> float:
     """Standard deviation of the white noise on a smooth signal, from its median second difference.
 
     Second differences remove linear trends, and the median removes jumps. For normal noise they have √6 times its

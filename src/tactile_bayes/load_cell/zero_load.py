@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell.contact_bounds import FEWEST, ContactBounds, contact_bounds
@@ -231,9 +230,9 @@ def _statistics(stretches: list[Floats], steps: Floats, floor: Floats, false_ala
 
 def _labelled(
     record: xr.Dataset,
-    sweeps: list[NDArray[np.intp]],
+    sweeps: list[Index],
     bounds: list[ContactBounds],
-    unloaded: NDArray[np.bool_],
+    unloaded: Flags,
     statistics: dict[str, Floats],
     channels: tuple[str, ...],
 ) -> xr.Dataset:

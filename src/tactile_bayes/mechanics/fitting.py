@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_workspace
 from tactile_bayes.mechanics.elastica import contact_from_wrench
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
@@ -53,7 +53,7 @@ class Reading(NamedTuple):
     covariance: Floats
     """Covariance of the other errors of the loads, shape (n, 3, 3)."""
 
-    def take(self, where: NDArray[np.intp] | slice) -> Reading:
+    def take(self, where: Index | slice) -> Reading:
         return Reading(*(column[where] for column in self))
 
 
@@ -75,7 +75,7 @@ class ContactFit(NamedTuple):
     covariance: Floats
     misfit: Floats
     phase: NDArray[np.int8]
-    at_edge: NDArray[np.bool_]
+    at_edge: Flags
     """True if the contact lies on the edge, since the best contacts of both phases lie beyond it."""
     clearance: Floats
     """Distance from the edge, in standard deviations of the coordinate that leads to it."""
@@ -220,7 +220,7 @@ class _Descent:
             self.go(np.arange(force.size), 0.0, 0)
         self._hardness[:] = 1e-3
 
-    def go(self, who: NDArray[np.intp], gain: float, most_steps: int) -> None:
+    def go(self, who: Index, gain: float, most_steps: int) -> None:
         """Descend with the samples `who` until the gain that the next step promises is small."""
         from tactile_bayes.mechanics.fits import Workspace, descents  # numba takes a second to load
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
@@ -58,7 +58,7 @@ class Paths:
     snap_off: NDArray[np.int8]
     change_parameter: Floats
     """Parameters at which phases begin, shape (n, phases); NaN beyond the last."""
-    change_to_tip: NDArray[np.bool_]
+    change_to_tip: Flags
     """True if a phase is tip contact, shape (n, phases)."""
     largest_curvature: Floats
     """Largest curvature of the rod up to snap-off [1/L], with a relative error of 1e-4."""
@@ -70,7 +70,7 @@ class Paths:
     sampled: Floats
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
 
-    def is_clear(self) -> NDArray[np.bool_]:
+    def is_clear(self) -> Flags:
         """Return whether the straight rod is clear of the object after snap-off, as far as known; shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)

@@ -6,9 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, MISS, REST, WAY, Course, Curves, angle_rate, lay_over_angle, left_of
 from tactile_bayes.mechanics.outline import Place, place
@@ -48,7 +47,7 @@ class Samples(NamedTuple):
 
     angles: Floats
     """Drive angles as read, in the sweep frame, increasing [rad]."""
-    rows: NDArray[np.intp]
+    rows: Index
     """Rows of their loads and states."""
     relative: bool
     """True if angles are shares of the drive angle from first contact to snap-off."""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.limits import clear_angle
@@ -63,7 +63,7 @@ class Sweeps(NamedTuple):
     base_y: Floats
     length: Floats
     standoff: Floats
-    backward: NDArray[np.bool_]
+    backward: Flags
     friction_angle: Floats
     compliance: Floats
     offset: Floats

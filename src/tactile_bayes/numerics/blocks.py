@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Index
 
 __all__ = ["blocks"]
 
@@ -11,7 +12,7 @@ _MOST = 2_000_000
 """Largest number of entries in one array of a block: 16 MB, of which a few exist at a time."""
 
 
-def blocks(points: int, numbers: int, largest: int | None = None) -> list[NDArray[np.intp]]:
+def blocks(points: int, numbers: int, largest: int | None = None) -> list[Index]:
     """Split the indices of points into blocks of about equal size.
 
     Parameters

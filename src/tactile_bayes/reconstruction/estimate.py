@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 
 __all__ = [
     "AT_EDGE",
@@ -68,7 +68,7 @@ class Estimate(NamedTuple):
     """Distance from the change between tip and tangential contact, in standard deviations, shape (n,)."""
 
 
-def unanswered(loaded: NDArray[np.bool_], cut_off: NDArray[np.bool_]) -> NDArray[np.int8]:
+def unanswered(loaded: Flags, cut_off: Flags) -> NDArray[np.int8]:
     """Status of samples before a contact is found."""
     return np.where(loaded, np.where(cut_off, CUT_OFF, NO_ZERO), NO_CONTACT).astype(np.int8)
 
@@ -83,7 +83,7 @@ def spread_across(covariance: Floats, slope_angle: Floats) -> tuple[Floats, Floa
     return along, normal
 
 
-def is_weak(loads: Floats, covariance: Floats) -> NDArray[np.bool_]:
+def is_weak(loads: Floats, covariance: Floats) -> Flags:
     """Return which forces, of loads (n, 3) with covariance (n, 3, 3), are below 10 standard deviations."""
     force = loads[:, 1:]
     with np.errstate(invalid="ignore", over="ignore"):
@@ -92,7 +92,7 @@ def is_weak(loads: Floats, covariance: Floats) -> NDArray[np.bool_]:
         return np.asarray(squared < _WEAK**2 * noise)
 
 
-def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> NDArray[np.bool_]:
+def bends_too_much(place: Floats, covariance: Floats, aside: list[tuple[Floats, Floats]]) -> Flags:
     """Return where contacts one standard deviation aside contradict a covariance of first order.
 
     Parameters

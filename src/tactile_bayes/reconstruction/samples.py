@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.fitting import Reading
@@ -41,7 +40,7 @@ class Samples(NamedTuple):
     has_noise: bool
     """True if any noise level is known."""
 
-    def take(self, where: NDArray[np.intp]) -> Samples:
+    def take(self, where: Index) -> Samples:
         """Select samples."""
         return self._replace(
             reading=self.reading.take(where),

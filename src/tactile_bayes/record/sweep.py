@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.record.schema import DIRECTIONS
 from tactile_bayes.record.table import Source
 
@@ -67,7 +68,7 @@ def refuse_impossible_sweeps(values: Mapping[str, NDArray[Any]], source: Source)
             )
 
 
-def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | NDArray[np.intp]]:
+def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | Index]:
     """Yield the rows of each sweep in the order of measurement, as slices if sweeps are contiguous."""
     steps = np.flatnonzero(sweep[1:] != sweep[:-1]) + 1
     numbers = sweep[np.concatenate(([0], steps))]
@@ -79,12 +80,12 @@ def _sweeps(sweep: NDArray[np.int64]) -> Iterator[slice | NDArray[np.intp]]:
         yield from np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
-def _ends(rows: slice | NDArray[np.intp]) -> tuple[int, int]:
+def _ends(rows: slice | Index) -> tuple[int, int]:
     """Return the first and the last row of a sweep."""
     return (rows.start, rows.stop - 1) if isinstance(rows, slice) else (int(rows[0]), int(rows[-1]))
 
 
-def _runs_backwards(angle: NDArray[np.float64], sense: int) -> bool:
+def _runs_backwards(angle: Floats, sense: int) -> bool:
     """Return whether a sequence runs against its sense by more than the noise of the encoder (see `validate`)."""
     if angle.size < 2:
         return False

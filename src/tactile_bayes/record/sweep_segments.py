@@ -6,8 +6,8 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.table import Source, Table
 
@@ -20,7 +20,7 @@ SHARE = 0.1
 """Least return of the drive angle after a turning point, as a share of its whole range."""
 
 
-def turning_points(angle: NDArray[np.float64], least: float) -> list[int]:
+def turning_points(angle: Floats, least: float) -> list[int]:
     """Find the extremes of an angle after which it returns by more than a threshold, minima and maxima alternating.
 
     Noise of an encoder below the threshold causes no turning point.
@@ -113,7 +113,7 @@ def split_at_turns(table: Table) -> Table:
     return Table({**table.columns, "sweep": (sweep, {}), "direction": (direction, {})}, table.attrs, source)
 
 
-def _refuse_wrapped(angle: NDArray[np.float64], moved: NDArray[np.bool_], source: Source) -> None:
+def _refuse_wrapped(angle: Floats, moved: Flags, source: Source) -> None:
     """Refuse an angle that jumps by about a turn between two samples.
 
     It is an angle modulo a turn, or a drive that was reset after a sweep of a whole turn, which begins a new sweep.
@@ -133,7 +133,7 @@ def _refuse_wrapped(angle: NDArray[np.float64], moved: NDArray[np.bool_], source
         )
 
 
-def _left_extreme(angle: NDArray[np.float64], begin: int, sense: int, least: float) -> tuple[int, int] | None:
+def _left_extreme(angle: Floats, begin: int, sense: int, least: float) -> tuple[int, int] | None:
     """First maximum (sense 1) or minimum (−1) after which the angle returns by a threshold, and the sample of that."""
     top, place = -np.inf, begin
     size = 256
@@ -151,6 +151,6 @@ def _left_extreme(angle: NDArray[np.float64], begin: int, sense: int, least: flo
     return None
 
 
-def _trend(angle: NDArray[np.float64]) -> float:
+def _trend(angle: Floats) -> float:
     """Slope of a straight line fitted to a sequence, times a positive factor."""
     return float(np.einsum("i,i->", np.arange(angle.size) - (angle.size - 1) / 2, angle - angle[0]))

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.inference.likelihood import RecordLikelihood
@@ -61,8 +61,8 @@ class Motion:
     """
 
     contour: Contour
-    samples: NDArray[np.intp]
-    sweep: NDArray[np.intp]
+    samples: Index
+    sweep: Index
     rod_x: Floats
     rod_y: Floats
     contact_x: Floats

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Floats
 
 __all__ = ["outermost"]
 
 
-def outermost(choices: Iterable[tuple[NDArray[np.float64], float, str, str]]) -> str:
+def outermost(choices: Iterable[tuple[Floats, float, str, str]]) -> str:
     """Return the extremes at which the best choice lies, as text; "" if it lies inside all ranges.
 
     Parameters

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from tactile_bayes import plotting
+from tactile_bayes.arrays import Floats
 from tactile_bayes.diagnostics.inspection import CellSource, known_cell
 from tactile_bayes.diagnostics.verdicts import doubtful_sides
 from tactile_bayes.inference.misfit import CHECK_RIG
@@ -165,7 +165,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
     return (*against, *sentences)
 
 
-def _map(measured: xr.Dataset, contacts: xr.Dataset, shown: NDArray[np.float64]) -> Axes:
+def _map(measured: xr.Dataset, contacts: xr.Dataset, shown: Floats) -> Axes:
     pivots = np.unique(np.stack([measured.base_x.values, measured.base_y.values], axis=1), axis=0)
     base = (float(pivots[0, 0]), float(pivots[0, 1])) if len(pivots) == 1 else None
     low, high = (float(end) for end in np.quantile(shown, [0.01, 0.99]))

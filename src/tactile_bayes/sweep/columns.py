@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.mechanics.phases import NONE
 from tactile_bayes.sweep.lab_frame import to_lab_frame
@@ -37,11 +37,11 @@ class ManyUnits(NamedTuple):
     moment_unit: Any
     force_unit: Any
 
-    def of(self, index: NDArray[np.intp]) -> ManyUnits:
+    def of(self, index: Index) -> ManyUnits:
         return ManyUnits(*(value[index] if isinstance(value, np.ndarray) else value for value in self))
 
 
-def sweep_samples(paths: Paths, units: ManyUnits, index: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
+def sweep_samples(paths: Paths, units: ManyUnits, index: Index) -> dict[str, NDArray[Any]]:
     """Loads and contacts at the drive angles with which paths were traced.
 
     Parameters

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record import CHANNELS, make_record
@@ -19,7 +19,7 @@ __all__ = ["record_template"]
 def record_template(
     bases: Sequence[tuple[float, float]],
     directions: Sequence[str],
-    drive_angles: NDArray[np.float64],
+    drive_angles: Floats,
     rod: Rod | None,
     load_cell: LoadCell,
 ) -> xr.Dataset:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.checks import check_probability
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.result import contact_draws
@@ -47,7 +47,7 @@ class ContactRegion:
         at = (np.stack([x.ravel(), y.ravel()], axis=-1) - self._centre) @ self._to_white.T
         return _kernel_sums(at, self._white, self._bandwidth).reshape(x.shape) / len(self._white)
 
-    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, x: ArrayLike, y: ArrayLike) -> Flags:
         """Return True for points in the region, False for others and for NaN; shape as of x and y, broadcast."""
         return np.asarray(self.density(x, y) >= self.level)
 

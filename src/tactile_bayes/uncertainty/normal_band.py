@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.numerics.roots import falling_root
@@ -142,7 +142,7 @@ def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats
     sin, cos = np.sin(slope_angle), np.cos(slope_angle)
     every = np.arange(x.size)
 
-    def short_of(i: NDArray[np.intp], parameter: Floats) -> tuple[Floats, Floats]:
+    def short_of(i: Index, parameter: Floats) -> tuple[Floats, Floats]:
         locus = many.take(i).locate(parameter)
         turn = locus.slope_angle - slope_angle[i]
         along = (locus.x - x[i]) * cos[i] + (locus.y - y[i]) * sin[i]

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.uncertainty.gap import gap
@@ -58,7 +58,7 @@ def gap_if_any(posterior: xr.DataTree, probability: float) -> xr.Dataset | None:
     return gap(posterior, probability) if both else None
 
 
-def reach(posterior: xr.DataTree) -> NDArray[np.float64]:
+def reach(posterior: xr.DataTree) -> Floats:
     """Return grid points of x over the touched stretch, on which a run computes its band; shape (201,).
 
     The stretch reaches from the 5 % quantile to the 95 % quantile of the events' x. Draws without an event do not

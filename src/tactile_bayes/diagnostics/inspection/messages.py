@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_bayes.arrays import Flags
 from tactile_bayes.diagnostics.inspection.corrections import OTHER_ANGLE
 from tactile_bayes.diagnostics.inspection.fit import Fit
 from tactile_bayes.diagnostics.units_and_signs import CHECK_UNITS
@@ -320,16 +320,16 @@ def _unit(record: xr.Dataset, name: str) -> str:
     return str(record[name].attrs.get("units", "1"))
 
 
-def _count(flags: NDArray[np.bool_], noun: str) -> str:
+def _count(flags: Flags, noun: str) -> str:
     count = int(np.sum(flags))
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def _are(flags: NDArray[np.bool_]) -> str:
+def _are(flags: Flags) -> str:
     return "is" if np.sum(flags) == 1 else "are"
 
 
-def _listed(flags: NDArray[np.bool_]) -> str:
+def _listed(flags: Flags) -> str:
     """Return text like "samples 3, 5 to 9 and 12", neighbours joined."""
     where = np.flatnonzero(flags)
     runs = np.split(where, np.flatnonzero(np.diff(where) != 1) + 1)

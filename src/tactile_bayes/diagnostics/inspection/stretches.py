@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.arrays import Flags, Floats, Index
 
 __all__ = ["Autocorrelation", "autocorrelation", "centred", "rows_of_sweeps", "unloaded_stretches"]
 
@@ -30,7 +30,7 @@ def rows_of_sweeps(sweep: NDArray[np.integer]) -> list[Index]:
     return np.split(order, np.flatnonzero(np.diff(sweep[order])) + 1)
 
 
-def unloaded_stretches(sweeps: list[Index], unloaded: NDArray[np.bool_]) -> list[Index]:
+def unloaded_stretches(sweeps: list[Index], unloaded: Flags) -> list[Index]:
     """Return the rows of every stretch of consecutive unloaded samples; `unloaded` has shape (samples,)."""
     stretches = []
     for rows in sweeps:

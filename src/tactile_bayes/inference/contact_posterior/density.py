@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
@@ -86,7 +86,7 @@ class ContactDensity:
         """True if the drive angle is uncertain."""
         return bool(np.any(self.samples.reading.angle_deviation))
 
-    def take(self, where: NDArray[np.intp]) -> ContactDensity:
+    def take(self, where: Index) -> ContactDensity:
         """Return the density of some of the samples."""
         some, readings, base = self.samples.take(where), self._readings.take(where), self.base[where]
         return ContactDensity(some, readings, base, turning=self._turning, delta=self.delta, prior=self._prior)

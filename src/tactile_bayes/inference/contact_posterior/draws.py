@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.importance import ContactWeights, weigh_contacts
@@ -42,7 +42,7 @@ class ContactDraws(NamedTuple):
     """Way, force and, if it is uncertain, drive angle, shape (chains, draws, n, 2 or 3)."""
     engine: NDArray[np.int8]
     """`IMPORTANCE` or `EMCEE`, shape (n,), like all further entries."""
-    converged: NDArray[np.bool_]
+    converged: Flags
     tangential: Floats
     """Probability of tangential contact."""
     log_evidence: Floats

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 from arviz_stats.base.array import array_stats
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.contact_posterior.density import ContactDensity
 from tactile_bayes.inference.contact_posterior.proposal import ContactProposal
 from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1
@@ -53,7 +52,7 @@ class ContactWeights(NamedTuple):
     """Logarithm of the sample's density under the prior, shape (n,)."""
 
     @property
-    def certified(self) -> NDArray[np.bool_]:
+    def certified(self) -> Flags:
         """True for samples whose weights represent the posterior, shape (n,)."""
         return np.asarray((self.pareto_k <= LARGEST_K) & (self.effective_draws >= LEAST_DRAWS))
 

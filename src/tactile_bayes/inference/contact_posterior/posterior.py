@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_choice, check_function, check_number, check_optional, check_whole_number, refused
 from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.contact_posterior.density import ContactDensity, ContactPrior
@@ -195,9 +194,7 @@ def _refuse_options(draws: int, method: str, settings: SamplerSettings | None) -
     check_choice("method", method, ("auto", "importance", "emcee"))
 
 
-def _density(
-    measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactPrior
-) -> tuple[ContactDensity, NDArray[np.intp]]:
+def _density(measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactPrior) -> tuple[ContactDensity, Index]:
     """Return the density of the loaded samples, and their numbers."""
     samples = samples_of(measured, cell)
     if cell.degrees_of_freedom <= 2.0:  # proposals take a covariance
@@ -214,9 +211,7 @@ def _density(
     return ContactDensity(samples, readings, base, turning=turning, delta=delta, prior=prior).take(loaded), loaded
 
 
-def _groups(
-    measured: xr.Dataset, density: ContactDensity, loaded: NDArray[np.intp], points: Floats
-) -> dict[str, xr.Dataset]:
+def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, points: Floats) -> dict[str, xr.Dataset]:
     size = measured.sizes["sample"]
     coordinates, _ = density.unfold(points)
     places = density.places(coordinates)
@@ -247,7 +242,7 @@ def _groups(
     }
 
 
-def _stats(size: int, loaded: NDArray[np.intp], found: ContactDraws) -> xr.Dataset:
+def _stats(size: int, loaded: Index, found: ContactDraws) -> xr.Dataset:
     def everywhere(values: Floats) -> Floats:
         spread = np.full(size, np.nan)
         spread[loaded] = values

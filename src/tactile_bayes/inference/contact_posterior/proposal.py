@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 
 __all__ = ["ContactProposal", "Proposed"]
 
@@ -79,7 +78,7 @@ class ContactProposal:
             points[..., 2] = middle + width * root[..., 2, 2] * rng.standard_normal((count, size))
         return Proposed(points, self._log_density(points, phase, who))
 
-    def _log_density(self, points: Floats, phase: NDArray[np.intp], who: NDArray[np.intp]) -> Floats:
+    def _log_density(self, points: Floats, phase: Index, who: Index) -> Floats:
         mean, root = self._mean[phase, who], self._root[phase, who]
         k = points.shape[-1]
         along = (points[..., 0] - mean[..., 0]) / root[..., 0, 0]

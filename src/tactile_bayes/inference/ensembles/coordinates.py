@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.ensembles.moves import standard_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture
 from tactile_bayes.inference.ensembles.target import LogProbability
@@ -63,7 +62,7 @@ class Logarithms(Plain):
     If a record determines a ratio of powers of two sizes, but hardly the sizes, their logarithms lie along a line.
     """
 
-    def __init__(self, positive: NDArray[np.bool_], proposal: Mixture | None = None) -> None:
+    def __init__(self, positive: Flags, proposal: Mixture | None = None) -> None:
         """Take logarithms where `positive` is True; `proposal`, in the coordinates, approximates the target."""
         self.positive = positive
         self.proposal = proposal

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.inference.ensembles.modes import Mode
 
 __all__ = ["Draws"]
@@ -59,7 +58,7 @@ class Draws:
         if "interrupted" in self.message:
             raise KeyboardInterrupt(f"interrupted while sampling {what}: there is no result")
 
-    def evenly(self, most: int) -> NDArray[np.intp]:
+    def evenly(self, most: int) -> Index:
         """Return the indices of at most so many draws of each chain, evenly spread."""
         count = self.samples.shape[1]
         return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
 
@@ -23,13 +22,13 @@ class _Part(NamedTuple):
 
     first: int
     """Number of the first step, counted from 1."""
-    numbers: NDArray[np.intp]
+    numbers: Index
     """Numbers of the steps whose samples are kept."""
     samples: Floats
     """Samples of the steps kept, shape (chain, step, walker, parameter)."""
     values: Floats
     """Their log-probability, shape (chain, step, walker)."""
-    moved: NDArray[np.bool_]
+    moved: Flags
     """True if a walker moved in a step, for all steps, shape (chain, step, walker)."""
 
     def since(self, steps: int, every: int) -> _Part:
@@ -96,7 +95,7 @@ class KeptSteps:
         return whole.samples, whole.values
 
     @property
-    def moved(self) -> NDArray[np.bool_]:
+    def moved(self) -> Flags:
         """True if a walker moved in a step of the second half except its first, kept or not; (chain, step, walker)."""
         return self._parts[0].moved[:, 1:]
 

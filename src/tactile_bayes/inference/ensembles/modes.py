@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from arviz_stats.base.array import array_stats
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 
 __all__ = ["Mode", "modes_message", "modes_of"]
 
@@ -96,7 +95,7 @@ def _at_rest(samples: Floats) -> bool:
     return True
 
 
-def _connected(near: NDArray[np.bool_]) -> list[tuple[int, ...]]:
+def _connected(near: Flags) -> list[tuple[int, ...]]:
     """Return the groups of ensembles that are near one another, directly or through others."""
     reached = near.copy()
     for k in range(len(near)):

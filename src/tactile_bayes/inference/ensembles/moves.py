@@ -7,9 +7,8 @@ from typing import Any
 
 import emcee
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 
 __all__ = ["Abreast", "FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
@@ -42,7 +41,7 @@ class Abreast(emcee.moves.Move):
         self._shares = [each / each.sum() for each in shares]
         self.randoms = randoms
 
-    def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, NDArray[np.bool_]]:
+    def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, Flags]:
         """Return the state after a step of every ensemble, and True for walkers that moved."""
         count, size = len(self.randoms), state.coords.shape[1]
         points, values = state.coords.reshape(count, -1, size), state.log_prob.reshape(count, -1)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp, ndtr
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
 from tactile_bayes.inference.ensembles.target import LogProbability
 
@@ -65,7 +65,7 @@ class Ends:
     low: Floats
     high: Floats
 
-    def hold(self, points: Floats) -> NDArray[np.bool_]:
+    def hold(self, points: Floats) -> Flags:
         """Return True for points, shape (n, parameters), within the bounds."""
         return np.asarray(((points > self.low) & (points < self.high)).all(axis=1))
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_triangular
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
@@ -85,7 +84,7 @@ class Observer:
         self._end, self._within = between.mean(axis=1), 0.5 * np.diff(between, axis=1)[:, 0]
         self._width = self._within / np.sqrt(3.0)
 
-    def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    def __call__(self, contours: Contour, values: dict[str, Floats]) -> tuple[Floats, Flags, Floats]:
         """Return residuals of readings, over `noise`; True for samples loaded as measured; and residuals of snap-offs.
 
         Residuals are expected less measured values, those of snap-offs in standard deviations. Shapes are
@@ -193,7 +192,7 @@ def _huber(residual: Floats) -> Floats:
 
 def _linearised(
     observer: Observer, family: ShapeFreeFamily, prior: LinearPrior, scales: Floats, linear: Floats
-) -> tuple[Floats, Floats, NDArray[np.intp], Floats]:
+) -> tuple[Floats, Floats, Index, Floats]:
     """Return the linearised observations: as few combinations of readings and snap-offs as carry all information.
 
     These are their slopes over radii at the nodes and the other parameters, (observations, k); their values at zero
