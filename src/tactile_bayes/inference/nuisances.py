@@ -258,7 +258,8 @@ def _unidentifiable(measured: xr.Dataset) -> dict[str, str]:
     if len(np.unique(measured.direction.values)) == 1:
         only = str(measured.direction.values[0])
         reasons["backlash"] = (
-            f"every sweep is {only}, and in one direction it cannot be told from drive_angle_offset; infer that"
+            f"every sweep is {only}, and in one direction it cannot be distinguished from drive_angle_offset; "
+            "infer that"
         )
     return reasons
 

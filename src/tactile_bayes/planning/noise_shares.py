@@ -26,7 +26,7 @@ _ERRORS = ("along", "across")
 
 
 def noise_shares(
-    plan: Plan, *, seed: int, samples: int = 1024, places: int = _STATES, methods: tuple[Method, ...] = METHODS
+    plan: Plan, *, seed: int, samples: int = 1024, states: int = _STATES, methods: tuple[Method, ...] = METHODS
 ) -> xr.Dataset:
     """Return the shares of each reading's noise in the variance of a contact's error (Sobol' 2001).
 
@@ -44,7 +44,7 @@ def noise_shares(
     samples : int
         Number of samples for each index, a power of two; `samples · (noises + 2)` contacts are reconstructed at each
         state.
-    places : int
+    states : int
         Number of states in each sweep, evenly in drive angle, at least 2.
     methods : tuple of str
         Methods of reconstruction, "raw" and "constrained".
@@ -68,7 +68,7 @@ def noise_shares(
     Raises
     ------
     ParameterError
-        If `samples` is no power of two, or `places` is less than 2.
+        If `samples` is no power of two, or `states` is less than 2.
 
     Notes
     -----
@@ -77,8 +77,8 @@ def noise_shares(
     """
     if check_whole_number("samples", samples, 2, "give a power of two, like 1024") & (samples - 1):
         raise ParameterError(f"samples is {samples!r}: give a power of two, like 1024")
-    check_whole_number("places", places, 2)
-    chosen = _states(plan, int(places))
+    check_whole_number("states", states, 2)
+    chosen = _states(plan, int(states))
     quiet = plan.certain(chosen)
     noises = {**plan.cell.standard_deviations, "drive_angle": plan.cell.drive_angle_deviation}
     sources = [name for name in SOURCES if noises[name] > 0.0]
