@@ -30,7 +30,8 @@ def events_of(
     Returns
     -------
     dict of str to ndarray, shape (n, segments)
-        first_drive_angle [rad], first_contact_x, first_contact_y [length], and likewise snap_off_.
+        first_drive_angle and snap_off_drive_angle [rad]; first_contact_x, first_contact_y, snap_off_contact_x and
+        snap_off_contact_y [length].
     """
     count = contours.shape[0]
     paths = likelihood.paths(contours, rig, exact=exact)
