@@ -18,11 +18,11 @@ BOTH = ["forward", "backward"]
 A, Q, X_C = 0.5, 0.3, 0.05
 
 
-def tree(last, strokes=BOTH, *, first=None, a=A, q=Q, x_c=X_C, units="SI"):
+def tree(last, segments=BOTH, *, first=None, a=A, q=Q, x_c=X_C, units="SI"):
     """Parabolas whose sweeps end at `last`, of shape (chain, draw, stroke)."""
     last = np.asarray(last, dtype=float)
-    first = np.where(np.array(strokes) == "forward", 1.0, -1.0) if first is None else first
-    angles = np.where(np.array(strokes) == "forward", 3.2, -0.1)
+    first = np.where(np.array(segments) == "forward", 1.0, -1.0) if first is None else first
+    angles = np.where(np.array(segments) == "forward", 3.2, -0.1)
     events = {"snap_off_contact_x": last, "first_contact_x": first, "snap_off_drive_angle": angles}
     dims = ("chain", "draw", "stroke")
     shape = last.shape[:2]
@@ -32,7 +32,7 @@ def tree(last, strokes=BOTH, *, first=None, a=A, q=Q, x_c=X_C, units="SI"):
                 {k: (dims[:2], np.broadcast_to(v, shape)) for k, v in {"a": a, "q": q, "x_c": x_c}.items()}
             ),
             "events": xr.Dataset(
-                {k: (dims, np.broadcast_to(v, last.shape)) for k, v in events.items()}, coords={"stroke": strokes}
+                {k: (dims, np.broadcast_to(v, last.shape)) for k, v in events.items()}, coords={"stroke": segments}
             ),
         }
     )
@@ -115,8 +115,8 @@ def test_events_belong_to_the_draws_of_their_labels():
 
 
 def test_several_pivots_leave_open_what_none_has_reached():
-    strokes = ["forward", "backward", "forward", "backward"]
-    found = gap(tree([[[0.3, -0.2, 0.1, -0.4]]], strokes)).sel(bound="median")
+    segments = ["forward", "backward", "forward", "backward"]
+    found = gap(tree([[[0.3, -0.2, 0.1, -0.4]]], segments)).sel(bound="median")
     assert (float(found.left), float(found.right)) == (-0.2, 0.1)
     assert float(found.width) == pytest.approx(0.3)
     assert found.snap_off_drive_angle.sizes == {"stroke": 4}
@@ -124,15 +124,15 @@ def test_several_pivots_leave_open_what_none_has_reached():
 
 def test_arcs_of_several_pivots_are_merged():
     """The second pivot's backward arc fills the middle of the first one's gap: the wider rest is described."""
-    strokes = ["forward", "backward", "forward", "backward"]
-    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], strokes, first=[1.0, -1.0, 1.0, -0.2]))
+    segments = ["forward", "backward", "forward", "backward"]
+    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], segments, first=[1.0, -1.0, 1.0, -0.2]))
     middle = found.sel(bound="median")
     assert found.attrs["gaps"] == 2
     assert (float(middle.left), float(middle.right)) == (0.1, 0.3)
-    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], strokes, first=[1.0, -1.0, 1.0, -0.05]))
+    found = gap(tree([[[0.3, -0.3, 0.6, 0.1]]], segments, first=[1.0, -1.0, 1.0, -0.05]))
     middle = found.sel(bound="median")
     assert (float(middle.left), float(middle.right)) == (-0.3, -0.05)
-    found = gap(tree([[[0.3, -0.3, 0.6, 0.35]]], strokes, first=[1.0, -1.0, 1.0, -0.4]))
+    found = gap(tree([[[0.3, -0.3, 0.6, 0.35]]], segments, first=[1.0, -1.0, 1.0, -0.4]))
     assert found.attrs["gaps"] == 0
     assert float(found.width.sel(bound="median")) == pytest.approx(-0.05)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tactile_bayes.arrays import Index
 
 __all__ = ["evenly_spread"]
 
 
-def evenly_spread(points: int, most: int) -> NDArray[np.intp]:
+def evenly_spread(points: int, most: int) -> Index:
     """Return the indices of at most so many of the points, evenly spread from the first to the last.
 
     Examples
