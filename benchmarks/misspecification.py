@@ -108,7 +108,7 @@ def calibrated(name: str, run: Run, replicates: int) -> xr.Dataset:
     folder = OUT / "".join(c if c.isalnum() or c in ".-" else "-" for c in name.strip())
     options = {"load_cell": CELL, **run.asked}
     as_stated = {"noise_scale": stats.lognorm(s=1e-9)}
-    world = tb.World(**{**run.world, "priors": as_stated | run.world.get("priors", {})})
+    world = tb.Misspecification(**{**run.world, "priors": as_stated | run.world.get("priors", {})})
     if options.get("family") == "shape-free":  # which takes parabolas for any smooth contour
         world = replace(world, family="parabola")
     else:

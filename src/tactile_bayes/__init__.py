@@ -21,12 +21,12 @@ _MODULES = ("contours", "datasets", "errors", "paper_figures", "plotting")
 
 _HOMES = {
     "LoadCell": "load_cell",
+    "Misspecification": "calibration.misspecification",
     "OrnsteinUhlenbeck": "load_cell",
     "Plan": "planning.plan",
     "RandomWalk": "load_cell",
     "Rod": "mechanics.rod",
     "SamplerSettings": "inference.ensembles",
-    "World": "calibration.misspecification",
     "calibrate": "calibration.calibrate",
     "calibration_replicate": "calibration.calibrate",
     "check_record": "diagnostics.record_check",
@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from tactile_bayes import plotting as plotting
     from tactile_bayes.calibration.calibrate import calibrate as calibrate
     from tactile_bayes.calibration.calibrate import calibration_replicate as calibration_replicate
-    from tactile_bayes.calibration.misspecification import World as World
+    from tactile_bayes.calibration.misspecification import Misspecification as Misspecification
     from tactile_bayes.comparison.families import compare_families as compare_families
     from tactile_bayes.diagnostics.inspection import inspect_record as inspect_record
     from tactile_bayes.diagnostics.record_check import check_record as check_record
@@ -121,6 +121,8 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return importlib.import_module(f"tactile_bayes.{name}")
+    if name == "World":  # its name in unreleased versions, for one release
+        return importlib.import_module("tactile_bayes.calibration.misspecification").Misspecification
     if name in _HOMES:
         value = getattr(importlib.import_module(f"tactile_bayes.{_HOMES[name]}"), name)
         globals()[name] = value

@@ -19,7 +19,7 @@ from helpers.refusals import refused
 from helpers.replicates import STAGES, failing
 from helpers.tasks import wait_until
 from tactile_bayes.calibration.calibrate import calibrate, calibration_replicate, experiment_of
-from tactile_bayes.calibration.misspecification import World
+from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.replicate import Outcome
 from tactile_bayes.calibration.store import REPLICATES
 from tactile_bayes.errors import CalibrationError, ParameterError
@@ -367,8 +367,8 @@ def test_a_killed_run_goes_on(tmp_path, wait):
     [
         ({"seed": 2}, ("seed", 1, 2)),
         ({"friction": 0.1}, ("friction", None, 0.1)),
-        ({"world": World(friction=0.1)}, ("world_friction", 0.0, 0.1)),
-        ({"world": World(priors={"a": stats.norm(1.0)})}, ("world_priors", "{}", "norm")),
+        ({"world": Misspecification(friction=0.1)}, ("world_friction", 0.0, 0.1)),
+        ({"world": Misspecification(priors={"a": stats.norm(1.0)})}, ("world_priors", "{}", "norm")),
         ({"load_cell": LoadCell(force_noise=0.1, moment_noise=0.02)}, ("load_cell", 0.05, 0.1)),
         ({"settings": FEW_STEPS}, ["settings"]),
         ({"drive_angles": ANGLES[:-1]}, ["drive_angles"]),
@@ -394,7 +394,7 @@ def test_another_calibration_is_left_alone(noted, tmp_path, other, differs):
     [
         {"seed": np.int64(1)},
         {"probability": np.float64(0.9)},
-        {"world": World(base_shift=[0.0, 0.0])},
+        {"world": Misspecification(base_shift=[0.0, 0.0])},
         {"settings": replace(BY_DEFAULT, ensembles=np.int64(2))},
     ],
     ids=lambda same: next(iter(same)),
@@ -416,7 +416,7 @@ def test_what_an_experiment_is_follows_from_its_words():
         "settings": SamplerSettings(
             ensembles=2, walkers=20, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500
         ),
-        "world": World(),
+        "world": Misspecification(),
     }
     assert experiment_of(seed=1, **written_out).identity == words
     assert all(isinstance(said, str) for said in words.values())
@@ -467,7 +467,7 @@ def test_bad_arguments_are_told(noted, tmp_path, wrong):
         ({"family": "cube", "priors": {}}, ["'cube'", "parabola"]),
         ({"load_cell": LoadCell()}, ["load cell", "noise"]),
         ({"priors": {"b": stats.norm()}}, ["b", "a, q, x_c, noise_scale"]),
-        ({"world": World(priors={"friction": stats.norm()})}, ["world", "friction"]),
+        ({"world": Misspecification(priors={"friction": stats.norm()})}, ["world", "friction"]),
     ],
 )
 def test_what_does_not_go_together_is_told(noted, wrong, named):
@@ -492,7 +492,7 @@ def test_noise_larger_than_told_is_found():
 
     The 366 readings of a record tell the scale of noise to 1/√732 = 3.7 %, and posteriors lie 2.6 times that too high.
     """
-    world = World(load_cell=LoadCell(force_noise=0.055, moment_noise=0.022))
+    world = Misspecification(load_cell=LoadCell(force_noise=0.055, moment_noise=0.022))
     found = quickly(replicates=25, world=world, workers=None)
     assert found.attrs["calibrated"] == 0
     assert "noise_scale: posteriors" in found.attrs["verdict"]
@@ -510,7 +510,7 @@ def test_a_shifted_prior_is_found():
         replicates=40,
         load_cell=LoadCell(force_noise=0.5, moment_noise=0.2),
         priors=PRIORS | prior,
-        world=World(priors={"rigidity_scale": stats.lognorm(s=0.01, scale=1.02)}),
+        world=Misspecification(priors={"rigidity_scale": stats.lognorm(s=0.01, scale=1.02)}),
         workers=None,
     )
     assert found.attrs["calibrated"] == 0

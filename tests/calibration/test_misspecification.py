@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import tactile_bayes as tb
 from helpers.refusals import refused
-from tactile_bayes.calibration.misspecification import World
+from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.likelihood import Rig
@@ -47,33 +48,42 @@ def radius(slope_angle):
 )
 def test_what_is_no_number_is_refused(name, value):
     with refused(ParameterError, **{name: value}):
-        World(**{name: value})
+        Misspecification(**{name: value})
 
 
 @pytest.mark.parametrize("entries", [{"rigidity_scale": 0.0}, {"rigidity_scale": -1.0}, {"flat_spot": (0.1, 0.0)}])
 def test_factors_are_positive(entries):
     with refused(ParameterError, "rigidity_scale", "flat spot", "positive"):
-        World(**entries)
+        Misspecification(**entries)
 
 
 def test_it_says_in_what_it_differs():
-    assert repr(World()) == "World()"
-    assert repr(World(friction=0, bias=(0.0, 0.0, 0.0))) == "World()"
-    assert repr(World(bias=(0.1, 0.0, 0.0), friction=0.2)) == "World(friction=0.2, bias=(0.1, 0.0, 0.0))"
-    assert repr(World(load_cell=LoadCell(force_noise=0.1))).startswith("World(load_cell=LoadCell(force_noise=0.1")
-    assert "priors={'a':" in repr(World(priors={"a": stats.norm()}))
+    assert repr(Misspecification()) == "Misspecification()"
+    assert repr(Misspecification(friction=0, bias=(0.0, 0.0, 0.0))) == "Misspecification()"
+    assert (
+        repr(Misspecification(bias=(0.1, 0.0, 0.0), friction=0.2))
+        == "Misspecification(friction=0.2, bias=(0.1, 0.0, 0.0))"
+    )
+    assert repr(Misspecification(load_cell=LoadCell(force_noise=0.1))).startswith(
+        "Misspecification(load_cell=LoadCell(force_noise=0.1"
+    )
+    assert "priors={'a':" in repr(Misspecification(priors={"a": stats.norm()}))
 
 
-def test_worlds_can_be_compared():
-    assert World() == World()
-    assert World(drift=(0.0, 0.1, 0.0)) == World(drift=(0.0, 0.1, 0.0)) != World()
+def test_its_earlier_name_stands_for_it():
+    assert tb.World is tb.Misspecification is Misspecification
+
+
+def test_misspecifications_can_be_compared():
+    assert Misspecification() == Misspecification()
+    assert Misspecification(drift=(0.0, 0.1, 0.0)) == Misspecification(drift=(0.0, 0.1, 0.0)) != Misspecification()
 
 
 # ---- the object
 
 
 def test_without_a_flat_spot_the_object_is_what_was_drawn():
-    assert World(friction=0.3).contour(DRAWN) is DRAWN
+    assert Misspecification(friction=0.3).contour(DRAWN) is DRAWN
 
 
 @pytest.mark.parametrize("at", [0.3, -0.8, 0.0])
@@ -85,7 +95,7 @@ def test_flat_spot_is_where_it_should_be_and_nowhere_else(at, factor):
     cubic interpolation is at most 5/384 of h⁴ times the fourth derivative, 3, and so 1.6e-4 of log 2. That of the
     parabola's own is 1e-6 where it is not steep.
     """
-    object_ = World(flat_spot=(at, factor)).contour(DRAWN)
+    object_ = Misspecification(flat_spot=(at, factor)).contour(DRAWN)
 
     def ratio(slope_angles):
         there = np.ravel(object_.radius_of_curvature(np.asarray(slope_angles)))
@@ -99,7 +109,7 @@ def test_flat_spot_is_where_it_should_be_and_nowhere_else(at, factor):
 
 
 def test_flat_spot_leaves_the_lowest_point_where_it_was():
-    object_ = World(flat_spot=(0.7, 2.0)).contour(DRAWN)
+    object_ = Misspecification(flat_spot=(0.7, 2.0)).contour(DRAWN)
     assert object_.shape == (1,)
     np.testing.assert_allclose(np.ravel(object_.point(0.0)), [0.1, 0.4], atol=1e-12)
     x, y = object_.point(np.array([-0.5, 1.1]))
@@ -114,13 +124,13 @@ def test_flat_spot_leaves_the_lowest_point_where_it_was():
 
 def test_by_default_the_rig_is_what_was_drawn():
     drawn = Rig(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), np.full((1, 2, 2), 0.03))
-    rig = World().rig(drawn, 2)
+    rig = Misspecification().rig(drawn, 2)
     for mine, theirs in zip(rig, drawn, strict=True):
         np.testing.assert_array_equal(mine, theirs)
 
 
 def test_what_differs_comes_on_top_of_what_was_drawn():
-    world = World(
+    world = Misspecification(
         friction=0.1,
         base_shift=(0.01, -0.02),
         further_base_shift=(0.1, 0.2),

@@ -12,7 +12,7 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.calibration import simulation
 from tactile_bayes.calibration.calibrate import experiment_of
-from tactile_bayes.calibration.misspecification import World
+from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Parabola
 from tactile_bayes.errors import ReachError
@@ -125,14 +125,14 @@ def test_a_lever_and_a_backlash_of_the_cell_that_measures(told):
     true, known = (
         replace(QUIET, lever=(0.03 * share, -0.02 * share), drive_angle_backlash=0.02 * share) for share in (1.0, told)
     )
-    made = simulated(load_cell=known, world=World(load_cell=true))
+    made = simulated(load_cell=known, world=Misspecification(load_cell=true))
     way = np.where(made.measured.direction == "forward", 0.5, -0.5)
     np.testing.assert_allclose(made.measured.drive_angle - 0.02 * told * way, np.r_[ANGLES, ANGLES[::-1]], atol=1e-12)
     np.testing.assert_allclose(loads_of(made.measured), read_with(made, (0.03, -0.02), 0.02 * (1.0 - told)), atol=1e-7)
 
 
 def test_the_world_has_the_same_on_top():
-    world = World(
+    world = Misspecification(
         rigidity_scale=1.1,
         drive_angle_offset=0.05,
         bias=(0.1, 0.2, 0.3),
@@ -155,7 +155,7 @@ def test_the_world_has_the_same_on_top():
     ],
 )
 def test_friction(told, further):
-    made = simulated(friction=told, world=World(friction=further))
+    made = simulated(friction=told, world=Misspecification(friction=further))
     agree(made, scanned(made, friction=0.3))
 
 
@@ -163,7 +163,7 @@ def test_pivots_are_shifted():
     """All by the same, and those after the first besides."""
     stated = [(0.0, 0.0), (0.2, 0.0), (-0.2, 0.05)]
     shift, further = np.array([0.03, -0.02]), np.array([0.01, 0.02])
-    made = simulated(base=stated, world=World(base_shift=tuple(shift), further_base_shift=tuple(further)))
+    made = simulated(base=stated, world=Misspecification(base_shift=tuple(shift), further_base_shift=tuple(further)))
     moved = np.array(stated) + shift + further * np.array([[0.0], [1.0], [1.0]])
     scan = scanned(made, base=[tuple(pivot) for pivot in moved])
     assert made.measured.sizes["sample"] == scan.record.sizes["sample"]
@@ -180,7 +180,7 @@ def test_of_an_si_rod():
         load_cell=cell,
         priors=priors,
         nuisances=("rigidity_scale", "bias"),
-        world=World(bias=biases, base_shift=(0.003, 0.0)),
+        world=Misspecification(bias=biases, base_shift=(0.003, 0.0)),
     )
     drawn = [made.truth[f"{name}_bias"] for name in ("moment", "force_x", "force_y")]
     contour = Parabola(a=made.truth["a"], q=made.truth["q"], x_c=made.truth["x_c"] - 0.003)
@@ -200,7 +200,7 @@ def test_forces_in_the_frame_of_a_cell_that_turns():
 
 def test_a_flat_spot_is_felt():
     """The object is what the simulation says it is."""
-    made = simulated(world=World(flat_spot=(0.3, 2.0)))
+    made = simulated(world=Misspecification(flat_spot=(0.3, 2.0)))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
     np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
     assert np.max(np.abs(loads_of(made.measured) - loads_of(scanned(made).record))) > 1e-3
@@ -208,7 +208,7 @@ def test_a_flat_spot_is_felt():
 
 def test_contours_of_another_family():
     """With priors of its own; what is inferred is of the family that it is taken for."""
-    asked = experiment(priors={}, world=World(family="circle"))
+    asked = experiment(priors={}, world=Misspecification(family="circle"))
     made = simulate(asked, np.random.default_rng(2))
     scan = tb.scan(made.contour.take(np.array(0)), drive_angles=ANGLES)
     np.testing.assert_allclose(loads_of(made.measured), loads_of(scan.record), atol=1e-8)
@@ -223,7 +223,7 @@ def test_contours_of_another_family():
 
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_events_are_those_of_a_scan(friction):
-    made = simulated(world=World(friction=friction))
+    made = simulated(world=Misspecification(friction=friction))
     scan = scanned(made, friction=friction)
     for segment, direction in enumerate(("forward", "backward")):
         sweep = scan.events[direction]
@@ -247,16 +247,16 @@ def test_noise_is_what_the_load_cell_that_measures_makes():
     """Of the same random numbers twice the noise is twice the noise; the scale that is inferred is on top of both."""
     told = noise_of(simulated(load_cell=NOISY))
     other = LoadCell(force_noise=0.1, moment_noise=0.04)
-    made = simulated(load_cell=NOISY, world=World(load_cell=other))
+    made = simulated(load_cell=NOISY, world=Misspecification(load_cell=other))
     np.testing.assert_allclose(noise_of(made), 2.0 * told, atol=1e-8)
-    fixed = simulated(load_cell=NOISY, world=World(priors={"noise_scale": stats.lognorm(s=1e-9, scale=3.0)}))
+    fixed = simulated(load_cell=NOISY, world=Misspecification(priors={"noise_scale": stats.lognorm(s=1e-9, scale=3.0)}))
     deviations = noise_of(fixed) / (3.0 * np.array([0.02, 0.05, 0.05]))
     assert abs(np.mean(deviations**2) - 1.0) < 5.0 * np.sqrt(2.0 / deviations.size)  # false alarm 1e-6
 
 
 def test_bias_and_gain_of_the_cell_that_measures():
     gain = ((1.1, 0.0, 0.0), (0.0, 1.0, 0.02), (0.0, 0.0, 0.9))
-    made = simulated(world=World(load_cell=replace(QUIET, bias=(0.1, 0.0, -0.2), gain=gain)))
+    made = simulated(world=Misspecification(load_cell=replace(QUIET, bias=(0.1, 0.0, -0.2), gain=gain)))
     expected = loads_of(scanned(made).record) @ np.array(gain).T + [0.1, 0.0, -0.2]
     np.testing.assert_allclose(loads_of(made.measured), expected, atol=1e-8)
 
@@ -279,8 +279,8 @@ def test_the_encoder_of_a_cell_that_is_told():
 def test_the_encoder_of_a_cell_that_measures(told):
     """An offset of 0.05 rad where `told` is known is one of the world's besides."""
     cell = replace(QUIET, drive_angle_offset=told)
-    one = simulated(load_cell=cell, world=World(load_cell=replace(cell, drive_angle_offset=0.05)))
-    other = simulated(load_cell=cell, world=World(drive_angle_offset=0.05 - told))
+    one = simulated(load_cell=cell, world=Misspecification(load_cell=replace(cell, drive_angle_offset=0.05)))
+    other = simulated(load_cell=cell, world=Misspecification(drive_angle_offset=0.05 - told))
     np.testing.assert_allclose(one.measured.drive_angle, other.measured.drive_angle, atol=1e-12)
     np.testing.assert_allclose(loads_of(one.measured), loads_of(other.measured), atol=1e-8)
 
@@ -289,7 +289,7 @@ def test_the_encoder_of_a_cell_that_measures(told):
 
 
 def test_truths_come_from_the_worlds_priors_and_inference_takes_its_own():
-    asked = experiment(world=World(priors={"a": stats.uniform(2.0, 0.1)}))
+    asked = experiment(world=Misspecification(priors={"a": stats.uniform(2.0, 0.1)}))
     made = simulate(asked, np.random.default_rng(1))
     assert 2.0 < made.truth["a"] < 2.1
     assert asked.problem_of(made.measured).model.priors["a"] is PRIORS["a"]
@@ -313,7 +313,7 @@ def test_the_same_numbers_again():
 def test_a_world_out_of_reach_is_told(monkeypatch):
     monkeypatch.setattr(simulation, "_TRIALS", 3)
     with refused(ReachError, "3 contours"):
-        simulated(world=World(base_shift=(0.0, -5.0)))
+        simulated(world=Misspecification(base_shift=(0.0, -5.0)))
 
 
 def test_friction_beyond_what_a_rod_slides_with_is_drawn_again():
@@ -321,7 +321,7 @@ def test_friction_beyond_what_a_rod_slides_with_is_drawn_again():
     options = {
         "nuisances": ["friction"],
         "priors": PRIORS | {"friction": stats.uniform(0.1, 0.3)},
-        "world": World(friction=0.6),
+        "world": Misspecification(friction=0.6),
     }
     drawn = [simulated(seed, **options).truth["friction"] for seed in range(4)]
     assert all(0.1 <= friction <= np.tan(0.7) - 0.6 for friction in drawn)

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from tactile_bayes.calibration.misspecification import World
+from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.replicate import Replicate, make_replicate, replicate
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.store import REPLICATES
@@ -65,7 +65,7 @@ def calibrate(
     events: bool = True,
     settings: SamplerSettings | None = None,
     probability: float = 0.9,
-    world: World | None = None,
+    world: Misspecification | None = None,
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -110,7 +110,7 @@ def calibrate(
         unconverged are counted.
     probability : float
         Stated probability of the bands, regions and intervals, in (0, 1).
-    world : World, optional
+    world : Misspecification, optional
         Misspecification: differences between the simulated rig and what inference assumes.
     out : path-like, optional
         Folder of the results store replicates.json: a run that was killed resumes, and one with more replicates
@@ -253,13 +253,13 @@ def experiment_of(
     events: bool = True,
     settings: SamplerSettings | None = None,
     probability: float = 0.9,
-    world: World | None = None,
+    world: Misspecification | None = None,
 ) -> SimulatedExperiment:
     """Return the experiment that `calibrate` repeats, from the same arguments and defaults."""
     check_optional("load_cell", load_cell, LoadCell)
     check_optional("rod", rod, Rod)
     check_optional("settings", settings, SamplerSettings)
-    check_optional("world", world, World)
+    check_optional("world", world, Misspecification)
     directions = {"both": ("forward", "backward"), "forward": ("forward",), "backward": ("backward",)}
     check_choice("direction", direction, directions)
     correction = "give a list of at least 3 different finite numbers [rad]"
@@ -286,7 +286,7 @@ def experiment_of(
         settings=settings or _SETTINGS,
         probability=probability,
         seed=check_seed(seed),
-        world=world or World(),
+        world=world or Misspecification(),
     )
     default = replace(_SETTINGS, walkers=max(_FEWEST_WALKERS, 2 * experiment.parameters + _MORE_WALKERS))
     return replace(experiment, settings=default, again=_AGAIN) if settings in (None, default) else experiment

@@ -16,7 +16,7 @@ from tactile_bayes.inference.likelihood import Rig
 from tactile_bayes.inference.priors import Prior, check_priors
 from tactile_bayes.load_cell import LoadCell
 
-__all__ = ["NUMBERS", "World"]
+__all__ = ["NUMBERS", "Misspecification"]
 
 Triple = tuple[float, float, float]
 
@@ -42,7 +42,7 @@ _ENDS, _KNOTS = 1.5, 121
 
 
 @dataclass(frozen=True)
-class World:
+class Misspecification:
     """Misspecification: differences between the simulated rig and what inference assumes, by default none.
 
     Parameters
@@ -77,8 +77,8 @@ class World:
 
     Examples
     --------
-    >>> World(friction=0.3)
-    World(friction=0.3)
+    >>> Misspecification(friction=0.3)
+    Misspecification(friction=0.3)
     """
 
     friction: float = 0.0
@@ -99,20 +99,23 @@ class World:
                 continue
             correction = f"give {size} finite numbers" if size > 1 else "give a finite number"
             shape = (size,) if size > 1 else ()
-            numbers = check_numbers(f"{name} of the world", getattr(self, name), correction, shape=shape).tolist()
+            numbers = check_numbers(
+                f"{name} of the misspecification", getattr(self, name), correction, shape=shape
+            ).tolist()
             object.__setattr__(self, name, tuple(numbers) if size > 1 else numbers)
-        check_number("friction of the world", self.friction, "give a coefficient from 0 up", least=0.0)
+        check_number("friction of the misspecification", self.friction, "give a coefficient from 0 up", least=0.0)
         if not self.rigidity_scale > 0.0 or (self.flat_spot is not None and not self.flat_spot[1] > 0.0):
             raise ParameterError(
-                "rigidity_scale or the factor of a flat spot of the world is not positive: give positive numbers"
+                "rigidity_scale or the factor of a flat spot of the misspecification is not positive: "
+                "give positive numbers"
             )
-        check_optional("load_cell of the world", self.load_cell, LoadCell)
+        check_optional("load_cell of the misspecification", self.load_cell, LoadCell)
         if self.family is not None:
             family_named(self.family)
-        check_priors("priors of the world", self.priors)
+        check_priors("priors of the misspecification", self.priors)
 
     def __repr__(self) -> str:
-        return f"World({', '.join(f'{name}={value!r}' for name, value in self._given().items())})"
+        return f"Misspecification({', '.join(f'{name}={value!r}' for name, value in self._given().items())})"
 
     def _given(self) -> dict[str, Any]:
         """Return the entries that differ from their defaults."""

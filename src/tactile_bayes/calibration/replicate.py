@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.calibration.misspecification import World
+from tactile_bayes.calibration.misspecification import Misspecification
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
 from tactile_bayes.calibration.simulation import Simulation, simulate
 from tactile_bayes.diagnostics.record_check import check_record
@@ -304,7 +304,7 @@ def _checks(tree: xr.DataTree, simulation: Simulation, experiment: SimulatedExpe
         numbers |= {"check_p_value": float(check.overall_p_value), "check_passed": float(check.attrs["passed"])}
     except InferenceError:  # a run that was cut short has too few predictions
         pass
-    if experiment.world == World():  # nothing to detect; this saves a tenth of the time
+    if experiment.world == Misspecification():  # nothing to detect; this saves a tenth of the time
         return numbers
     try:
         contacts = contact_points(simulation.measured, experiment.load_cell, tree)

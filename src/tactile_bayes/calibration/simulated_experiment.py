@@ -10,7 +10,7 @@ from typing import Any
 
 import xarray as xr
 
-from tactile_bayes.calibration.misspecification import NUMBERS, World
+from tactile_bayes.calibration.misspecification import NUMBERS, Misspecification
 from tactile_bayes.checks import check_probability
 from tactile_bayes.contours.families import family_named
 from tactile_bayes.errors import ParameterError
@@ -41,7 +41,7 @@ class SimulatedExperiment:
     """Settings of a second run if the first has not converged; None for no second run."""
     probability: float = 0.9
     seed: int = 0
-    world: World = field(default_factory=World)
+    world: Misspecification = field(default_factory=Misspecification)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "probability", check_probability("probability", self.probability))
@@ -50,7 +50,7 @@ class SimulatedExperiment:
                 "the load cell has no noise, so that there is nothing to calibrate: give "
                 "LoadCell(force_noise=0.05, moment_noise=0.02), in the record's units"
             )
-        refuse_unknown_priors(self.world.priors, self.names, "of the world ")
+        refuse_unknown_priors(self.world.priors, self.names, "of the misspecification ")
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: the model is built again where it is needed."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-    from tactile_bayes.calibration.misspecification import World
+    from tactile_bayes.calibration.misspecification import Misspecification
     from tactile_bayes.calibration.replicate import Replicate
 
 __all__ = ["calibrate"]
@@ -105,14 +105,14 @@ def calibrate(
     )
 
 
-def _world(options: Sequence[str] | None) -> World:
-    from tactile_bayes.calibration.misspecification import NUMBERS, World
+def _world(options: Sequence[str] | None) -> Misspecification:
+    from tactile_bayes.calibration.misspecification import NUMBERS, Misspecification
 
     given: dict[str, Any] = {}
     for name, value in assigned("--world", options, known=NUMBERS).items():
         numbers = numbers_asked(value, f"--world {name}", NUMBERS[name])
         given[name] = numbers[0] if NUMBERS[name] == 1 else numbers
-    return World(**given)
+    return Misspecification(**given)
 
 
 def _of_replicate(made: Replicate) -> Answer:
