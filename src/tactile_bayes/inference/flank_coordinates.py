@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.contour_events import events_of
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.ensembles import Logarithms, Mixture
-from tactile_bayes.inference.ensembles.moves import standard_moves
+from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
 from tactile_bayes.numerics.differences import central_slopes
 
 __all__ = ["FlankCoordinates"]
@@ -112,6 +111,6 @@ class FlankCoordinates:
         """Return the same coordinates with a distribution that approximates the posterior."""
         return replace(self, proposal=proposal)
 
-    def moves(self) -> list[tuple[Any, float]]:
-        """Return new moves of one ensemble and their shares."""
+    def moves(self) -> Moves:
+        """Return the moves of an ensemble, with their shares."""
         return standard_moves(self.proposal)

@@ -468,9 +468,9 @@ def test_a_full_disk_is_told_and_what_is_written_is_kept(tmp_path, monkeypatch):
 
 
 def test_looks_do_not_depend_on_where_a_run_began():
-    looks = [block.next_look(0, 50)]
+    looks = [block.next_diagnosis(0, 50)]
     while looks[-1] < 20_000:
-        looks.append(block.next_look(looks[-1], 50))
+        looks.append(block.next_diagnosis(looks[-1], 50))
     assert looks[:7] == [50, 100, 150, 200, 250, 313, 392]
     for before, look in pairwise(looks):
-        assert {block.next_look(steps, 50) for steps in (before, before + 1, look - 1)} == {look}
+        assert {block.next_diagnosis(steps, 50) for steps in (before, before + 1, look - 1)} == {look}

@@ -248,13 +248,15 @@ def test_an_interrupt_from_the_progress_callable_leaves_what_has_been_drawn():
     assert "interrupted" in draws.message
 
 
-def test_an_interrupt_of_the_diagnosis_leaves_what_has_been_drawn(monkeypatch):
-    interrupted = False
+@pytest.mark.parametrize("interrupts", [1, 3])
+def test_an_interrupt_of_the_diagnosis_leaves_what_has_been_drawn(interrupts, monkeypatch):
+    """However often it comes."""
+    calls = 0
 
     def rhat(*arguments, **options):
-        nonlocal interrupted
-        if not interrupted:
-            interrupted = True
+        nonlocal calls
+        calls += 1
+        if calls <= interrupts:
             raise KeyboardInterrupt
         return np.array([1.0, 1.0])
 

@@ -6,7 +6,7 @@ import emcee
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles.block import WalkingEnsembles
+from tactile_bayes.inference.ensembles.block import Block, make_block
 from tactile_bayes.inference.ensembles.moves import FittedMove, FixedMove, NormalMove, standard_moves, whitened_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
 from tactile_bayes.inference.ensembles.walkers import first_random_state
@@ -71,8 +71,8 @@ def moments(target: Gaussian, moves, *, ensembles: int, steps: int, watched: int
         first, second = own.spawn(2)
         start = target.draw(np.random.default_rng(first), WALKERS)
         values, random = target.log_probability(start), first_random_state(second)
-        ensemble = WalkingEnsembles(target.log_probability, moves, start[None], values[None], [random])
-        samples = ensemble.make_block(steps).samples[0]
+        first = Block(start[None, None], values[None, None], (random,))
+        samples = make_block(target.log_probability, moves(), first, steps).samples[0]
         moved += float(np.mean(samples[1:, :, watched] != samples[:-1, :, watched])) / ensembles
         centred = (samples - target.mean) / target.deviation
         totals.append([centred.mean(axis=(0, 1)), (centred**2).mean(axis=(0, 1)) - 1.0])
@@ -85,15 +85,16 @@ def test_ensembles_abreast_walk_as_each_does_alone():
     """Bit by bit as emcee makes them go, one after the other."""
     target, rng = Gaussian(3, 1.0, wall=False), np.random.default_rng(5)
     starts = np.array([target.draw(rng, WALKERS) for _ in range(3)])
-    randoms = [first_random_state(own) for own in np.random.SeedSequence(6).spawn(3)]
+    randoms = tuple(first_random_state(own) for own in np.random.SeedSequence(6).spawn(3))
     values = np.array([target.log_probability(start) for start in starts])
-    together = WalkingEnsembles(target.log_probability, standard_moves, starts, values, randoms)
-    blocks = [together.make_block(20), together.make_block(10)]
+    blocks = [Block(starts[:, None], values[:, None], randoms)]
+    for steps in (20, 10):
+        blocks.append(make_block(target.log_probability, standard_moves(), blocks[-1], steps))
     for k, (start, random) in enumerate(zip(starts, randoms, strict=True)):
         alone = emcee.EnsembleSampler(WALKERS, 3, target.log_probability, moves=standard_moves(), vectorize=True)
         state = alone.run_mcmc(emcee.State(start, random_state=random), 30)
-        assert np.array_equal(np.concatenate([block.samples[k] for block in blocks]), alone.get_chain())
-        assert np.array_equal(np.concatenate([block.log_probability[k] for block in blocks]), alone.get_log_prob())
+        assert np.array_equal(np.concatenate([block.samples[k] for block in blocks[1:]]), alone.get_chain())
+        assert np.array_equal(np.concatenate([block.log_probability[k] for block in blocks[1:]]), alone.get_log_prob())
         assert blocks[-1].random_states[k].position == state.random_state[2]
 
 

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import emcee
 import numpy as np
 
 from tactile_bayes.arrays import Floats
-from tactile_bayes.inference.ensembles.moves import Abreast, Moves
+from tactile_bayes.inference.ensembles.moves import Moves, step_ensembles
 from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import RandomState
 
-__all__ = ["Block", "WalkingEnsembles", "next_look"]
+__all__ = ["Block", "make_block", "next_diagnosis"]
 
 
 _GROWTH = 1.25
@@ -41,50 +38,30 @@ class Block:
         return self.samples.shape[1]
 
 
-class WalkingEnsembles:
-    """All ensembles, sampled in step."""
+def make_block(target: LogProbability, moves: Moves, last: Block, steps: int, deadline: float = math.inf) -> Block:
+    """Make the steps after a block, which are determined by its last one.
 
-    def __init__(
-        self, target: LogProbability, moves: Moves, points: Floats, values: Floats, randoms: Sequence[RandomState]
-    ) -> None:
-        """Start from points, shape (chain, walker, parameter), with target values, shape (chain, walker)."""
-        self._shape = chains, walkers, parameters = points.shape
-        self._moves = Abreast([moves() for _ in randoms], [random.numbers() for random in randoms])
-        sampler: Any = emcee.EnsembleSampler(
-            chains * walkers, parameters, target, moves=[(self._moves, 1.0)], vectorize=True
-        )
-        sampler.log_prob_fn = target  # without emcee's wrapper, which prints when the target raises
-        # Starting points are checked before; those of a resumed run are kept, even if emcee would refuse them.
-        self._states = sampler.sample(
-            emcee.State(points.reshape(-1, parameters), log_prob=values.ravel(), copy=True),
-            iterations=None,
-            store=False,
-            skip_initial_state_check=True,
-        )
-
-    def make_block(self, steps: int, deadline: float = math.inf) -> Block:
-        """Make steps: at least one, but fewer than asked for after the deadline [s, monotonic clock] or an interrupt.
-
-        After an interrupt the ensembles make no further steps.
-        """
-        chains, walkers, parameters = self._shape
-        samples, values = np.empty((chains, steps, walkers, parameters)), np.empty((chains, steps, walkers))
-        made, randoms, whole = 0, tuple[RandomState, ...](), True
-        try:
-            while made < steps and not (made and time.monotonic() > deadline):
-                state = next(self._states)
-                samples[:, made] = state.coords.reshape(self._shape)
-                values[:, made] = state.log_prob.reshape(chains, walkers)
-                randoms = tuple(RandomState.of(random) for random in self._moves.randoms)
-                made += 1
-        except KeyboardInterrupt:
-            whole = False
-        return Block(samples[:, :made], values[:, :made], randoms, whole)
+    The block has at least one step, but fewer than asked for after the deadline [s, monotonic clock] or an interrupt.
+    """
+    points, values = last.samples[:, -1], last.log_probability[:, -1]
+    randoms = [state.generator() for state in last.random_states]
+    states = last.random_states
+    samples, log_probability = (np.empty((len(a), steps, *a.shape[1:])) for a in (points, values))
+    made, whole = 0, True
+    try:
+        while made < steps and not (made and time.monotonic() > deadline):
+            points, values = step_ensembles(target, moves, randoms, points, values)
+            samples[:, made], log_probability[:, made] = points, values
+            states = tuple(RandomState.of(random) for random in randoms)
+            made += 1
+    except KeyboardInterrupt:
+        whole = False
+    return Block(samples[:, :made], log_probability[:, :made], states, whole)
 
 
-def next_look(steps: int, block_steps: int) -> int:
+def next_diagnosis(steps: int, block_steps: int) -> int:
     """Return the number of steps at which a run that has made `steps` is diagnosed next."""
-    look = block_steps
-    while look <= steps:
-        look += max(block_steps, math.ceil((_GROWTH - 1.0) * look))
-    return look
+    due = block_steps
+    while due <= steps:
+        due += max(block_steps, math.ceil((_GROWTH - 1.0) * due))
+    return due

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from tactile_bayes.arrays import Flags, Floats
-from tactile_bayes.inference.ensembles.moves import standard_moves
+from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture
 from tactile_bayes.inference.ensembles.target import LogProbability
 
@@ -27,8 +27,8 @@ class Coordinates(Protocol):
     def of(self, points: Floats) -> Floats:
         """Return the coordinates of parameters, (n, parameters)."""
 
-    def moves(self) -> list[tuple[Any, float]]:
-        """Return the moves of one ensemble with their shares, new ones at each call."""
+    def moves(self) -> Moves:
+        """Return the moves of an ensemble, with their shares."""
 
 
 class Proposing(Coordinates, Protocol):
@@ -52,7 +52,7 @@ class Plain:
     def of(self, points: Floats) -> Floats:
         return points
 
-    def moves(self) -> list[tuple[Any, float]]:
+    def moves(self) -> Moves:
         return standard_moves()
 
 
@@ -85,7 +85,7 @@ class Logarithms(Plain):
         coordinates[..., self.positive] = np.log(points[..., self.positive])
         return coordinates
 
-    def moves(self) -> list[tuple[Any, float]]:
+    def moves(self) -> Moves:
         return standard_moves(self.proposal)
 
 

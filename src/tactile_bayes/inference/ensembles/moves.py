@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import emcee
 import numpy as np
 
-from tactile_bayes.arrays import Flags, Floats
+from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
+from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = ["Abreast", "FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "whitened_moves"]
+__all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "step_ensembles", "whitened_moves"]
 
-Moves = Callable[[], list[tuple[Any, float]]]
-"""Function that makes the moves of one ensemble, with their shares."""
+Moves = Sequence[tuple[Any, float]]
+"""Moves of an ensemble, with their shares. They keep nothing from step to step."""
 
 _LEAST_NEW = 0.2
 """Smallest share of the new normal draw in a step of `NormalMove`."""
@@ -26,47 +27,34 @@ _MOST_FIXED, _EFFICIENT = 0.8, 0.5
 """Largest share of proposals from a fixed distribution, and the efficiency from which it is used."""
 
 
-class Abreast(emcee.moves.Move):
-    """Moves of several ensembles, whose walkers follow one ensemble after the other.
+def step_ensembles(
+    target: LogProbability, moves: Moves, randoms: Sequence[np.random.RandomState], points: Floats, values: Floats
+) -> tuple[Floats, Floats]:
+    """Return points, (chain, walker, parameter), and their log-density, (chain, walker), after a step of all ensembles.
 
-    Each ensemble moves by halves, as emcee's moves do (Foreman-Mackey et al. 2013, doi 10.1086/670067), with moves and
-    random numbers of its own, as if it were alone; but the target, efficient for many points, is evaluated for all at
-    once.
+    Each ensemble moves by halves, as emcee's moves do (Foreman-Mackey et al. 2013, doi 10.1086/670067), with random
+    numbers of its own, as if it were alone; but the target, efficient for many points, is evaluated for all at once.
     """
-
-    def __init__(self, moves: Sequence[Sequence[tuple[Any, float]]], randoms: Sequence[np.random.RandomState]) -> None:
-        """Combine the moves of each ensemble, with their shares, and its random numbers."""
-        self._moves = [[move for move, _ in each] for each in moves]
-        shares = [np.array([share for _, share in each]) for each in moves]
-        self._shares = [each / each.sum() for each in shares]
-        self.randoms = randoms
-
-    def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, Flags]:
-        """Return the state after a step of every ensemble, and True for walkers that moved."""
-        count, size = len(self.randoms), state.coords.shape[1]
-        points, values = state.coords.reshape(count, -1, size), state.log_prob.reshape(count, -1)
-        accepted = np.zeros(values.shape, dtype=bool)
-        chosen, halves = [], []
-        for moves, shares, random, place in zip(self._moves, self._shares, self.randoms, points, strict=True):
-            chosen.append(random.choice(moves, p=shares))
-            chosen[-1].setup(place)
-            halves.append(np.arange(len(place)) % 2)
-            random.shuffle(halves[-1])
-        for half in range(2):
-            moving = [each == half for each in halves]
-            proposed = [
-                move.get_proposal(place[some], [place[~some]], random)
-                for move, place, some, random in zip(chosen, points, moving, self.randoms, strict=True)
-            ]
-            there, _ = model.compute_log_prob_fn(np.concatenate([place for place, _ in proposed]))
-            for k, ((place, factors), some, value) in enumerate(
-                zip(proposed, moving, np.split(there, count), strict=True)
-            ):
-                taken = factors + value - values[k, some] > np.log(self.randoms[k].rand(len(value)))
-                movers = np.flatnonzero(some)[taken]
-                points[k, movers], values[k, movers], accepted[k, movers] = place[taken], value[taken], True
-        state.coords, state.log_prob = points.reshape(-1, size), values.ravel()
-        return state, accepted.ravel()
+    points, values = points.copy(), values.copy()
+    shares = np.array([share for _, share in moves])
+    chosen, halves = [], []
+    for random, ensemble in zip(randoms, points, strict=True):
+        chosen.append(random.choice([move for move, _ in moves], p=shares / shares.sum()))
+        chosen[-1].setup(ensemble)
+        halves.append(np.arange(len(ensemble)) % 2)
+        random.shuffle(halves[-1])
+    for half in range(2):
+        moving = [each == half for each in halves]
+        proposed = [
+            move.get_proposal(ensemble[some], [ensemble[~some]], random)
+            for move, ensemble, some, random in zip(chosen, points, moving, randoms, strict=True)
+        ]
+        densities = np.split(target(np.concatenate([there for there, _ in proposed])), len(points))
+        for k, ((there, factors), some, density) in enumerate(zip(proposed, moving, densities, strict=True)):
+            accepted = factors + density - values[k, some] > np.log(randoms[k].rand(len(density)))
+            movers = np.flatnonzero(some)[accepted]
+            points[k, movers], values[k, movers] = there[accepted], density[accepted]
+    return points, values
 
 
 class FixedMove(emcee.moves.RedBlueMove):
@@ -143,13 +131,13 @@ class NormalMove(emcee.moves.RedBlueMove):
         return proposed, 0.5 * np.sum(there**2 - moving**2, axis=1)
 
 
-def standard_moves(proposal: Mixture | None = None) -> list[tuple[Any, float]]:
-    """Return the moves of one ensemble and their shares, new ones at each call, since a move keeps its scale.
+def standard_moves(proposal: Mixture | None = None) -> Moves:
+    """Return the moves of an ensemble, with their shares.
 
     Proposals fitted to the walkers suit a nearly normal posterior; differences of two other walkers, scaled and now and
     then unscaled, suit others. A given proposal near the posterior is used most, the more the more efficient it is;
     what it misses, a proposal fitted to walkers would miss as well, but short differences of other walkers reach it.
-    All moves split the ensemble in two halves, as `Abreast` does.
+    All moves split the ensemble in two halves, as `step_ensembles` does.
     """
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
@@ -165,7 +153,7 @@ def standard_moves(proposal: Mixture | None = None) -> list[tuple[Any, float]]:
     return [move for move in moves if move[1]]
 
 
-def whitened_moves(bent: int) -> list[tuple[Any, float]]:
+def whitened_moves(bent: int) -> Moves:
     """Return the moves for coordinates that are nearly independent and standard normal, except the first `bent`."""
     first, rest = slice(0, bent), slice(bent, None)
     return [

@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles.block import WalkingEnsembles
+from tactile_bayes.inference.ensembles.block import Block, make_block
 from tactile_bayes.inference.ensembles.coordinates import Proposing, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import autocorrelation_time
 from tactile_bayes.inference.ensembles.proposal import Mixture, Proposal
@@ -68,8 +68,8 @@ def learned(
     for steps in _STEPS:
         walked = in_coordinates(log_probability, best)
         places = best.of(points)
-        ensembles = WalkingEnsembles(walked, best.moves, places[None], walked(places)[None], [random])
-        block = ensembles.make_block(steps, deadline.moment)
+        first = Block(places[None, None], walked(places)[None, None], (random,))
+        block = make_block(walked, best.moves(), first, steps, deadline.moment)
         if not block.whole:
             raise KeyboardInterrupt
         (random,) = block.random_states

@@ -7,21 +7,21 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import InferenceError, ParameterError
-from tactile_bayes.inference.ensembles.block import Block, WalkingEnsembles, next_look
+from tactile_bayes.inference.ensembles.block import Block, make_block, next_diagnosis
 from tactile_bayes.inference.ensembles.checkpoint import Checkpoint, open_checkpoint
 from tactile_bayes.inference.ensembles.coordinates import Coordinates, Plain, in_coordinates
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis, autocorrelation_time, lost_walkers, walker_major
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.identity import identity_of_run
-from tactile_bayes.inference.ensembles.kept import KeptSteps
 from tactile_bayes.inference.ensembles.modes import modes_message, modes_of
+from tactile_bayes.inference.ensembles.run_state import RunState
 from tactile_bayes.inference.ensembles.settings import SamplerSettings
 from tactile_bayes.inference.ensembles.target import CheckedTarget, LogProbability
 from tactile_bayes.inference.ensembles.walkers import Seed, checked_start, first_random_state, spawn
@@ -140,82 +140,98 @@ def sample(
     if not names or len(set(names)) != len(names):
         raise ParameterError(f"names are {names!r}: give each parameter a name of its own")
     points = checked_start(start, names, settings)
-    chains, walkers, parameters = points.shape
+    chains, walkers, _ = points.shape
     target = CheckedTarget(log_probability, names)
     coordinates = coordinates or Plain()
-    walked = in_coordinates(target, coordinates)
-    enough = max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers)
+    density = in_coordinates(target, coordinates)
+    settings = replace(settings, min_ess=max(settings.min_ess, _DRAWS_PER_WALKER * chains * walkers))
     deadline = math.inf if settings.max_seconds is None else began + settings.max_seconds
-    steps, evaluations_before, seconds_before = 0, 0, 0.0
-    ending, look = "", 0
-    stored: Checkpoint | None = None
+    due, stored = 0, None
     with ExitStack() as stack:
         if checkpoint is not None:
             about = identity_of_run(identity, points, names, seed, settings, coordinates)
-            stored = stack.enter_context(open_checkpoint(checkpoint, about, (chains, walkers, parameters)))
+            stored = stack.enter_context(open_checkpoint(checkpoint, about, points.shape))
         if stored is not None and stored.steps:
-            steps = stored.steps
-            kept = KeptSteps(coordinates, points, steps // 2, steps)
-            for last in stored.read(since=steps // 2):
-                kept.append(last)
-            evaluations_before, seconds_before = chains * walkers * (1 + steps), stored.seconds
-            if steps in (stored.judged, next_look(steps - 1, settings.block_steps)) or steps >= settings.max_steps:
-                look = steps  # else it was killed before a diagnosis
+            state = _resumed(stored, coordinates, points)
+            began, target.evaluations = began - stored.seconds, chains * walkers * (1 + state.steps)
+            due = state.steps if stored.judged == state.steps else 0
         else:
-            last = _beginning(points, walked, seed)
-            kept = KeptSteps(coordinates, points)
-        ensembles = WalkingEnsembles(
-            walked, coordinates.moves, last.samples[:, -1], last.log_probability[:, -1], last.random_states
-        )
+            state = RunState.begin(coordinates, _first_block(points, density, seed))
+        due = due or next_diagnosis(state.steps - 1, settings.block_steps)  # also if it was killed before a diagnosis
 
-        while not ending:
-            look = look or min(next_look(steps, settings.block_steps), settings.max_steps)
-            while steps < look and not ending:
-                block = ensembles.make_block(min(settings.block_steps, look - steps), deadline)
-                steps += block.steps
-                try:
+        ending, late, diagnosis = "", False, None
+        while not ending or diagnosis is None:
+            try:
+                due = min(due, settings.max_steps)
+                while state.steps < due and not (late or ending):
+                    steps = min(settings.block_steps, due - state.steps)
+                    block = make_block(density, coordinates.moves(), state.last, steps, deadline)
+                    diagnosis = None
+                    state = state.append(block)
                     if not block.whole:
-                        ending = _INTERRUPTED
-                    elif stored is not None:
-                        stored.write(block, seconds_before + time.monotonic() - began)
-                except KeyboardInterrupt:
-                    ending = _INTERRUPTED
-                try:
-                    kept.append(block)
-                except KeyboardInterrupt:
-                    ending = _INTERRUPTED
-                    kept.append(block)
-                if not ending and time.monotonic() > deadline:
-                    ending = _OUT_OF_TIME
-            if not steps:
-                raise KeyboardInterrupt
-            look = 0
-            samples, values = kept.second_half()
-            try:
-                diagnosis = Diagnosis(samples)
-            except KeyboardInterrupt:
-                ending, diagnosis = _INTERRUPTED, Diagnosis(samples)
-            lost = lost_walkers(values)
-            if ending != _INTERRUPTED and not lost and diagnosis.satisfies(settings.max_r_hat, enough):
-                ending = _CONVERGED
-            elif not ending and steps >= settings.max_steps:
-                ending = _OUT_OF_STEPS
-            try:
+                        raise KeyboardInterrupt
+                    if stored is not None:
+                        stored.write(block, time.monotonic() - began)
+                    late = time.monotonic() > deadline
+                state, diagnosis = state.diagnose()
+                if not ending:
+                    enough = diagnosis.satisfies(settings.max_r_hat, settings.min_ess)
+                    spent = _OUT_OF_TIME if late else _OUT_OF_STEPS if state.steps >= settings.max_steps else ""
+                    ending = _CONVERGED if enough and not lost_walkers(state.half.values) else spent
                 if stored is not None and ending not in ("", _INTERRUPTED):
                     stored.note_end()
                 if progress is not None:
                     worst = float(diagnosis.r_hat[diagnosis.worst_r_hat]), float(diagnosis.ess[diagnosis.worst_ess])
-                    seconds = seconds_before + time.monotonic() - began
-                    progress(Progress(steps, settings.max_steps, *worst, seconds))
+                    progress(Progress(state.steps, settings.max_steps, *worst, time.monotonic() - began))
+                due = next_diagnosis(state.steps, settings.block_steps)
             except KeyboardInterrupt:
+                if not state.steps:
+                    raise
                 ending = ending or _INTERRUPTED
 
-    moved = kept.moved
+    return _draws(state, diagnosis, ending, names, settings, target.evaluations, time.monotonic() - began)
+
+
+def _first_block(points: Floats, density: LogProbability, seed: Seed) -> Block:
+    """Return the starting points as a block of one step."""
+    values = np.array([density(ensemble) for ensemble in points])
+    outside = int(np.count_nonzero(np.isneginf(values)))
+    if outside:
+        raise InferenceError(
+            f"{outside} of {values.size} walkers start where the log-probability is −inf: "
+            "start them inside the support, for instance with scatter_walkers"
+        )
+    randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
+    return Block(points[:, None], values[:, None], randoms)
+
+
+def _resumed(stored: Checkpoint, coordinates: Coordinates, points: Floats) -> RunState:
+    """Return the state after the last stored block; the steps before its second half are not read."""
+    unknown = Block(points[:, None], np.full(points.shape[:2], np.nan)[:, None], ())
+    state = RunState.begin(coordinates, unknown, stored.steps // 2, stored.steps)
+    for block in stored.read(since=stored.steps // 2):
+        state = state.append(block)
+    return state
+
+
+def _draws(
+    state: RunState,
+    diagnosis: Diagnosis,
+    ending: str,
+    names: tuple[str, ...],
+    settings: SamplerSettings,
+    evaluations: int,
+    seconds: float,
+) -> Draws:
+    """Return the second half of a run that has ended, with the message on its end."""
+    chains, _, walkers, _ = state.last.samples.shape
+    converged, half, moved = ending == _CONVERGED, state.half, state.moved
     stuck = int(np.count_nonzero(~moved.any(axis=1))) if moved.size else 0
-    modes = () if ending == _CONVERGED else modes_of(samples, values, names)
-    message = f"{ending} after {steps} steps: {diagnosis.message(names)}"
-    if ending != _CONVERGED:
-        message += f"; wanted are R̂ below {settings.max_r_hat:g} and an effective sample size of {enough:.0f}"
+    lost = lost_walkers(half.values)
+    modes = () if converged else modes_of(half.samples, half.values, names)
+    message = f"{ending} after {state.steps} steps: {diagnosis.message(names)}"
+    if not converged:
+        message += f"; wanted are R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
     if modes:
         message += f"; {modes_message(modes)}"
     if lost:
@@ -225,35 +241,22 @@ def sample(
     if stuck:
         message += f"; {stuck} of {chains * walkers} walkers did not move in the steps kept: look where they sit"
     return Draws(
-        samples=walker_major(samples),
-        log_probability=walker_major(values),
+        samples=walker_major(half.samples),
+        log_probability=walker_major(half.values),
         names=names,
         walkers=walkers,
-        steps_kept=samples.shape[1],
-        every=kept.every,
-        steps_run=steps,
+        steps_kept=half.samples.shape[1],
+        every=state.every,
+        steps_run=state.steps,
         r_hat=diagnosis.r_hat,
         ess_bulk=diagnosis.ess_bulk,
         ess_tail=diagnosis.ess_tail,
         acceptance=moved.mean(axis=(1, 2)) if moved.size else np.full(chains, np.nan),
-        autocorrelation_time=kept.every * autocorrelation_time(samples),
-        evaluations=evaluations_before + target.evaluations,
-        seconds=seconds_before + time.monotonic() - began,
-        converged=ending == _CONVERGED,
+        autocorrelation_time=state.every * autocorrelation_time(half.samples),
+        evaluations=evaluations,
+        seconds=seconds,
+        converged=converged,
         message=message,
         stuck=stuck,
         modes=modes,
     )
-
-
-def _beginning(points: Floats, target: LogProbability, seed: Seed) -> Block:
-    """Return the starting points as a block of one step."""
-    values = np.array([target(ensemble) for ensemble in points])
-    outside = int(np.count_nonzero(np.isneginf(values)))
-    if outside:
-        raise InferenceError(
-            f"{outside} of {values.size} walkers start where the log-probability is −inf: "
-            "start them inside the support, for instance with scatter_walkers"
-        )
-    randoms = tuple(first_random_state(own) for own in spawn(seed, len(points)))
-    return Block(points[:, None], values[:, None], randoms)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
-from tactile_bayes.inference.ensembles.moves import standard_moves
+from tactile_bayes.inference.ensembles.moves import Moves, standard_moves
 from tactile_bayes.inference.ensembles.proposal import Mixture
 
 __all__ = ["Straightened"]
@@ -118,7 +117,7 @@ class Straightened:
     def with_proposal(self, proposal: Mixture) -> Straightened:
         return replace(self, proposal=proposal)
 
-    def moves(self) -> list[tuple[Any, float]]:
+    def moves(self) -> Moves:
         return standard_moves(self.proposal)
 
 

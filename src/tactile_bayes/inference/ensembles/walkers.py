@@ -43,7 +43,7 @@ class RandomState(NamedTuple):
     def of(cls, random: np.random.RandomState) -> RandomState:
         return cls(*random.get_state(legacy=True))
 
-    def numbers(self) -> np.random.RandomState:
+    def generator(self) -> np.random.RandomState:
         """Return a generator that continues from this state."""
         random = np.random.RandomState()
         random.set_state(self)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.inference.ensembles import whitened_moves
+from tactile_bayes.inference.ensembles.moves import Moves
 from tactile_bayes.inference.shape_free_posterior.normal_approximation import NormalApproximation, joined, split
 
 __all__ = ["Whitening"]
@@ -68,7 +68,7 @@ class Whitening:
         pulled, root = self.approximation.conditional(scales)
         return np.hstack([np.log(scales), (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled])
 
-    def moves(self) -> list[tuple[Any, float]]:
+    def moves(self) -> Moves:
         return whitened_moves(self.bent)
 
     def _moved(self, coordinates: Floats) -> tuple[Floats, Floats]:

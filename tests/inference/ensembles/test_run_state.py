@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_bayes.inference.ensembles import Logarithms, Plain, SamplerSettings, kept, sample
+from tactile_bayes.inference.ensembles import Logarithms, Plain, SamplerSettings, run_state, sample
 from tactile_bayes.inference.ensembles.block import Block
-from tactile_bayes.inference.ensembles.kept import KeptSteps
+from tactile_bayes.inference.ensembles.run_state import RunState
 
 SHAPE = (2, 4, 3)
 """Chains, walkers, parameters: 24 numbers a step."""
@@ -20,31 +20,39 @@ def walked(steps):
     return np.cumsum(moves, axis=1)
 
 
+def as_block(samples):
+    return Block(samples, samples.sum(axis=-1), ())
+
+
+def second_half(state):
+    """Samples and log-probability at a diagnosis, whether walkers moved, and the thinning."""
+    state, _ = state.diagnose()
+    return state.half.samples, state.half.values, state.moved, state.every
+
+
 def appended(samples, ends, coordinates):
-    keeping = KeptSteps(coordinates, samples[:, 0])
+    state = RunState.begin(coordinates, as_block(samples[:, :1]))
     for begin, end in zip([0, *ends], ends, strict=False):
-        part = samples[:, begin + 1 : end + 1]
-        keeping.append(Block(part, part.sum(axis=-1), ()))
-    return keeping
+        state = state.append(as_block(samples[:, begin + 1 : end + 1]))
+    return state
 
 
 @pytest.fixture
 def little_memory(monkeypatch):
     """No more than ten steps are kept."""
-    monkeypatch.setattr(kept, "_MOST", 10 * 24)
+    monkeypatch.setattr(run_state, "_MAX_STORED", 10 * 24)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 7, 20])
 @pytest.mark.usefixtures("little_memory")
 def test_of_few_steps_the_second_half_is_kept(steps):
     samples = walked(steps)
-    keeping = appended(samples, [steps], Plain())
-    points, values = keeping.second_half()
+    points, values, walkers_moved, every = second_half(appended(samples, [steps], Plain()))
     np.testing.assert_array_equal(points, samples[:, steps // 2 + 1 :])
     np.testing.assert_array_equal(values, points.sum(axis=-1))
     moved = np.any(points[:, 1:] != points[:, :-1], axis=-1)
-    np.testing.assert_array_equal(keeping.moved, moved)
-    assert keeping.every == 1
+    np.testing.assert_array_equal(walkers_moved, moved)
+    assert every == 1
 
 
 @pytest.mark.parametrize(("steps", "every"), [(21, 2), (22, 2), (43, 4), (100, 8)])
@@ -52,13 +60,12 @@ def test_of_few_steps_the_second_half_is_kept(steps):
 def test_of_many_steps_every_so_manieth_is_kept(steps, every):
     """And whether walkers moved is known of all of them."""
     samples = walked(steps)
-    keeping = appended(samples, [steps], Plain())
-    points, _ = keeping.second_half()
-    assert keeping.every == every
+    points, _, moved, thinning = second_half(appended(samples, [steps], Plain()))
+    assert thinning == every
     assert points.shape[1] <= 11
     number = np.arange(steps + 1)
     np.testing.assert_array_equal(points, samples[:, (number > steps // 2) & (number % every == 0)])
-    np.testing.assert_array_equal(keeping.moved, np.any(np.diff(samples[:, steps // 2 + 1 :], axis=1) != 0.0, axis=-1))
+    np.testing.assert_array_equal(moved, np.any(np.diff(samples[:, steps // 2 + 1 :], axis=1) != 0.0, axis=-1))
 
 
 @pytest.mark.usefixtures("little_memory")
@@ -66,19 +73,14 @@ def test_blocks_and_looks_make_no_difference():
     steps, positive = 90, Logarithms(np.array([True, False, True]))
     samples = 0.01 * walked(steps)
     whole = appended(samples, [steps], positive)
-    parts = appended(samples, [3, 10, 11, 40], positive)
-    parts.second_half()
+    parts, _ = appended(samples, [3, 10, 11, 40], positive).diagnose()
     for begin, end in ((40, 47), (47, 80), (80, 90)):
-        part = samples[:, begin + 1 : end + 1]
-        parts.append(Block(part, part.sum(axis=-1), ()))
-    resumed = KeptSteps(positive, samples[:, 0], 45, 90)
-    part = samples[:, 46:]
-    resumed.append(Block(part, part.sum(axis=-1), ()))
+        parts = parts.append(as_block(samples[:, begin + 1 : end + 1]))
+    resumed = RunState.begin(positive, as_block(samples[:, :1]), 45, 90).append(as_block(samples[:, 46:]))
     for other in (parts, resumed):
-        for one, another in zip(whole.second_half(), other.second_half(), strict=True):
+        for one, another in zip(second_half(whole), second_half(other), strict=True):
             np.testing.assert_array_equal(one, another)
-        np.testing.assert_array_equal(whole.moved, other.moved)
-        assert whole.every == other.every > 1
+        assert second_half(other)[-1] > 1
 
 
 def test_a_thinned_run_is_the_same_run(monkeypatch, tmp_path):
@@ -91,7 +93,7 @@ def test_a_thinned_run_is_the_same_run(monkeypatch, tmp_path):
         return sample(lambda x: -0.5 * x[:, 0] ** 2, start, names=["x"], seed=1, settings=chosen, **options)
 
     whole = drawn()
-    monkeypatch.setattr(kept, "_MOST", 16 * 250)
+    monkeypatch.setattr(run_state, "_MAX_STORED", 16 * 250)
     thinned = drawn()
     assert (whole.every, thinned.every) == (1, 4)
     assert (whole.steps_kept, thinned.steps_kept, thinned.steps_run) == (800, 200, 1600)
