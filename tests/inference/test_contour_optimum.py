@@ -36,7 +36,7 @@ def test_contact_of_a_few_samples_brackets_its_events(brief):
     sweeps = scanned.events
     forward, backward = ([s.first_contact.drive_angle, s.snap_off.drive_angle] for s in sweeps.values())
     events = np.array([[forward, np.pi - np.array(backward)]])
-    assert brackets.stroke.tolist() == [0, 0, 1, 1]
+    assert brackets.segment.tolist() == [0, 0, 1, 1]
     assert np.all(brackets.missed(events) == 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Where a contour and all else that is not known fit a record best, sought without help."""
+"""Parameters that fit a record best, found from the record and the priors alone."""
 
 from __future__ import annotations
 
@@ -25,74 +25,74 @@ __all__ = ["ContourOptimum", "contact_fit", "fitted_noise", "optima_of", "optimu
 
 _PRIOR_DRAWS = 1000
 _CANDIDATES = 24
-"""Draws from the prior from which the optimum is sought at most, the likeliest first. A sample at an event that is
-loaded or not holds the search up where it began too far away."""
+"""Largest number of prior draws from which searches begin, the likeliest first: a search that begins too far away stops
+early, since a sample at an event is loaded or not."""
 
-_SHARP = 0.1
-"""Of the angle between the samples beside an event: how far it may be outside for a residual of one."""
+_EVENT_TOLERANCE = 0.1
+"""Distance of an event outside its bracket that counts as a residual of one, over the width of the bracket."""
 
-_LOUD = 1e-7
-"""Probability that noise makes a sample look loaded by itself."""
+_FALSE_ALARM = 1e-7
+"""Probability that noise alone makes an unloaded sample look loaded."""
 
-_FARTHEST = 12.0
-"""Standard deviations of the prior's logarithm that a size may be off on the way to where it is sought."""
+_MAX_LOG_DISTANCE = 12.0
+"""Largest distance of the logarithm of a positive parameter from its prior median during a search, in prior spreads."""
 
-_FAR_OFF = 1000.0
-"""Residual of an event that does not happen."""
+_MISSING_EVENT_RESIDUAL = 1000.0
+"""Residual of an event that does not occur."""
 
-_FIRM = 2.0
-"""Standard deviation of a contact across the contour, over the median one, up to which a contour is fitted to it."""
+_MAX_RELATIVE_SD = 2.0
+"""Largest standard deviation of a contact normal to the contour, over the median one, for a fit of the contour."""
 
-_FAR_BETTER, _NEARLY = 100.0, 5.0
-"""Log-likelihood, roughly, by which a record is explained better beyond the end of a prior for that to be a mistake;
-and cost per residual there, for what is not nearly explained is where a search got lost."""
+_MIN_GAIN, _MAX_COST = 100.0, 5.0
+"""Gain in coarse log-likelihood beyond the end of a prior above which the prior is reported as too narrow, and the cost
+per residual there below which the gain is believed."""
 
-
-_CLEARLY = 0.9
-"""Share of its cost that a search from Step 2's contacts may leave, to be gone on with."""
+_MAX_COST_RATIO = 0.9
+"""Largest share of the cost that a search from Step 2's contacts may leave for its result to be taken."""
 
 
 class ContourOptimum(NamedTuple):
-    """Parameters that explain a record, by robust least squares."""
+    """Robust least-squares solution for all parameters."""
 
     point: Floats
-    """All of the model's."""
+    """Shape (parameters,)."""
     covariance: Floats
-    """Roughly that of the model's coordinates in the posterior."""
+    """Coarse posterior covariance of the model's coordinates, shape (parameters, parameters)."""
     cost: float
-    """Of robust least squares."""
+    """Robust least-squares cost."""
     fits: bool
-    """Whether noise as it was guessed explains the record."""
+    """True if the assumed noise explains the residuals."""
     beyond: str = ""
-    """What the record wants and the priors do not allow, where that explains it far better; in words."""
+    """Parameters that fit the record far better beyond the ends of their priors, as text; else empty."""
 
 
 class Brackets(NamedTuple):
-    """Drive angles between which contact begins or ends, as read and as seen in forward sweeps, a row an event."""
+    """Drive angles as read, in the sweep frame, between which contact begins or ends; one entry per event."""
 
-    stroke: NDArray[np.intp]
+    segment: NDArray[np.intp]
+    """Number of the sweep segment."""
     ends: NDArray[np.intp]
     """0 for first contact, 1 for snap-off."""
     low: Floats
     high: Floats
     width: Floats
-    """In which a residual grows by one."""
+    """Distance outside that counts as a residual of one [rad]."""
 
     def at(self, events: Floats) -> Floats:
-        """Of events, shape (n, strokes, 2), those that have to happen, shape (n, events); NaN where one does not."""
-        return np.asarray(events[:, self.stroke, self.ends])
+        """Return the bracketed of all events, (n, segments, 2), as (n, events); NaN if one does not occur."""
+        return np.asarray(events[:, self.segment, self.ends])
 
     def missed(self, events: Floats) -> Floats:
-        """By how much events, shape (n, strokes, 2), are outside, in widths, shape (n, events)."""
+        """Return residuals of events, shape (n, segments, 2), relative to their brackets, shape (n, events)."""
         at = self.at(events)
         missed = np.maximum(self.low - at, 0.0) - np.maximum(at - self.high, 0.0)
-        return np.nan_to_num(missed / self.width, nan=_FAR_OFF)
+        return np.nan_to_num(missed / self.width, nan=_MISSING_EVENT_RESIDUAL)
 
 
 def event_brackets(model: ContourModel) -> Brackets:
-    """Between which samples contact begins and ends, by the loads alone.
+    """Return the drive angles between which contact begins and ends, from the loads alone.
 
-    Loads say nothing of where a rod lets go until a sample is on the other side: what is missed here leads there.
+    Residuals of loads do not depend on the angle of snap-off until a sample changes sides; residuals of brackets do.
     """
     angle = model.likelihood.angles_in_sweep_frame
     of_sample = model.likelihood.segment_of_sample
@@ -100,32 +100,33 @@ def event_brackets(model: ContourModel) -> Brackets:
     for onset, snap_off in zip(model.found["onset"].values, model.found["snap_off"].values, strict=True):
         for ends, (before, after) in enumerate((onset, snap_off)):
             if before < 0 or after < 0 or of_sample[before] != of_sample[after] or angle[before] >= angle[after]:
-                continue  # there is none, or the drive turns back
-            rows.append((of_sample[before], ends, angle[before], angle[after], _SHARP * (angle[after] - angle[before])))
+                continue  # there is no event, or the drive turns back
+            width = _EVENT_TOLERANCE * (angle[after] - angle[before])
+            rows.append((of_sample[before], ends, angle[before], angle[after], width))
     found = {row[0] for row in rows}
-    for stroke, (before, first, last, after) in enumerate(model.likelihood.event_samples(_loud(model))):
-        if stroke not in found and before >= 0 and after >= 0:  # contact so brief that loads before it tell nothing
-            step = _SHARP * (angle[after] - angle[before]) / 2.0
-            rows += [(stroke, 0, -np.inf, angle[first], step), (stroke, 1, angle[last], angle[after], step)]
+    for segment, (before, first, last, after) in enumerate(model.likelihood.event_samples(_certainly_loaded(model))):
+        if segment not in found and before >= 0 and after >= 0:  # contact is too brief for its loads to show events
+            width = _EVENT_TOLERANCE * (angle[after] - angle[before]) / 2.0
+            rows += [(segment, 0, -np.inf, angle[first], width), (segment, 1, angle[last], angle[after], width)]
     columns = np.array(rows, dtype=float).reshape(-1, 5).T
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
 
 
-def _loud(model: ContourModel) -> NDArray[np.bool_]:
-    """Samples whose load no noise explains, each for itself."""
+def _certainly_loaded(model: ContourModel) -> NDArray[np.bool_]:
+    """Return True for samples whose load noise does not explain, each taken by itself."""
     measured, present = model.likelihood.measured[:, model.present], model.present
     zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))
-    surprise = np.square((measured - zero) / model.deviation[present]).sum(axis=1)
-    return np.asarray(surprise > chdtri(np.count_nonzero(present), _LOUD))
+    squared_distance = np.square((measured - zero) / model.deviation[present]).sum(axis=1)
+    return np.asarray(squared_distance > chdtri(np.count_nonzero(present), _FALSE_ALARM))
 
 
 def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> ContourOptimum:
-    """The best of `optima_of`, or the first that explains the record.
+    """Return the first optimum of `optima_of` that explains the record, or else the best one.
 
     Raises
     ------
     InferenceError
-        If there is none.
+        If there is no optimum.
     """
     best: ContourOptimum | None = None
     for found in optima_of(model, rng, deadline):
@@ -139,71 +140,74 @@ def optimum_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline
 
 
 def optima_of(model: ContourModel, rng: np.random.Generator, deadline: Deadline = NEVER) -> Iterator[ContourOptimum]:
-    """Return where searches end that begin at Step 2's contacts and at draws from the prior, the likeliest first."""
+    """Yield optima that start from a contour fitted to Step 2's contacts, and from prior draws, the likeliest first."""
     search = _Search(model, rng, deadline)
     for found in optima(search.residuals, search.starts(), *search.limits):
-        yield search.judged(search.gone_on(found))
+        yield search.complete(search.refine(found))
 
 
 class _Search:
-    """Least squares over the contour and the rig, in logarithms of sizes; the noise follows from what is left."""
+    """Least squares over the forward-model parameters, positive ones by their logarithms.
+
+    The noise follows from the residuals.
+    """
 
     def __init__(self, model: ContourModel, rng: np.random.Generator, deadline: Deadline) -> None:
         self.model = model
         self.deadline = deadline
         size = len(model.forward_parameters)
-        self.located = Logarithms(model.coordinates.positive[:size])
+        self.coordinates = Logarithms(model.coordinates.positive[:size])
         self.deviation = model.deviation[model.present]
         self.measured = model.likelihood.measured[:, model.present] / self.deviation
         self.brackets = event_brackets(model)
         self.candidates, _ = model.draw_prior(rng, _PRIOR_DRAWS, deadline)
         for name, zero in _zeros(model).items():
             self.candidates[:, model.names.index(name)] = zero
-        self.drawn = self.located.of(self.candidates[:, :size])
+        self.drawn = self.coordinates.of(self.candidates[:, :size])
         percentiles = np.quantile(self.drawn, [0.16, 0.84], axis=0)
-        rough = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
+        coarse = np.maximum(0.5 * np.diff(percentiles, axis=0)[0], 1e-3 * np.abs(percentiles[0]))
         stated = np.array([float(model.priors[name].std()) for name in model.forward_parameters])
         self.middle = percentiles.mean(axis=0)
-        self.spread = np.where(np.isfinite(stated) & ~self.located.positive, stated, rough)
-        walked = model.walked_ends
-        self.limits = self.middle, self.spread, walked.low[:size], walked.high[:size], deadline
+        self.spread = np.where(np.isfinite(stated) & ~self.coordinates.positive, stated, coarse)
+        ends = model.walked_ends
+        self.limits = self.middle, self.spread, ends.low[:size], ends.high[:size], deadline
 
-    def points(self, places: Floats) -> Floats:
-        """Parameters of contour and rig, shape (n, parameters), from where they are sought."""
-        return self.located.parameters(places)[0]
+    def points(self, coordinates: Floats) -> Floats:
+        """Return the forward-model parameters at coordinates, both of shape (n, parameters)."""
+        return self.coordinates.parameters(coordinates)[0]
 
-    def residuals(self, places: Floats) -> Floats:
-        """Loads and events that are missed, in standard deviations, shape (n, loads + events).
+    def residuals(self, coordinates: Floats) -> Floats:
+        """Return residuals of loads and events in standard deviations, shape (n, loads + events).
 
-        A prior that ends somewhere is no wall: the way to where it does not may lead through there.
+        They are defined beyond the ends of priors too, since the way to an optimum may lead through there.
         """
-        model, points, size = self.model, self.points(places), self.middle.size
+        model, points, size = self.model, self.points(coordinates), self.middle.size
         least = np.where(model.may_vanish, -model.high, model.low)[:size]
         allowed = ((points > least) & (points < model.high[:size])).all(axis=1)
-        far = np.abs(places - self.middle) >= _FARTHEST * self.spread
-        allowed &= ~far[:, self.located.positive].any(axis=1)
+        far = np.abs(coordinates - self.middle) >= _MAX_LOG_DISTANCE * self.spread
+        allowed &= ~far[:, self.coordinates.positive].any(axis=1)
         out = np.tile(10.0 * (np.abs(self.measured) + 1.0), (len(points), 1, 1))
-        late = np.full((len(points), self.brackets.low.size), _FAR_OFF)
+        late = np.full((len(points), self.brackets.low.size), _MISSING_EVENT_RESIDUAL)
         if allowed.any():
             loads, events = _continued(model, points[allowed])
             expected = model.likelihood.load_cell.expected(loads)
-            # Where loads are large, to have none would often be nearer than to have others: it leads nowhere.
+            # Zero loads are often closer to measured ones than wrong loads: without contact, residuals are constant.
             happens = ~np.isnan(self.brackets.at(events)).any(axis=1)
             missed = self.measured - expected[happens][..., model.present] / self.deviation
             out[np.flatnonzero(allowed)[happens]] = missed
             late[allowed] = self.brackets.missed(events)
         return np.concatenate([out.reshape(len(points), -1), late], axis=1)
 
-    def events_missed(self, places: Floats) -> Floats:
-        """The events' part of the residuals."""
-        return self.residuals(places)[:, self.measured.size :]
+    def events_missed(self, coordinates: Floats) -> Floats:
+        """Return the residuals of events, shape (n, events)."""
+        return self.residuals(coordinates)[:, self.measured.size :]
 
     def starts(self) -> Iterator[Floats]:
-        """Places where searches begin; at draws from the prior, moved to where events are as they are to be."""
-        by_contacts = contact_fit(self.model)
-        if by_contacts is not None:
-            rig = np.median(self.candidates[:, by_contacts.size : self.middle.size], axis=0)
-            yield self.located.of(np.append(by_contacts, rig))
+        """Yield coordinates at which searches begin; prior draws are first moved until events are in their brackets."""
+        fitted = contact_fit(self.model)
+        if fitted is not None:
+            rig = np.median(self.candidates[:, fitted.size : self.middle.size], axis=0)
+            yield self.coordinates.of(np.append(fitted, rig))
         parts = [self.drawn[block] for block in blocks(len(self.drawn), self.measured.size)]
         costs = np.concatenate([np.sum(np.minimum(np.abs(self.residuals(part)), 30.0), axis=1) for part in parts])
         for place in self.drawn[np.argsort(costs)[:_CANDIDATES]]:
@@ -212,26 +216,26 @@ class _Search:
             else:
                 yield place
 
-    def gone_on(self, found: Optimum) -> Optimum:
-        """An optimum, or, as long as it does not explain the record, what a search from Step 2's contacts leads to.
+    def refine(self, found: Optimum) -> Optimum:
+        """Return an optimum, refined by searches from Step 2's contacts while it does not explain the record.
 
-        The rig is often found long before a contour that is far away; with that rig Step 2 says where the contour is.
+        The rig often converges long before a distant contour; with that rig, Step 2 locates the contour.
         """
         while not found.fits and not self.deadline.has_passed:
             point = self.points(found.point[None])[0]
             point = np.where(self.model.may_vanish[: point.size], np.maximum(point, 0.0), point)
-            by_contacts = contact_fit(self.model, dict(zip(self.model.forward_parameters, point.tolist(), strict=True)))
-            if by_contacts is None:
+            fitted = contact_fit(self.model, dict(zip(self.model.forward_parameters, point.tolist(), strict=True)))
+            if fitted is None:
                 break
-            place = self.located.of(np.append(by_contacts, point[by_contacts.size :]))
+            place = self.coordinates.of(np.append(fitted, point[fitted.size :]))
             again = next(optima(self.residuals, [place], *self.limits))
-            if again.cost > _CLEARLY * found.cost:
+            if again.cost > _MAX_COST_RATIO * found.cost:
                 break
             found = again
         return found
 
-    def judged(self, found: Optimum) -> ContourOptimum:
-        """All parameters at an optimum, how uncertain they are, and whether the record wants others."""
+    def complete(self, found: Optimum) -> ContourOptimum:
+        """Return the optimum with the noise parameters and the covariance of all parameters."""
         model, size = self.model, self.middle.size
         point = self.points(found.point[None])[0]
         noise = fitted_noise(model, found.residuals[: self.measured.size].reshape(self.measured.shape))
@@ -244,21 +248,20 @@ class _Search:
         return ContourOptimum(np.append(point, noise), covariance, found.cost, found.fits, self._beyond(found))
 
     def _beyond(self, found: Optimum) -> str:
-        """What the record wants and the priors do not allow, in words, where that explains it far better."""
-        explained = found.cost - found.excess < _NEARLY * found.residuals.size
-        if found.beyond is None or found.excess <= _FAR_BETTER or not explained:
+        """Return the parameters that fit the record far better beyond the ends of their priors, as text."""
+        explained = found.cost - found.excess < _MAX_COST * found.residuals.size
+        if found.beyond is None or found.excess <= _MIN_GAIN or not explained:
             return ""
-        wanted, ends = self.points(found.beyond[None])[0], self.model.ends
-        low, high = ends.low[: wanted.size], ends.high[: wanted.size]
-        off = np.flatnonzero((wanted <= low) | (wanted >= high))
-        return ", ".join(
-            f"{self.model.forward_parameters[i]} = {wanted[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off
-        )
+        favoured, ends, names = self.points(found.beyond[None])[0], self.model.ends, self.model.forward_parameters
+        low, high = ends.low[: favoured.size], ends.high[: favoured.size]
+        off = np.flatnonzero((favoured <= low) | (favoured >= high))
+        return ", ".join(f"{names[i]} = {favoured[i]:.6g} (prior: {low[i]:.6g} to {high[i]:.6g})" for i in off)
 
 
 def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
-    """Loads and events, continued evenly to less than zero of what may vanish: where the record would have less than
-    none, a search that ran into a wall would not get on along it.
+    """Return loads and events, continued antisymmetrically to negative values of parameters that may vanish.
+
+    A search would otherwise stop at a wall if the record favours negative values.
     """
     vanishing = np.flatnonzero(model.may_vanish)
     below = (points[:, vanishing] < 0.0).any(axis=1)
@@ -274,7 +277,7 @@ def _continued(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
 
 
 def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
-    """Noise parameters that fit the optimum's residuals, shape (samples, present channels), outliers aside."""
+    """Return noise parameters that fit residuals, shape (samples, present channels), robustly against outliers."""
     known = model.likelihood.load_cell.noise
     fitted = model.deviation[model.present] * np.maximum(1.4826 * np.median(np.abs(residuals), axis=0), 1e-3)
     measured = np.flatnonzero(model.present)
@@ -283,7 +286,10 @@ def fitted_noise(model: ContourModel, residuals: Floats) -> Floats:
 
 
 def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -> Floats | None:
-    """The family fitted to Step 2's contact points, with the rig that was found, or with zeros as they show."""
+    """Return the contour parameters fitted to Step 2's contact points, or None if too few are usable.
+
+    Step 2 takes a given rig, by default one with the zeros of the unloaded samples.
+    """
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None
     rod = model.likelihood.rod
@@ -291,21 +297,21 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
     cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
     rig = rig_with(model.measured, cell, _zeros(model) if found is None else found, model.nuisances.friction)
     contacts = rig.contacts()
-    firm = contacts.status.values == "ok"
-    if firm.any():
-        firm &= contacts.normal_sd.values <= _FIRM * np.median(contacts.normal_sd.values[firm])
-    said = len(model.family.parameters) - len(model.family.roughness)
-    if np.count_nonzero(firm) < 2 * said:
+    usable = contacts.status.values == "ok"
+    if usable.any():
+        usable &= contacts.normal_sd.values <= _MAX_RELATIVE_SD * np.median(contacts.normal_sd.values[usable])
+    size = len(model.family.parameters) - len(model.family.roughness)
+    if np.count_nonzero(usable) < 2 * size:
         return None
     length = rod.length
-    values = model.family.fit(contacts.contact_x.values[firm] / length, contacts.contact_y.values[firm] / length)
+    values = model.family.fit(contacts.contact_x.values[usable] / length, contacts.contact_y.values[usable] / length)
     point = np.array([values[name] * length**power for name, power in model.family.length_powers.items()])
     inside = [np.isfinite(model.priors[n].logpdf(v)) for n, v in zip(model.family.parameters, point, strict=True)]
     return point if all(inside) else None
 
 
 def _zeros(model: ContourModel) -> dict[str, float]:
-    """Biases that are inferred as unloaded samples show them, by name."""
+    """Return inferred biases as estimated from the unloaded samples, by name."""
     names, stated = model.nuisances.names, model.noise.cell.bias
     units = [model.nuisances.units.get(name, np.nan) for name in BIASES]
     shown = zip(BIASES, model.zero * np.array(units) - np.array(stated), strict=True)

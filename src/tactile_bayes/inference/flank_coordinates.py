@@ -1,4 +1,4 @@
-"""Coordinates of power laws of which one flank is touched, far from the vertex."""
+"""Coordinates of power laws with contacts on one flank only, far from the vertex."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ __all__ = ["FlankCoordinates"]
 _PARAMETERS, _X_C = 4, 3
 """Number of parameters of a power law, and the column of x_c among them."""
 
-_RARELY, _NEARBY = 0.01, 0.1
-"""Share of the draws, and of the median distance of the vertex from x: if more draws are nearer than this, the vertex
-may lie on the other side as well, which these coordinates exclude."""
+_MAX_SHARE, _NEAR = 0.01, 0.1
+"""Share of the draws, and distance of the vertex from x over its median: if a larger share is nearer, the vertex may
+lie on the other side as well, which these coordinates exclude."""
 
 _STEP = 1e-6
-"""Step of the differences in the model's coordinates."""
+"""Step of central differences in the model's coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlankCoordinates:
-    """Slope, exponent, height and bend of a power law at one place, instead of its parameters w, n, q and x_c.
+    """Slope, exponent, height and slope ratio of a power law at one x, instead of its parameters w, n, q and x_c.
 
-    A record of one flank tells height, slope and curvature where the rod touches, and hardly where the vertex is: w, n,
-    q and x_c then lie along a bent ridge, thousands of times as long as wide. With u = |x − x_c| the coordinates are
+    A record of one flank determines height, slope and curvature at the contacts, but hardly the vertex: the posterior
+    of w, n, q and x_c is then a bent ridge, thousands of times as long as wide. With u = |x − x_c| the coordinates are
     log t, log(n − 1), y and log(t/t′), where t = n (u/w)^(n − 1) is the slope, t/t′ = u/(n − 1) its ratio to its
     derivative, and y = q + t u/n the height. They determine the contour on either side of the vertex.
 
@@ -40,9 +40,9 @@ class FlankCoordinates:
     base : Logarithms
         Coordinates of all parameters, of which those of the contour are the first four.
     x : float
-        The place [length].
+        Position at which the coordinates are taken [length].
     side : float
-        1 where the vertex lies at smaller x, −1 where it lies at larger x.
+        1 if the vertex lies at smaller x, −1 if it lies at larger x.
     proposal : Mixture, optional
         Distribution of coordinates that approximates the posterior.
     """
@@ -53,9 +53,11 @@ class FlankCoordinates:
     proposal: Mixture | None = None
 
     @classmethod
-    def where_touched(cls, model: ContourModel, point: Floats) -> FlankCoordinates | None:
-        """Coordinates at the middle of the contacts that parameters predict, shape (parameters,); None at the vertex,
-        and for other families than the power law."""
+    def at_contacts(cls, model: ContourModel, point: Floats) -> FlankCoordinates | None:
+        """Return coordinates at the middle of the contacts predicted at a point, shape (parameters,).
+
+        There are none at the vertex, nor for families other than the power law.
+        """
         if model.family.name != "power-law":
             return None
         at = point[None]
@@ -66,7 +68,7 @@ class FlankCoordinates:
 
     @property
     def digest(self) -> str:
-        """Text that tells these coordinates from others."""
+        """Identity of the coordinates, as text."""
         proposal = "" if self.proposal is None else self.proposal.digest
         return f"flank of a power law, side {self.side:g} at {self.x!r}, {self.base.digest}, proposal {proposal}"
 
@@ -74,18 +76,18 @@ class FlankCoordinates:
         """Return parameters, shape (n, parameters), and the logarithm of the Jacobian determinant, shape (n,)."""
         log_slope, log_power, height, log_ratio = coordinates[:, :_PARAMETERS].T
         based = coordinates.copy()
-        with np.errstate(over="ignore", invalid="ignore"):  # what is beyond all numbers is impossible
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite parameters are impossible
             power, u = np.exp(log_power), np.exp(log_power + log_ratio)
             n = 1.0 + power
             based[:, 0] = log_power + log_ratio - (log_slope - np.log(n)) / power
             based[:, 1] = n
             based[:, 2] = height - np.exp(log_slope) * u / n
             based[:, 3] = self.x - self.side * u
-        points, growth = self.base.parameters(based)
-        return points, growth + log_power + log_ratio
+        points, log_jacobian = self.base.parameters(based)
+        return points, log_jacobian + log_power + log_ratio
 
     def of(self, points: Floats) -> Floats:
-        """Return coordinates of points, shape (..., parameters); NaN where the vertex is on the other side."""
+        """Return coordinates of points, shape (..., parameters); NaN if the vertex is on the other side."""
         coordinates = self.base.of(points)
         w, n, q, x_c = np.moveaxis(points[..., :_PARAMETERS], -1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -97,15 +99,14 @@ class FlankCoordinates:
 
     def covariance(self, point: Floats, covariance: Floats) -> Floats:
         """Transform a covariance of the base coordinates to first order at a point, shape (parameters,)."""
-        place = self.base.of(point[None])[0]
-        slopes = central_slopes(lambda places: self.of(self.base.parameters(places)[0]), place, _STEP)
+        based = self.base.of(point[None])[0]
+        slopes = central_slopes(lambda points: self.of(self.base.parameters(points)[0]), based, _STEP)
         return np.asarray(slopes @ covariance @ slopes.T)
 
     def reach_vertex(self, coordinates: Floats) -> bool:
-        """Return whether draws of the posterior, shape (n, parameters), come so near to the vertex that it may lie on
-        the other side as well."""
+        """Return True if the vertex may lie on the other side as well, according to draws, shape (n, parameters)."""
         distances = np.abs(self.parameters(coordinates)[0][:, _X_C] - self.x)
-        return bool(np.quantile(distances, _RARELY) < _NEARBY * np.median(distances))
+        return bool(np.quantile(distances, _MAX_SHARE) < _NEAR * np.median(distances))
 
     def with_proposal(self, proposal: Mixture) -> FlankCoordinates:
         """Return the same coordinates with a distribution that approximates the posterior."""

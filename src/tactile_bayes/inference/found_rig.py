@@ -1,4 +1,4 @@
-"""The rig that a posterior has found beside a contour: a load cell that is off, a drive that is, pivots that are."""
+"""The rig that was inferred with a contour: corrections of load cell, drive and pivots, for Step 2."""
 
 from __future__ import annotations
 
@@ -18,25 +18,26 @@ from tactile_bayes.record import CHANNELS, present_channels
 
 __all__ = ["FoundRig", "contact_points", "found_rig", "rig_with"]
 
-_SHORT = ("moment", "force_x", "force_y")
+_CHANNEL_NAMES = ("moment", "force_x", "force_y")
 
 
 class FoundRig(NamedTuple):
-    """What Step 2 needs to take a record as the posterior does."""
+    """Arguments of `reconstruct` by which Step 2 corrects a record as the posterior does."""
 
     record: xr.Dataset
-    """With pivots as they were found, and without drift."""
+    """Record with inferred pivots, and without drift."""
     load_cell: LoadCell
-    """Bias, gain (a rod that is stiffer than stated makes it larger), lever and encoder as they were found.
+    """Load cell with inferred bias, gain (which includes the stiffness of the rod), lever and encoder.
 
-    So is noise that was not stated; else it is as stated, whatever `noise_scale` says, so that misfits tell of it.
+    Its noise is inferred only where it was not stated: `noise_scale` is not applied, so that misfits show it.
     """
     friction: float
+    """Coulomb's coefficient."""
     suspension_compliance: float
-    """Per moment of the rod as stated, as `reconstruct` takes it."""
+    """Compliance relative to the stated rod, as in `reconstruct`."""
 
     def contacts(self) -> xr.Dataset:
-        """Return contact points by Step 2, as from `reconstruct`: constrained where the noise is known, else raw."""
+        """Return contact points from `reconstruct`, constrained if the noise is known, else raw."""
         return reconstruct(
             self.record,
             method="constrained" if self.load_cell.has_variances else "raw",
@@ -47,16 +48,16 @@ class FoundRig(NamedTuple):
 
 
 def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> FoundRig:
-    """Medians of what was inferred of the rig beside a contour, put where `reconstruct` takes it.
+    """Return the rig with the posterior medians of its parameters.
 
     Parameters
     ----------
     measured : xr.Dataset
         The record.
     load_cell : LoadCell or None
-        As `infer_contour` was given it.
+        The argument of `infer_contour`.
     posterior : xr.DataTree
-        What that made of the record.
+        Its result for the record.
     """
     draws = posterior_draws(posterior)
     found = {str(name): float(values.median()) for name, values in draws.data_vars.items()}
@@ -68,25 +69,25 @@ def found_rig(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.Da
 
 
 def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float], friction: float) -> FoundRig:
-    """What nuisance parameters, by name and in the record's units, make of a rig that was stated.
+    """Return the stated rig, corrected by nuisance parameters.
 
     Parameters
     ----------
     measured : xr.Dataset
         The record.
     load_cell : LoadCell
-        As it was stated.
+        The stated load cell.
     rig : mapping of str to float
-        What differs from that.
+        Nuisance parameters by name, in the record's units; others have no effect.
     friction : float
-        Coulomb's coefficient, where it is not among the parameters.
+        Coulomb's coefficient, if it is not among the parameters.
     """
 
-    def of_channels(what: str, otherwise: float) -> np.ndarray[Any, np.dtype[np.float64]]:
-        return np.array([rig.get(f"{channel}_{what}", otherwise) for channel in _SHORT])
+    def by_channel(kind: str, default: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+        return np.array([rig.get(f"{channel}_{kind}", default) for channel in _CHANNEL_NAMES])
 
-    gain: Any = np.array(load_cell.gain) * of_channels("gain", 1.0) * rig.get("rigidity_scale", 1.0)
-    bias = np.array(load_cell.bias) + of_channels("bias", 0.0)
+    gain: Any = np.array(load_cell.gain) * by_channel("gain", 1.0) * rig.get("rigidity_scale", 1.0)
+    bias = np.array(load_cell.bias) + by_channel("bias", 0.0)
     cell = replace(
         load_cell,
         gain=gain,
@@ -95,16 +96,16 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
         drive_angle_offset=load_cell.drive_angle_offset + rig.get("drive_angle_offset", 0.0),
         drive_angle_backlash=load_cell.drive_angle_backlash + rig.get("backlash", 0.0),
     )
-    way = np.linspace(-0.5, 0.5, measured.sizes["sample"])
+    fraction = np.linspace(-0.5, 0.5, measured.sizes["sample"])
     columns = {
-        name: measured[name] - drift * way for name, drift in zip(CHANNELS, of_channels("drift", 0.0), strict=True)
+        name: measured[name] - drift * fraction for name, drift in zip(CHANNELS, by_channel("drift", 0.0), strict=True)
     }
     pivots = np.stack([measured.base_x.values, measured.base_y.values], axis=1)
     for number, pivot in enumerate(bases_of(measured), start=1):
-        here = np.all(pivots == np.asarray(pivot), axis=1)
+        at_pivot = np.all(pivots == np.asarray(pivot), axis=1)
         for name in ("base_x", "base_y"):
             shift = rig.get(f"base_{number}_{name[-1]}", 0.0)
-            columns[name] = columns.get(name, measured[name]) + shift * here
+            columns[name] = columns.get(name, measured[name]) + shift * at_pivot
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
     return FoundRig(
         record,
@@ -115,21 +116,21 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
 
 
 def contact_points(measured: xr.Dataset, load_cell: LoadCell | None, posterior: xr.DataTree) -> xr.Dataset | None:
-    """Return contact points by Step 2, with the rig that was found: noise, biases, stiffness, offset, friction.
+    """Return contact points by Step 2, with the inferred noise, biases, stiffness, offset and friction.
 
     Parameters
     ----------
     measured : xr.Dataset
         The record.
     load_cell : LoadCell or None
-        As `infer_contour` was given it.
+        The argument of `infer_contour`.
     posterior : xr.DataTree
-        What that made of the record.
+        Its result for the record.
 
     Returns
     -------
     xr.Dataset or None
-        From `reconstruct`; None where a load channel is missing.
+        Result of `reconstruct`; None if a load channel is missing.
     """
     if set(present_channels(measured)) != set(CHANNELS):
         return None

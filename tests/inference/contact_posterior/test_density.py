@@ -120,7 +120,7 @@ def test_the_density_is_likelihood_times_prior_times_volume(i):
     density, sample = density_of(record, CELL, i), Sample(record, i, CELL)
     z, phase = random_coordinates(rng, 200)
     found = density.at(z[:, None, :], phase[:, None])
-    logs, places = found.log_density[:, 0], density.to_lab_frame(found.place)[:3, :, 0].T
+    logs, places = found.log_density[:, 0], density.to_lab_frame(found.contact)[:3, :, 0].T
     expected, phases = sample.log_likelihood(places)
     use = np.isfinite(logs) & (logs > -1e4)
     assert use.sum() > 40
@@ -130,7 +130,7 @@ def test_the_density_is_likelihood_times_prior_times_volume(i):
     for step in range(4):
         moved = [z + sign * 1e-6 * np.eye(4)[step] for sign in (1.0, -1.0)]
         ahead, behind = (
-            density.to_lab_frame(density.at(m[:, None, :], phase[:, None]).place)[:3, :, 0].T for m in moved
+            density.to_lab_frame(density.at(m[:, None, :], phase[:, None]).contact)[:3, :, 0].T for m in moved
         )
         columns.append((ahead - behind) / 2e-6)
     slopes = np.stack(columns, axis=-1)
@@ -198,7 +198,7 @@ def test_nothing_measured_leaves_the_flat_prior():
     z[:, 0, 3] = record.drive_angle.values[i] + 0.3 * rng.standard_normal(count)
     found = density.at(z, kinds[:, None])
     logs = found.log_density[:, 0] - stats.norm.logpdf(z[:, 0, 3], record.drive_angle.values[i], 0.3) + log_force
-    places = found.place[:3, :, 0].T
+    places = found.contact[:3, :, 0].T
     weight = np.exp(logs - logs[np.isfinite(logs)].max())
     weight[~np.isfinite(weight)] = 0.0
     weight *= np.where(tip, 0.5 * np.pi, 1.0)

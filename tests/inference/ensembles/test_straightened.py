@@ -7,7 +7,14 @@ import pytest
 
 from helpers.interrupts import interrupted_at
 from tactile_bayes.inference.deadline import NEVER, Deadline
-from tactile_bayes.inference.ensembles import Logarithms, Mixture, Proposal, approximate, in_coordinates, learned
+from tactile_bayes.inference.ensembles import (
+    Logarithms,
+    Mixture,
+    Proposal,
+    approximate,
+    in_coordinates,
+    learn_coordinates,
+)
 from tactile_bayes.inference.ensembles.straightened import Straightened
 
 SIZE = 6
@@ -55,7 +62,7 @@ def found():
     base, rng = Logarithms(POSITIVE), np.random.default_rng(4)
     target = in_coordinates(bent, base)
     straight = approximate(target, np.zeros(SIZE), np.diag([1.0, 1.0, *[0.1] * (SIZE - 2)]) ** 2, rng)
-    return straight, learned(bent, base.with_proposal(Mixture((straight,))), scouts(2.0), SCALE, rng)
+    return straight, learn_coordinates(bent, base.with_proposal(Mixture((straight,))), scouts(2.0), SCALE, rng)
 
 
 def test_a_bent_ridge_is_made_normal(found):
@@ -76,7 +83,7 @@ def test_directions_that_turn_about_one_another_are_followed():
         return -0.5 * np.sum(steps**2, axis=1)
 
     start = narrow * np.random.default_rng(5).normal(size=(36, SIZE))
-    coordinates = learned(sheared, PLAIN, start, SCALE, np.random.default_rng(4))
+    coordinates = learn_coordinates(sheared, PLAIN, start, SCALE, np.random.default_rng(4))
     exact = np.random.default_rng(3).normal(size=(5000, SIZE))
     exact[:, -1] += 3.0 * exact[:, 0] * exact[:, 2]
     assert acceptance(sheared, coordinates, narrow * exact) > 0.4
@@ -126,7 +133,7 @@ def learned_of_a_normal(width, efficiency, deadline=NEVER):
     """What is made of a proposal so many times as wide as a standard normal posterior."""
     base = PLAIN.with_proposal(Mixture((Proposal(np.zeros(SIZE), width * np.eye(SIZE), efficiency),)))
     start = 2.0 * np.random.default_rng(5).normal(size=(36, SIZE))
-    return learned(normal, base, start, SCALE, np.random.default_rng(1), deadline)
+    return learn_coordinates(normal, base, start, SCALE, np.random.default_rng(1), deadline)
 
 
 def test_what_is_normal_already_is_left_alone():
@@ -149,7 +156,7 @@ def test_past_the_deadline_one_step_is_made():
 def test_an_interrupt_is_passed_on():
     start = np.random.default_rng(5).normal(size=(36, SIZE))
     with pytest.raises(KeyboardInterrupt):
-        learned(interrupted_at(11, normal), PLAIN, start, SCALE, np.random.default_rng(1))
+        learn_coordinates(interrupted_at(11, normal), PLAIN, start, SCALE, np.random.default_rng(1))
 
 
 def test_draws_of_which_the_nearest_lie_in_a_plane_are_refused():

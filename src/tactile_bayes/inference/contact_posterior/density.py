@@ -28,7 +28,7 @@ class Evaluated(NamedTuple):
 
     log_density: Floats
     """Density over force and ψ1 (tip) or arc length (tangential), and drive angle; shape (..., n)."""
-    place: Floats
+    contact: Floats
     """Contact point of the rod's centreline, slope angle, arc length; in the sweep frame, shape (4, ..., n)."""
 
 
@@ -92,7 +92,7 @@ class ContactDensity:
         return ContactDensity(some, readings, base, turning=self._turning, delta=self.delta, prior=self._prior)
 
     def at(self, coordinates: Floats, phase: NDArray[np.int8]) -> Evaluated:
-        """Evaluate contacts by coordinates, shape (..., n, 4), and phase, shape (..., n); −inf where impossible.
+        """Evaluate contacts from coordinates, shape (..., n, 4), and phase, shape (..., n); −inf if impossible.
 
         The density is that of the coordinates that are free in the phase.
         """
@@ -119,32 +119,32 @@ class ContactDensity:
         density = np.where(possible.reshape(shape) & ~np.isnan(density), density, -np.inf)
         return Evaluated(density, rod.place.reshape(4, *shape))
 
-    def places(self, coordinates: Floats) -> Floats:
-        """Return contacts by coordinates, shape (..., n, 4), in the form of `to_lab_frame`."""
-        place = contact_states(coordinates.reshape(-1, 4), self.delta).place
-        return self.to_lab_frame(place.reshape(4, *coordinates.shape[:-1]))
+    def contacts(self, coordinates: Floats) -> Floats:
+        """Return contacts from coordinates, shape (..., n, 4), in the form of `to_lab_frame`."""
+        contact = contact_states(coordinates.reshape(-1, 4), self.delta).place
+        return self.to_lab_frame(contact.reshape(4, *coordinates.shape[:-1]))
 
-    def to_lab_frame(self, place: Floats) -> Floats:
+    def to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""
         rod, side = self.samples.rod, self.samples.side
-        x, y, alpha, arclength = place
+        x, y, alpha, arclength = contact
         radius, length = 0.5 * rod.diameter, rod.length_unit
         x, y = x * length - radius * np.sin(alpha), y * length + radius * np.cos(alpha)
         return np.stack([self.base[:, 0] + side * x, self.base[:, 1] + y, side * alpha, arclength * length])
 
-    def _log_prior(self, place: Floats, shape: tuple[int, ...]) -> Floats | float:
+    def _log_prior(self, contact: Floats, shape: tuple[int, ...]) -> Floats | float:
         if self._prior == "flat":
             return 0.0
-        place = place.reshape(4, *shape)
+        contact = contact.reshape(4, *shape)
         if not callable(self._prior):
-            return np.asarray(-np.log(np.hypot(place[0], place[1])))
-        values = np.asarray(self._prior(*self.to_lab_frame(place)[:3]), dtype=float)
+            return np.asarray(-np.log(np.hypot(contact[0], contact[1])))
+        values = np.asarray(self._prior(*self.to_lab_frame(contact)[:3]), dtype=float)
         if values.shape != shape:
             raise ParameterError(
                 f"the prior gave an array of shape {values.shape} for arguments of shape {shape}: it has to work "
                 "element by element"
             )
-        if np.any((np.isnan(values) | (values == np.inf)) & np.isfinite(place[0])):
+        if np.any((np.isnan(values) | (values == np.inf)) & np.isfinite(contact[0])):
             raise ParameterError("the prior is not a number, or +inf, somewhere within reach: give a log-density")
         return values
 

@@ -19,17 +19,19 @@ __all__ = ["CHAINS", "EMCEE", "EMCEE_SETTINGS", "IMPORTANCE", "ContactDraws", "M
 Method = Literal["auto", "importance", "emcee"]
 
 CHAINS = 4
+"""Number of chains."""
 
 IMPORTANCE, EMCEE = 1, 2
 """Codes of the method that made the draws."""
 
 EMCEE_SETTINGS = SamplerSettings(walkers=24, min_ess=400.0, max_steps=4000)
+"""Default settings of emcee for a single contact."""
 
 _PROPOSALS = 4
-"""Number of proposals for each draw that is kept."""
+"""Number of proposals per resampled draw."""
 
-_START = 1000
-"""Smallest number of proposals among which emcee's walkers start."""
+_MIN_PROPOSALS = 1000
+"""Smallest number of proposals of a sample, among which emcee's walkers start."""
 
 _BLOCK = 64
 """Number of samples that are processed at a time."""
@@ -85,9 +87,12 @@ def _draw_block(
     own: list[np.random.SeedSequence],
     settings: SamplerSettings | None,
 ) -> ContactDraws:
+    """Draw contacts for one block of samples; `own` are the seeds of emcee for each sample."""
     for_weights, for_picks = spawn(seed, 2)
     count = density.samples.side.size
-    weights = weigh_contacts(density, _START if method == "emcee" else max(_PROPOSALS * draws, _START), for_weights)
+    weights = weigh_contacts(
+        density, _MIN_PROPOSALS if method == "emcee" else max(_PROPOSALS * draws, _MIN_PROPOSALS), for_weights
+    )
     points = _resampled(weights, draws, np.random.default_rng(for_picks))
     tangential = np.where(weights.points[..., 0] < 0.0, np.exp(weights.log_weight), 0.0).sum(axis=0)
     tangential[weights.effective_draws == 0.0] = np.nan
@@ -107,7 +112,7 @@ def _draw_block(
         return found
     for i in np.flatnonzero((method == "emcee") | ~found.converged).tolist():
         found.engine[i], found.log_evidence[i] = EMCEE, np.nan
-        points[:, :, i], found.r_hat[i], found.ess[i], found.converged[i] = _walk(
+        points[:, :, i], found.r_hat[i], found.ess[i], found.converged[i] = _draw_by_emcee(
             density.take(np.array([i])), weights, i, draws, own[i], settings or EMCEE_SETTINGS
         )
         lost = np.isnan(points[0, 0, i, 0])
@@ -130,7 +135,7 @@ def _resampled(weights: ContactWeights, draws: int, rng: np.random.Generator) ->
     return points
 
 
-def _walk(
+def _draw_by_emcee(
     density: ContactDensity,
     weights: ContactWeights,
     i: int,
@@ -151,14 +156,14 @@ def _walk(
         near = proposed[rng.choice(weight.size, count, p=weight / weight.sum())]
         return np.asarray(near + spread * rng.standard_normal(near.shape))
 
-    for_start, for_walk = spawn(seed, 2)
+    for_start, for_sampling = spawn(seed, 2)
     try:
         start = scatter_walkers(
             log_probability, draw, parameters=len(names), seed=for_start, settings=settings, max_rounds=1000
         )
     except InferenceError:  # no contact is possible for this sample
         return np.full((CHAINS, draws // CHAINS, len(names)), np.nan), np.nan, 0.0, False
-    found = sample(log_probability, start, names=names, seed=for_walk, settings=settings)
-    kept = np.linspace(0, found.samples.shape[1] - 1, draws // CHAINS).astype(int)
+    found = sample(log_probability, start, names=names, seed=for_sampling, settings=settings)
+    thinned = np.linspace(0, found.samples.shape[1] - 1, draws // CHAINS).astype(int)
     ess = float(np.min([found.ess_bulk, found.ess_tail]))
-    return found.samples[:, kept], float(np.max(found.r_hat)), ess, found.converged
+    return found.samples[:, thinned], float(np.max(found.r_hat)), ess, found.converged

@@ -18,20 +18,20 @@ from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 __all__ = ["LARGEST_K", "LEAST_DRAWS", "ContactWeights", "weigh_contacts"]
 
 LARGEST_K = 0.7
-"""Pareto k̂ above which weights must not be trusted (Vehtari et al. 2024, JMLR 25(72))."""
+"""Pareto k̂ above which weights are not reliable (Vehtari et al. 2024, JMLR 25(72))."""
 
 LEAST_DRAWS = 400.0
 """Smallest number of effective draws."""
 
-_NOTHING = 600.0
-"""Logarithm of a ratio of weights at which the smaller is negligible."""
+_NEGLIGIBLE = 600.0
+"""Logarithm of a ratio of weights from which the smaller is negligible."""
 
 _PILOTS = ((600, 0.25), (600, 0.15))
 """Number of proposals of each pilot run, and the smallest share of the less probable phase in the next run: the edge
 between the phases cuts off narrow layers of the posterior, which need more than one pilot."""
 
-_GOOD = 0.4
-"""Effective share of a phase's proposals above which its approximation is kept: moments of a truncated posterior would
+_GOOD_SHARE = 0.4
+"""Effective share of a phase's proposals from which its approximation is final: moments of a truncated posterior would
 not improve it."""
 
 
@@ -40,7 +40,7 @@ class ContactWeights(NamedTuple):
 
     points: Floats
     """Way, force and, if it is uncertain, drive angle, shape (draws, n, 2 or 3)."""
-    place: Floats
+    contact: Floats
     """Contact point, slope angle and arc length, in the sweep frame and dimensionless, shape (4, draws, n)."""
     log_weight: Floats
     """Logarithms of smoothed weights with sum one, shape (draws, n)."""
@@ -77,27 +77,28 @@ def weigh_contacts(density: ContactDensity, draws: int, seed: np.random.SeedSequ
         points, _, log_weight = _evaluated(density, ContactProposal(*approximation, longest), count, rng)
         approximation = _refined(points, log_weight, *approximation, least)
     proposal = ContactProposal(*approximation, longest)
-    points, place, log_weight = _evaluated(density, proposal, draws, rng)
+    points, contact, log_weight = _evaluated(density, proposal, draws, rng)
     with np.errstate(invalid="ignore"):
         log_evidence = logsumexp(log_weight, axis=0) - np.log(draws)
     lost = ~np.isfinite(log_evidence)
     log_weight[:, lost] = 0.0
     smoothed, k = log_weight.copy(), np.full(lost.size, np.inf)
     # If nearly all weights are negligible there is no tail to smooth.
-    many = np.count_nonzero(log_weight > log_weight.max(axis=0) - _NOTHING, axis=0) >= 0.25 * draws
+    many = np.count_nonzero(log_weight > log_weight.max(axis=0) - _NEGLIGIBLE, axis=0) >= 0.25 * draws
     for i in np.flatnonzero(many & ~lost).tolist():
         smoothed[:, i], k[i] = array_stats.psislw(-log_weight[:, i])  # weights are exp(−argument)
     smoothed = smoothed - logsumexp(smoothed, axis=0)
     effective = np.exp(-logsumexp(2.0 * smoothed, axis=0))
-    return ContactWeights(points, place, smoothed, k, np.where(lost, 0.0, effective), log_evidence)
+    return ContactWeights(points, contact, smoothed, k, np.where(lost, 0.0, effective), log_evidence)
 
 
 def _evaluated(
     density: ContactDensity, proposal: ContactProposal, draws: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats, Floats]:
+    """Return proposals, their contacts, and the logarithms of their importance weights."""
     proposed = proposal.draw(draws, rng)
     found = density.at(*density.unfold(proposed.points))
-    return proposed.points, found.place, found.log_density - proposed.log_density
+    return proposed.points, found.contact, found.log_density - proposed.log_density
 
 
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
@@ -140,7 +141,7 @@ def _refined(
             new = np.einsum("dn,dnk->nk", own, points)
             off = points - new
             spread = np.einsum("dn,dni,dnj->nij", own, off, off)
-        trusted = (effective >= 10.0 * points.shape[-1]) & (effective < _GOOD * mine.sum(axis=0))
+        trusted = (effective >= 10.0 * points.shape[-1]) & (effective < _GOOD_SHARE * mine.sum(axis=0))
         spread[~trusted] = np.eye(points.shape[-1])
         scale = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -38,10 +38,11 @@ from tactile_bayes.record.schema import column_attributes
 
 __all__ = ["infer_contacts"]
 
-_UNLIKELY = 1e-4
-"""Probability of a misfit below which the loads are not those of the rod."""
+_MIN_MISFIT_PROBABILITY = 1e-4
+"""Probability of a misfit below which the message reports that the loads do not fit."""
 
 _MOST_DRAWS = 10**6
+"""Largest number of draws for each sample."""
 
 _CONSTANT = ("sweep", "direction", "base_x", "base_y")
 
@@ -175,8 +176,8 @@ def infer_contacts(
     return tree
 
 
-def _chance_of_misfit(measured: xr.Dataset, cell: LoadCell, friction: float) -> float:
-    """Return the probability of the misfit of all samples under noise, from `reconstruct`; NaN without variances."""
+def _misfit_probability(measured: xr.Dataset, cell: LoadCell, friction: float) -> float:
+    """Return the probability of a larger misfit of all samples, from `reconstruct`; NaN without variances."""
     if cell.degrees_of_freedom <= 2.0:
         return float("nan")
     return float(
@@ -214,7 +215,7 @@ def _density(measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactP
 def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, points: Floats) -> dict[str, xr.Dataset]:
     size = measured.sizes["sample"]
     coordinates, _ = density.unfold(points)
-    places = density.places(coordinates)
+    contacts = density.contacts(coordinates)
     units = measured.attrs["units"]
     dims = ("chain", "draw", "sample")
 
@@ -225,7 +226,7 @@ def _groups(measured: xr.Dataset, density: ContactDensity, loaded: Index, points
 
     variables: dict[str, Any] = {
         name: (dims, everywhere(values), column_attributes(name, units))
-        for name, values in zip(PLACE, places, strict=True)
+        for name, values in zip(PLACE, contacts, strict=True)
     }
     if density.has_free_angle:
         side = density.samples.side
@@ -287,8 +288,8 @@ def _attributes(
             else "emcee ran out of steps"
         )
         message += f"; not converged: {failed} ({why}), see sample_stats"
-    chance = _chance_of_misfit(measured, cell, friction)
-    if chance < _UNLIKELY:
+    chance = _misfit_probability(measured, cell, friction)
+    if chance < _MIN_MISFIT_PROBABILITY:
         message += f"; THE LOADS DO NOT FIT (probability {chance:.1g}): are rod, friction, frame and noise right?"
     approximations = list(cell.approximations)
     if cell.drift is not None or any(cell.bias_uncertainty):

@@ -16,7 +16,7 @@ _WIDTHS = np.array([1.15, 3.0])
 
 _SHARES = np.array([0.75, 0.25])
 
-_FARTHEST = 30.0
+_MAX_DISTANCE = 30.0
 """Largest distance of a mean beyond the edge, in standard deviations, so that probabilities stay positive."""
 
 
@@ -51,7 +51,9 @@ class ContactProposal:
         self._low = np.array([0.0, -1.0])[:, None] + 0.0 * share
         self._high = np.array([longest, 0.0])[:, None] + 0.0 * share
         self._mean = mean.copy()
-        self._mean[..., 0] = np.clip(mean[..., 0], self._low - _FARTHEST * spread, self._high + _FARTHEST * spread)
+        self._mean[..., 0] = np.clip(
+            mean[..., 0], self._low - _MAX_DISTANCE * spread, self._high + _MAX_DISTANCE * spread
+        )
 
     def draw(self, count: int, rng: np.random.Generator) -> Proposed:
         """Draw `count` independent points for every sample, with both phases in their shares."""

@@ -14,9 +14,9 @@ evaluation if a posterior is nearly normal. The others are differential evolutio
 10.1007/s11222-006-8769-1; Nelson et al. 2014, doi 10.1088/0067-0049/210/1/11): the difference of two other walkers,
 scaled, which adapts to any shape, and now and then unscaled, which lets a walker jump between separated modes.
 
-Parameters may be sampled in other coordinates; diagnoses and results are always of the parameters. `learned` finds such
-coordinates, and a proposal in them, by a short run whose draws are discarded. If there is a proposal, most steps are
-taken from it; differential evolution with long and short steps covers what it misses.
+Parameters may be sampled in other coordinates; diagnoses and results are always of the parameters. `learn_coordinates`
+finds such coordinates, and a proposal in them, by a short run whose draws are discarded. If there is a proposal, most
+steps are taken from it; differential evolution with long and short steps covers what it misses.
 
 With a checkpoint, every block of steps is on disk before the next begins. A block's file holds the last positions of
 the walkers and the states of their random numbers, so that a killed run makes the same draws as an uninterrupted one.
@@ -26,7 +26,7 @@ from tactile_bayes.inference.ensembles.coordinates import Coordinates, Logarithm
 from tactile_bayes.inference.ensembles.draws import Draws
 from tactile_bayes.inference.ensembles.modes import Mode
 from tactile_bayes.inference.ensembles.moves import whitened_moves
-from tactile_bayes.inference.ensembles.pilot import learned
+from tactile_bayes.inference.ensembles.pilot import learn_coordinates
 from tactile_bayes.inference.ensembles.proposal import ANYTHING, Ends, Mixture, Proposal, approximate
 from tactile_bayes.inference.ensembles.sampling import Progress, sample
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, settings_of
@@ -50,7 +50,7 @@ __all__ = [
     "Straightened",
     "approximate",
     "in_coordinates",
-    "learned",
+    "learn_coordinates",
     "sample",
     "scatter_walkers",
     "seed_sequence",

@@ -1,4 +1,4 @@
-"""The checkpoint of a run, a file a block, from which it resumes after it was killed at any moment."""
+"""The checkpoint of a run, one file per block, from which the run resumes after it was killed at any moment."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class Checkpoint:
         self._folder = folder
         self._identity = dict(identity)
         self._shape = shape
-        self.judged = 0
-        """Steps after which the run last ended and was diagnosed, also by time between two diagnoses; 0 if never."""
-        self._ends = self._found()
+        self.ended_at = 0
+        """Number of steps at which the run last ended, diagnosed; 0 if it never has."""
+        self._ends = self._stored_ends()
         self.seconds = 0.0
         """Sampling time up to the last block that was read or written [s]."""
 
@@ -68,7 +68,7 @@ class Checkpoint:
     def write(self, block: Block, seconds: float) -> None:
         """Append a block that was finished after `seconds` [s] of the whole run."""
         if not self._ends:
-            self._describe()
+            self._write_description()
         end = self.steps + block.steps
         path = self._folder / _name(self.steps, end)
         if path.exists():
@@ -89,22 +89,22 @@ class Checkpoint:
         self.seconds = seconds
 
     def note_end(self) -> None:
-        """Note that the run was diagnosed after the last block and ended there."""
-        if self.judged != self.steps:
-            self.judged = self.steps
-            self._describe()
+        """Record that the run ended after the last block, diagnosed."""
+        if self.ended_at != self.steps:
+            self.ended_at = self.steps
+            self._write_description()
 
-    def _describe(self) -> None:
-        table = {"kind": _KIND, "format": _FORMAT, "judged": self.judged, "identity": self._identity}
+    def _write_description(self) -> None:
+        table = {"kind": _KIND, "format": _FORMAT, "judged": self.ended_at, "identity": self._identity}
         text = json.dumps(table, indent=1, ensure_ascii=False)
         with write_atomically(self._folder / _DESCRIPTION) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
-    def _found(self) -> list[int]:
+    def _stored_ends(self) -> list[int]:
         """Return the ends of the stored blocks, in steps; refuse blocks of another run, or with gaps."""
         files = sorted(path.name for path in self._folder.iterdir() if not is_temporary(path))
         if _DESCRIPTION in files:
-            self.judged = self._description()
+            self.ended_at = self._read_description()
         elif files:
             raise InferenceError(
                 f"{self._folder} holds {files[0]!r} and no {_DESCRIPTION}, so it is no checkpoint: give a folder "
@@ -121,8 +121,8 @@ class Checkpoint:
             ends.append(end)
         return ends
 
-    def _description(self) -> int:
-        """Return the steps after which the run was last diagnosed; refuse the description of another run."""
+    def _read_description(self) -> int:
+        """Return the number of steps at which the run last ended; refuse the description of another run."""
         path = self._folder / _DESCRIPTION
         try:
             table = json.loads(path.read_text(encoding="utf-8"))

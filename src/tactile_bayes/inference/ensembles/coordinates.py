@@ -32,17 +32,17 @@ class Coordinates(Protocol):
 
 
 class Proposing(Coordinates, Protocol):
-    """Coordinates that may know a proposal which comes near the posterior in them."""
+    """Coordinates in which a proposal near the posterior may be known."""
 
     @property
     def proposal(self) -> Mixture | None: ...
 
     def with_proposal(self, proposal: Mixture) -> Self:
-        """The same, with a proposal."""
+        """Return the same coordinates with another proposal."""
 
 
 class Plain:
-    """The parameters themselves."""
+    """The parameters themselves as coordinates."""
 
     digest: str = "the parameters"
 
@@ -92,8 +92,8 @@ class Logarithms(Plain):
 def in_coordinates(log_probability: LogProbability, coordinates: Coordinates) -> LogProbability:
     """Return the log-density of the coordinates, from that of the parameters."""
 
-    def of_coordinates(points: Floats) -> Floats:
-        parameters, growth = coordinates.parameters(points)
-        return np.asarray(log_probability(parameters) + growth)
+    def log_density(points: Floats) -> Floats:
+        parameters, log_jacobian = coordinates.parameters(points)
+        return np.asarray(log_probability(parameters) + log_jacobian)
 
-    return of_coordinates
+    return log_density

@@ -17,20 +17,20 @@ _TAIL = (0.05, 0.95)
 """Quantiles that define the effective sample size of the tails."""
 
 
-_LOST = 10.0
-"""Distance of a lost walker's best log-probability below the median of all."""
+_LOST_BELOW = 10.0
+"""Distance of a lost walker's largest log-probability below the median of all walkers."""
 
 
 def lost_walkers(values: Floats) -> int:
     """Count walkers far less probable than the rest, from log-probabilities of shape (chain, step, walker).
 
     R̂ and effective sample size do not detect one of them among a hundred, and it would dominate the tails of the
-    result. Draws of one posterior differ by that much less than once in thousands, a walker's best of many practically
-    never.
+    result. Fewer than one in thousands of draws from a posterior is so improbable, and practically never the most
+    probable of a walker's many draws.
     """
     if not values.shape[1]:
         return 0
-    return int(np.count_nonzero(values.max(axis=1) < np.median(values) - _LOST))
+    return int(np.count_nonzero(values.max(axis=1) < np.median(values) - _LOST_BELOW))
 
 
 _WINDOW = 5.0

@@ -45,11 +45,11 @@ class Draws:
     """Sampling time [s], including the steps of earlier calls with a checkpoint."""
     converged: bool
     message: str
-    """Message on the end of the run."""
+    """Reason for the end of the run, with the worst diagnostics."""
     stuck: int
     """Number of walkers that did not move in all the steps kept."""
     modes: tuple[Mode, ...] = ()
-    """Modes of the ensembles, if each ensemble is at rest but they disagree; else empty."""
+    """Modes of the ensembles, if each ensemble is stationary but they disagree; else empty."""
     every: int = 1
     """Thinning: 1, or a power of two if the second half of the steps would take too much memory."""
 

@@ -20,7 +20,7 @@ __all__ = ["changes", "identity_of_run"]
 _START, _COORDINATES = _CONSEQUENCES = ("starting points", "coordinates of the walkers")
 """Entries that follow from the others, if those are complete."""
 
-_LONGEST = 60
+_MAX_CHARACTERS = 60
 """Largest number of characters of an entry in an error message."""
 
 
@@ -46,7 +46,7 @@ def identity_of_run(
         "number of ensembles": str(chains),
         "walkers of an ensemble": str(walkers),
         "block_steps": str(settings.block_steps),
-        "seed of the ensembles": _seed_in_words(seed),
+        "seed of the ensembles": _seed_as_text(seed),
         _START: hashlib.sha256(np.ascontiguousarray(start, dtype="<f8").tobytes()).hexdigest(),
         _COORDINATES: coordinates.digest,
         "version of emcee": version("emcee"),
@@ -59,7 +59,7 @@ def identity_of_run(
     return {**entries, **rest}
 
 
-def _seed_in_words(seed: Seed) -> str:
+def _seed_as_text(seed: Seed) -> str:
     sequence = seed_sequence(seed)
     spawned = f", spawn key {sequence.spawn_key}" if sequence.spawn_key else ""
     return f"{sequence.entropy}{spawned}, pool of {sequence.pool_size}"
@@ -85,8 +85,8 @@ def _shown(text: str | None, at: int) -> str:
     """Return an entry, shortened to the surroundings of a position."""
     if text is None:
         return "not stated"
-    if len(text) <= _LONGEST:
+    if len(text) <= _MAX_CHARACTERS:
         return repr(text)
-    begin = max(0, min(at - _LONGEST // 3, len(text) - _LONGEST))
-    end = begin + _LONGEST
+    begin = max(0, min(at - _MAX_CHARACTERS // 3, len(text) - _MAX_CHARACTERS))
+    end = begin + _MAX_CHARACTERS
     return ("…" if begin else "") + repr(text[begin:end]) + ("…" if end < len(text) else "")

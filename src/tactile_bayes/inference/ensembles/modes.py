@@ -1,4 +1,4 @@
-"""Modes of the posterior: groups of ensembles at rest between which no walker moves."""
+"""Modes of the posterior: groups of stationary ensembles between which no walker moves."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from tactile_bayes.arrays import Flags, Floats
 __all__ = ["Mode", "modes_message", "modes_of"]
 
 
-_APART = 5.0
-"""Distance of two ensembles' means, over the larger of their standard deviations, from which they are apart."""
+_MIN_DISTANCE = 5.0
+"""Distance of two ensembles' means, over the larger of their standard deviations, from which they are separate."""
 
-_AT_REST = 1.1
-"""R̂ of an ensemble's early against its late steps below which it is at rest."""
+_MAX_R_HAT = 1.1
+"""R̂ of an ensemble's early against its late steps below which it is stationary."""
 
-_DRAWS_PER_WALKER = 2.0
-"""Smallest number of effective draws per walker of an ensemble at rest."""
+_MIN_DRAWS_PER_WALKER = 2.0
+"""Smallest number of effective draws per walker of a stationary ensemble."""
 
-_MOST_NAMED = 3
+_MAX_NAMED = 3
 """Largest number of parameters that the message names for a mode."""
 
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode in which some of the ensembles sit, apart from the others."""
+    """Mode that holds some of the ensembles."""
 
     ensembles: tuple[int, ...]
     """Numbers of the ensembles, counted from 0."""
@@ -41,20 +41,20 @@ class Mode:
 def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> tuple[Mode, ...]:
     """Return the modes of the ensembles, from samples (chain, step, walker, parameter) and log-probabilities.
 
-    The result is empty if there is only one mode, or if an ensemble is not at rest: the early and late steps of each
-    ensemble must agree, and its walkers must have forgotten their positions, before disagreement means several modes.
-    So a slow run is not taken for one with several modes.
+    The result is empty if there is only one mode, or if an ensemble is not stationary: only if the early and late steps
+    of each ensemble agree, and its walkers have forgotten their positions, does disagreement between ensembles mean
+    several modes rather than a slow run.
     """
-    if not _at_rest(samples):
+    if not _are_stationary(samples):
         return ()
     mean, deviation = samples.mean(axis=(1, 2)), samples.std(axis=(1, 2))  # (chain, parameter)
     larger = np.maximum(deviation[:, None], deviation)
     distance = np.abs(mean[:, None] - mean) / np.where(larger > 0.0, larger, np.inf)  # (chain, chain, parameter)
-    groups = _connected(distance.max(axis=-1) < _APART)
+    groups = _connected(distance.max(axis=-1) < _MIN_DISTANCE)
     if len(groups) < 2:
         return ()
     clearest = np.argsort(-distance.max(axis=(0, 1)), kind="stable")
-    separating = [i for i in clearest if distance[..., i].max() >= _APART]
+    separating = [i for i in clearest if distance[..., i].max() >= _MIN_DISTANCE]
     return tuple(
         Mode(
             ensembles=group,
@@ -66,12 +66,13 @@ def modes_of(samples: Floats, log_probability: Floats, names: Sequence[str]) -> 
 
 
 def modes_message(modes: Sequence[Mode]) -> str:
+    """Return a message with the ensembles, medians and log-probability of each mode."""
     parts = []
     for mode in modes:
         values = [f"{name} = {value:.6g}" for name, value in mode.values.items()]
-        more = [f"{len(values) - _MOST_NAMED} more"] if len(values) > _MOST_NAMED else []
+        more = [f"{len(values) - _MAX_NAMED} more"] if len(values) > _MAX_NAMED else []
         which = f"{'ensemble' if len(mode.ensembles) == 1 else 'ensembles'} {', '.join(map(str, mode.ensembles))}"
-        where = ", ".join(values[:_MOST_NAMED] + more)
+        where = ", ".join(values[:_MAX_NAMED] + more)
         parts.append(f"{which} near {where} (mean log-probability {mode.log_probability:.1f})")
     return (
         f"ensembles sit in {len(modes)} modes and none of them leaves its own: {'; '.join(parts)}; their shares "
@@ -79,7 +80,7 @@ def modes_message(modes: Sequence[Mode]) -> str:
     )
 
 
-def _at_rest(samples: Floats) -> bool:
+def _are_stationary(samples: Floats) -> bool:
     _, steps, walkers, parameters = samples.shape
     half = steps // 2
     if half < 4:
@@ -90,7 +91,7 @@ def _at_rest(samples: Floats) -> bool:
         with np.errstate(divide="ignore", invalid="ignore"):
             r_hat = array_stats.rhat(halves, chain_axis=0, draw_axis=1, method="rank")
             ess = array_stats.ess(swapped.reshape(1, -1, parameters), chain_axis=0, draw_axis=1, method="bulk")
-        if not (np.all(r_hat < _AT_REST) and np.all(ess >= _DRAWS_PER_WALKER * walkers)):
+        if not (np.all(r_hat < _MAX_R_HAT) and np.all(ess >= _MIN_DRAWS_PER_WALKER * walkers)):
             return False
     return True
 

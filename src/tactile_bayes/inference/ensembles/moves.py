@@ -17,14 +17,14 @@ __all__ = ["FittedMove", "FixedMove", "Moves", "NormalMove", "standard_moves", "
 Moves = Sequence[tuple[Any, float]]
 """Moves of an ensemble, with their shares. They keep nothing from step to step."""
 
-_LEAST_NEW = 0.2
+_MIN_NEW_SHARE = 0.2
 """Smallest share of the new normal draw in a step of `NormalMove`."""
 
-_SMALL = 0.25
-"""Scale of short differences over the usual one, for targets along bent ridges or between bounds."""
+_SHORT_SCALE = 0.25
+"""Scale of short differences over the usual scale, for targets along bent ridges or between bounds."""
 
-_MOST_FIXED, _EFFICIENT = 0.8, 0.5
-"""Largest share of proposals from a fixed distribution, and the efficiency from which it is used."""
+_MAX_FIXED_SHARE, _EFFICIENT = 0.8, 0.5
+"""Largest share of proposals from a fixed distribution, and the efficiency from which it applies."""
 
 
 def step_ensembles(
@@ -124,7 +124,7 @@ class NormalMove(emcee.moves.RedBlueMove):
     ) -> tuple[Floats, Floats]:
         """Return proposals, (n, parameters), and the log of the backward over the forward proposal density, (n,)."""
         moving = sample[:, self._columns]
-        new = random.uniform(_LEAST_NEW, 1.0, len(moving))[:, None]
+        new = random.uniform(_MIN_NEW_SHARE, 1.0, len(moving))[:, None]
         there = np.sqrt(1.0 - new**2) * moving + new * random.standard_normal(moving.shape)
         proposed = sample.copy()
         proposed[:, self._columns] = there
@@ -141,13 +141,13 @@ def standard_moves(proposal: Mixture | None = None) -> Moves:
     """
     if proposal is None:
         return [(FittedMove(), 0.7), (emcee.moves.DEMove(), 0.27), (emcee.moves.DEMove(gamma0=1.0), 0.03)]
-    fixed = _MOST_FIXED * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))
+    fixed = _MAX_FIXED_SHARE * np.sqrt(min(1.0, proposal.efficiency / _EFFICIENT))
     usual = 2.38 / np.sqrt(2.0 * proposal.size)
     moves = [
         (FixedMove(proposal), fixed),
         (FittedMove(), 0.2 * (1.0 - fixed)),
         (emcee.moves.DEMove(gamma0=usual), 0.4 * (1.0 - fixed)),
-        (emcee.moves.DEMove(gamma0=_SMALL * usual), 0.37 * (1.0 - fixed)),
+        (emcee.moves.DEMove(gamma0=_SHORT_SCALE * usual), 0.37 * (1.0 - fixed)),
         (emcee.moves.DEMove(gamma0=1.0), 0.03 * (1.0 - fixed)),
     ]
     return [move for move in moves if move[1]]

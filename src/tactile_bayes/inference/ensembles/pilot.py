@@ -17,25 +17,25 @@ from tactile_bayes.inference.ensembles.straightened import Straightened
 from tactile_bayes.inference.ensembles.target import LogProbability
 from tactile_bayes.inference.ensembles.walkers import first_random_state
 
-__all__ = ["learned"]
+__all__ = ["learn_coordinates"]
 
 _STEPS = (60, 120, 240, 480, 960)
 """Number of steps of each stage, which samples in the best coordinates so far."""
 
-_KEPT = 3000
-"""Largest number of draws of a stage from each half of the walkers, to which coordinates are fitted."""
+_MAX_DRAWS = 3000
+"""Largest number of draws from each half of the walkers to which the coordinates of a stage are fitted."""
 
-_GOOD = 0.25
-"""Quality at which learning stops; that of a normal posterior is 0.4."""
+_GOOD_QUALITY = 0.25
+"""Quality of a proposal from which no further stage is made; it is 0.4 for a normal posterior."""
 
-_JUDGED = 400
-"""Number of draws of the posterior, and of the proposal, by which the proposal is judged."""
+_QUALITY_DRAWS = 400
+"""Number of draws from the posterior, and from the proposal, by which the quality is estimated."""
 
-_LEAST = 0.02
-"""Lower bound of the acceptance from any point, since there are other moves."""
+_MIN_ACCEPTANCE = 0.02
+"""Lower bound of the acceptance probability at any point, since there are other moves."""
 
 
-def learned(
+def learn_coordinates(
     log_probability: LogProbability,
     base: Proposing,
     start: Floats,
@@ -45,8 +45,8 @@ def learned(
 ) -> Proposing:
     """Return coordinates with a proposal in them, learned in stages that sample in the best coordinates so far.
 
-    A proposal judged by its own draws looks good if it is so narrow that they miss a part of the target; here it is
-    judged by positions of the walkers.
+    The quality of a proposal is estimated at positions of the walkers: its own draws would miss the same parts of the
+    target as the proposal, and a narrow one would look good.
 
     Parameters
     ----------
@@ -66,10 +66,10 @@ def learned(
     points = start
     random = first_random_state(np.random.SeedSequence(int(rng.integers(2**63))))
     for steps in _STEPS:
-        walked = in_coordinates(log_probability, best)
-        places = best.of(points)
-        first = Block(places[None, None], walked(places)[None, None], (random,))
-        block = make_block(walked, best.moves(), first, steps, deadline.moment)
+        density = in_coordinates(log_probability, best)
+        coordinates = best.of(points)
+        first = Block(coordinates[None, None], density(coordinates)[None, None], (random,))
+        block = make_block(density, best.moves(), first, steps, deadline.moment)
         if not block.whole:
             raise KeyboardInterrupt
         (random,) = block.random_states
@@ -78,35 +78,35 @@ def learned(
         every = [best.parameters(walker)[0] for walker in np.swapaxes(late[0], 0, 1)]
         share = 1.0 / max(1.0, float(np.median(autocorrelation_time(late))))
         half = len(every) // 2
-        some, others = (rng.permutation(np.concatenate(part))[:_KEPT] for part in (every[:half], every[half:]))
-        most = 0.0
+        some, others = (rng.permutation(np.concatenate(part))[:_MAX_DRAWS] for part in (every[:half], every[half:]))
+        quality = 0.0
         if best.proposal is not None:
-            most = _quality(log_probability, best, np.concatenate([some, others]), rng)
-            best = best.with_proposal(best.proposal.with_efficiency(most))
-        if most < _GOOD and not deadline.has_passed:
-            with suppress(np.linalg.LinAlgError):  # too few have moved for anything to be fitted
-                quality = _quality(log_probability, _straightened(base, some, scale, share), others, rng)
-                if quality > most:
-                    most = quality
-                    best = _straightened(base, np.concatenate([some, others]), scale, share, quality)
-        if most >= _GOOD or deadline.has_passed:
+            quality = _quality(log_probability, best, np.concatenate([some, others]), rng)
+            best = best.with_proposal(best.proposal.with_efficiency(quality))
+        if quality < _GOOD_QUALITY and not deadline.has_passed:
+            with suppress(np.linalg.LinAlgError):  # too few walkers have moved for a fit
+                found = _quality(log_probability, _straightened(base, some, scale, share), others, rng)
+                if found > quality:
+                    quality = found
+                    best = _straightened(base, np.concatenate([some, others]), scale, share, found)
+        if quality >= _GOOD_QUALITY or deadline.has_passed:
             break
     return best
 
 
 def _straightened(base: Proposing, draws: Floats, scale: Floats, share: float, efficiency: float = 0.0) -> Straightened:
-    """Return coordinates fitted to draws, of which a share is independent, and a proposal in them."""
+    """Return coordinates fitted to draws, with a proposal; a share of the draws counts as independent."""
     found = Straightened.fitted(base, draws, scale, share * len(draws))
     return replace(found, proposal=Mixture((replace(Proposal.fitted(found.of(draws)), efficiency=efficiency),)))
 
 
 def _quality(log_probability: LogProbability, coordinates: Proposing, draws: Floats, rng: np.random.Generator) -> float:
-    """Return one over the mean number of proposals until one is accepted, averaged over draws of the posterior."""
+    """Return one over the mean number of proposals until acceptance, averaged over draws from the posterior."""
     target, proposal = in_coordinates(log_probability, coordinates), coordinates.proposal
     assert proposal is not None
-    proposed, density = proposal.draw(rng, _JUDGED)
+    proposed, density = proposal.draw(rng, _QUALITY_DRAWS)
     there = target(proposed) - density
-    chosen = coordinates.of(draws[rng.permutation(len(draws))[:_JUDGED]])
+    chosen = coordinates.of(draws[rng.permutation(len(draws))[:_QUALITY_DRAWS]])
     here = target(chosen) - proposal.log_density(chosen)
     accepted = np.exp(np.minimum(0.0, there - here[:, None])).mean(axis=1)
-    return float(1.0 / np.mean(1.0 / np.maximum(accepted, _LEAST)))
+    return float(1.0 / np.mean(1.0 / np.maximum(accepted, _MIN_ACCEPTANCE)))

@@ -20,29 +20,31 @@ from tactile_bayes.inference.ensembles.target import LogProbability
 __all__ = ["ANYTHING", "GOOD", "Ends", "Mixture", "Proposal", "Random", "approximate", "effective", "flattened"]
 
 _DEGREES_OF_FREEDOM = 10.0
-"""Degrees of freedom of the t distribution: its tails are heavier than normal ones, at little cost."""
+"""Degrees of freedom of the t distribution: its tails are heavier than normal tails, at little cost."""
 
 _WIDENING = 1.1
 """Scale over that of the fitted points: too wide a proposal costs less than too narrow a one."""
 
 _ROUNDS = 8
+"""Largest number of rounds of importance sampling."""
+
 _DRAWS = 60
-"""Number of draws for each parameter in each round."""
+"""Number of draws per parameter in each round."""
 
 GOOD = 0.6
 """Efficiency from which no further round is made."""
 
-_TRIES = 40
-"""Number of times that points beyond the ends are drawn again."""
+_MAX_REDRAWS = 40
+"""Largest number of times that points out of bounds are drawn again."""
 
 _CUTS = np.linspace(-4.0, 1.0, 101)
 """Truncation points of a normal distribution, in standard deviations from its mean: truncation farther below has no
 effect, and farther above most draws would be lost."""
 
-_COUNTED = 4000
-"""Number of draws for the share of a proposal between the ends."""
+_MASS_DRAWS = 4000
+"""Number of draws from which the mass of a proposal within the bounds is estimated."""
 
-_HELD = 5
+_MIN_EFFECTIVE = 5
 """Smallest number of effective draws per parameter for a covariance; weights are made more equal to reach it."""
 
 
@@ -70,9 +72,9 @@ class Ends:
         return np.asarray(((points > self.low) & (points < self.high)).all(axis=1))
 
     def drawn(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Return draws within the bounds: others are drawn again, except a few after too many tries."""
+        """Return draws within the bounds; others are drawn again, up to a largest number of times."""
         points = draw(count)
-        for _ in range(_TRIES):
+        for _ in range(_MAX_REDRAWS):
             out = np.flatnonzero(~self.hold(points))
             if not out.size:
                 break
@@ -111,7 +113,7 @@ class Proposal:
     def fitted(cls, points: Floats, weights: Floats | None = None, ends: Ends = ANYTHING) -> Proposal:
         """Fit a proposal to points, shape (n, parameters), with weights of sum one, in any units of the parameters.
 
-        The points are taken for those of a normal distribution that is truncated at the lower bounds.
+        The points are assumed to come from a normal distribution that is truncated at the lower bounds.
 
         Raises
         ------
@@ -120,18 +122,18 @@ class Proposal:
         """
         weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
         mean = weights @ points
-        apart = points - mean
-        deviation = np.sqrt(weights @ apart**2)
+        centred = points - mean
+        deviation = np.sqrt(weights @ centred**2)
         if not np.all(deviation > 1e-12 * np.abs(mean)):
             raise np.linalg.LinAlgError("a parameter is the same in all points")
-        standard = apart / deviation
+        standard = centred / deviation
         correlation = (weights[:, None] * standard).T @ standard / (1.0 - np.sum(weights**2))
         above = (mean - ends.low) / deviation
         for j in np.flatnonzero(above < -_CUTS[0]):
-            whole, wider = _whole(above[j], correlation[j, j])
+            shift, extra = _untruncated(above[j], correlation[j, j])
             along = correlation[:, j] / correlation[j, j]
-            mean = mean + deviation * along * whole
-            correlation = correlation + wider * np.outer(along, along)
+            mean = mean + deviation * along * shift
+            correlation = correlation + extra * np.outer(along, along)
         return cls(mean, _WIDENING * deviation[:, None] * np.linalg.cholesky(correlation), ends=ends)
 
     @property
@@ -141,10 +143,10 @@ class Proposal:
 
     def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
         """Return points, shape (count, parameters), and their log-density, up to the constant of `log_density`."""
-        points = self.ends.drawn(lambda count: self.anywhere(random, count), count)
+        points = self.ends.drawn(lambda count: self.draw_unbounded(random, count), count)
         return points, self.log_density(points)
 
-    def anywhere(self, random: Random, count: int) -> Floats:
+    def draw_unbounded(self, random: Random, count: int) -> Floats:
         """Return points of the distribution without bounds, shape (count, parameters)."""
         normal = random.standard_normal((count, self.mean.size))
         steps = normal / np.sqrt(random.chisquare(_DEGREES_OF_FREEDOM, count) / _DEGREES_OF_FREEDOM)[:, None]
@@ -201,21 +203,22 @@ class Mixture:
 
     @property
     def digest(self) -> str:
+        """Identity of the mixture, as text."""
         return hashlib.sha256("".join(part.digest for part in self.parts).encode()).hexdigest()
 
     def draw(self, random: Random, count: int) -> tuple[Floats, Floats]:
-        """Draw as `Proposal.draw` does."""
-        points = self.parts[0].ends.drawn(lambda count: self.anywhere(random, count), count)
+        """Return points and their log-density, as `Proposal.draw` does."""
+        points = self.parts[0].ends.drawn(lambda count: self.draw_unbounded(random, count), count)
         return points, self.log_density(points)
 
-    def anywhere(self, random: Random, count: int) -> Floats:
-        """Draw without bounds, as `Proposal.anywhere` does."""
+    def draw_unbounded(self, random: Random, count: int) -> Floats:
+        """Return points of the mixture without bounds, as `Proposal.draw_unbounded` does."""
         counts = random.multinomial(count, self.shares)
-        parts = [part.anywhere(random, int(each)) for part, each in zip(self.parts, counts, strict=True)]
+        parts = [part.draw_unbounded(random, int(each)) for part, each in zip(self.parts, counts, strict=True)]
         return np.concatenate(parts)[random.permutation(count)]
 
     def log_density(self, points: Floats) -> Floats:
-        """Return the log-density as `Proposal.log_density` does."""
+        """Return the log-density, as `Proposal.log_density` does."""
         with np.errstate(divide="ignore"):  # a part without mass has no share
             shares = np.log(self.shares)
         each = [share + part.log_density(points) for share, part in zip(shares, self.parts, strict=True)]
@@ -244,18 +247,19 @@ def approximate(
             break
         points, density = proposal.draw(rng, _DRAWS * centre.size)
         surplus = log_probability(points) - density
-        if not np.isfinite(surplus).sum() > _HELD * centre.size:
+        if not np.isfinite(surplus).sum() > _MIN_EFFECTIVE * centre.size:
             break
         efficiency = effective(normalised(surplus)) / len(points)
         if efficiency > best.efficiency:
             log_mass = float(logsumexp(surplus) - np.log(len(points)))
             if ends is not ANYTHING:
-                log_mass += float(np.log(max(ends.hold(proposal.anywhere(rng, _COUNTED)).mean(), 1.0 / _COUNTED)))
+                within = ends.hold(proposal.draw_unbounded(rng, _MASS_DRAWS)).mean()
+                log_mass += float(np.log(max(within, 1.0 / _MASS_DRAWS)))
             best = replace(proposal, efficiency=efficiency, log_mass=log_mass)
         if best.efficiency >= GOOD:
             break
         try:
-            proposal = Proposal.fitted(points, flattened(surplus, _HELD * centre.size), ends)
+            proposal = Proposal.fitted(points, flattened(surplus, _MIN_EFFECTIVE * centre.size), ends)
         except np.linalg.LinAlgError:
             break
     return best
@@ -276,9 +280,10 @@ def normalised(surplus: Floats) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def _whole(above: float, variance: float) -> tuple[float, float]:
-    """Return the changes of mean and variance, in standard deviations, that undo the truncation of a normal
-    distribution whose bound lies `above` below its truncated mean.
+def _untruncated(above: float, variance: float) -> tuple[float, float]:
+    """Return the changes of mean and variance that undo the truncation of a normal distribution.
+
+    Its lower bound lies `above` below the truncated mean; all numbers are in truncated standard deviations.
     """
     mills = np.exp(-0.5 * _CUTS**2) / (np.sqrt(2.0 * np.pi) * ndtr(-_CUTS))
     narrow = np.sqrt(1.0 - mills * (mills - _CUTS))

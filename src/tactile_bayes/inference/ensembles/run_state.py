@@ -111,8 +111,8 @@ class RunState:
 
     def _as_parameters(self, part: StoredSteps) -> StoredSteps:
         shape = part.samples.shape
-        points, growth = self.coordinates.parameters(part.samples.reshape(-1, shape[-1]))
-        return part._replace(samples=points.reshape(shape), values=part.values - growth.reshape(shape[:-1]))
+        points, log_jacobian = self.coordinates.parameters(part.samples.reshape(-1, shape[-1]))
+        return part._replace(samples=points.reshape(shape), values=part.values - log_jacobian.reshape(shape[:-1]))
 
 
 def _thinning(steps: int, block: Block) -> int:

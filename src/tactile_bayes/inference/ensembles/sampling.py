@@ -93,7 +93,7 @@ def sample(
     progress : callable, optional
         Called with a `Progress` after each diagnosis.
     checkpoint : path-like, optional
-        Folder, created if missing, in which every block of steps is kept (see Notes).
+        Folder, created if missing, in which every block of steps is stored (see Notes).
     identity : mapping of str to str, optional
         All that determines the log-probability, for the checkpoint: hash of the data, model, priors and the like. The
         arguments of `sample` are added to it.
@@ -115,7 +115,7 @@ def sample(
         If walkers start outside the support or in a plane, or the log-probability is NaN or +inf somewhere; if the
         checkpoint belongs to another run, has another format, is damaged or in use, or the folder holds other files.
     OSError
-        If a block cannot be written. Those before it are kept.
+        If a block cannot be written; the blocks before it remain.
 
     Notes
     -----
@@ -154,7 +154,7 @@ def sample(
         if stored is not None and stored.steps:
             state = _resumed(stored, coordinates, points)
             began, target.evaluations = began - stored.seconds, chains * walkers * (1 + state.steps)
-            due = state.steps if stored.judged == state.steps else 0
+            due = state.steps if stored.ended_at == state.steps else 0
         else:
             state = RunState.begin(coordinates, _first_block(points, density, seed))
         due = due or next_diagnosis(state.steps - 1, settings.block_steps)  # also if it was killed before a diagnosis

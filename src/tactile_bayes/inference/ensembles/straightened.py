@@ -14,14 +14,14 @@ from tactile_bayes.inference.ensembles.proposal import Mixture
 
 __all__ = ["Straightened"]
 
-_FARTHEST = 1e100
-"""Bound of a coordinate, whose square remains finite."""
+_MAX_COORDINATE = 1e100
+"""Bound of a coordinate, whose square is finite."""
 
-_NEAR = 0.1
-"""Share of the draws, those nearest to the centre, from which principal directions are found."""
+_CENTRAL_SHARE = 0.1
+"""Share of the draws, nearest to the centre, from which principal directions are estimated."""
 
-_SURE = 3.0
-"""Smallest significance of a bend, in standard errors: uncertain ones would distort the coordinates."""
+_MIN_SIGNIFICANCE = 3.0
+"""Smallest significance of a bend, in standard errors: an uncertain bend would distort the coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +72,15 @@ class Straightened:
         numpy.linalg.LinAlgError
             If the draws lie in a plane.
         """
-        places = base.of(points)
-        mean: Floats = places.mean(axis=0)
-        apart: Floats = places - mean
-        distances = np.sum(np.square(_solved(np.asarray(np.linalg.cholesky(np.cov(places.T))), apart)), axis=1)
-        near = places[distances <= np.quantile(distances, _NEAR)]  # where bends have not made narrow directions wide
+        coordinates = base.of(points)
+        mean: Floats = coordinates.mean(axis=0)
+        deviations: Floats = coordinates - mean
+        root = np.asarray(np.linalg.cholesky(np.cov(coordinates.T)))
+        distances = np.sum(np.square(_solved(root, deviations)), axis=1)
+        # Farther out, bends make narrow directions wide.
+        near = coordinates[distances <= np.quantile(distances, _CENTRAL_SHARE)]
         root = _principal(np.cov(near.T), scale)
-        straight = _solved(root, apart)
+        straight = _solved(root, deviations)
         root, straight = root * straight.std(axis=0), straight / straight.std(axis=0)
         bends = np.zeros(3 * scale.shape)
         for k in range(1, scale.size):
@@ -88,13 +90,14 @@ class Straightened:
             gram = count / len(points) * design.T @ design + np.eye(design.shape[1])
             solved = np.linalg.solve(gram, count / len(points) * straight[:, k] @ design)
             left = np.mean(np.square(straight[:, k] - design @ solved))
-            certain = np.abs(solved) > _SURE * np.sqrt(left * np.diag(np.linalg.inv(gram)))
+            certain = np.abs(solved) > _MIN_SIGNIFICANCE * np.sqrt(left * np.diag(np.linalg.inv(gram)))
             bends[k, one, other] = np.where(certain, solved, 0.0)[1 + k :]
             straight[:, k] -= products @ bends[k, one, other]
         return cls(base, mean, root, bends)
 
     @property
     def digest(self) -> str:
+        """Identity of the coordinates, as text."""
         arrays = (self.mean, self.root, self.bends)
         content = b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)
         proposal = "" if self.proposal is None else self.proposal.digest
@@ -111,7 +114,7 @@ class Straightened:
         for k, bend in enumerate(self.bends):
             one, other = np.nonzero(bend)
             bent = straight[:, k] - (straight[:, one] * straight[:, other]) @ bend[one, other]
-            straight[:, k] = np.clip(bent, -_FARTHEST, _FARTHEST)
+            straight[:, k] = np.clip(bent, -_MAX_COORDINATE, _MAX_COORDINATE)
         return straight.reshape(points.shape)
 
     def with_proposal(self, proposal: Mixture) -> Straightened:
@@ -121,8 +124,9 @@ class Straightened:
         return standard_moves(self.proposal)
 
 
-def _solved(root: Floats, apart: Floats) -> Floats:
-    return np.array(np.linalg.solve(root, apart.T).T, dtype=np.float64)
+def _solved(root: Floats, deviations: Floats) -> Floats:
+    """Return deviations, (n, d), in units of the root's columns."""
+    return np.array(np.linalg.solve(root, deviations.T).T, dtype=np.float64)
 
 
 def _principal(covariance: Floats, scale: Floats) -> Floats:
