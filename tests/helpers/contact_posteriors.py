@@ -295,7 +295,7 @@ def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", frict
 def weighed_moments(density: ContactDensity, draws=16000, seed=1):
     """The ten numbers of each sample from weighted proposals, and the number of draws that these are worth."""
     weights = weigh_contacts(density, draws, np.random.SeedSequence(seed))
-    places = density.to_lab_frame(weights.place)[:3]
+    places = density.to_lab_frame(weights.contact)[:3]
     tangential = weights.points[..., 0] < 0.0
     each = []
     for i, log_weight in enumerate(weights.log_weight.T):

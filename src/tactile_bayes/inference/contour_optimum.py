@@ -7,10 +7,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import InferenceError
 from tactile_bayes.inference.contour_model import ContourModel
 from tactile_bayes.inference.deadline import NEVER, Deadline
@@ -69,9 +68,9 @@ class ContourOptimum(NamedTuple):
 class Brackets(NamedTuple):
     """Drive angles as read, in the sweep frame, between which contact begins or ends; one entry per event."""
 
-    segment: NDArray[np.intp]
+    segment: Index
     """Number of the sweep segment."""
-    ends: NDArray[np.intp]
+    ends: Index
     """0 for first contact, 1 for snap-off."""
     low: Floats
     high: Floats
@@ -112,7 +111,7 @@ def event_brackets(model: ContourModel) -> Brackets:
     return Brackets(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
 
 
-def _certainly_loaded(model: ContourModel) -> NDArray[np.bool_]:
+def _certainly_loaded(model: ContourModel) -> Flags:
     """Return True for samples whose load noise does not explain, each taken by itself."""
     measured, present = model.likelihood.measured[:, model.present], model.present
     zero = np.where(np.isfinite(model.zero[present]), model.zero[present], np.median(measured, axis=0))

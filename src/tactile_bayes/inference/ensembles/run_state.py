@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.coordinates import Coordinates
 from tactile_bayes.inference.ensembles.diagnosis import Diagnosis
@@ -25,13 +24,13 @@ class StoredSteps(NamedTuple):
 
     first: int
     """Number of the first step, counted from 1."""
-    numbers: NDArray[np.intp]
+    numbers: Index
     """Numbers of the stored steps."""
     samples: Floats
     """Samples of the stored steps, shape (chain, step, walker, parameter)."""
     values: Floats
     """Their log-probability, shape (chain, step, walker)."""
-    moved: NDArray[np.bool_]
+    moved: Flags
     """True if a walker moved in a step, for all steps, shape (chain, step, walker)."""
 
     def since(self, steps: int, every: int) -> StoredSteps:
@@ -105,7 +104,7 @@ class RunState:
         return replace(self, every=every, half=half, recent=()), Diagnosis(half.samples)
 
     @property
-    def moved(self) -> NDArray[np.bool_]:
+    def moved(self) -> Flags:
         """True if a walker moved in a step, for all of the second half except the first; (chain, step, walker)."""
         return self.half.moved[:, 1:]
 
