@@ -23,10 +23,10 @@ _STEP = 1e-4
 """Step of the differences by which loads are linearised, over the scale of each coordinate."""
 
 _MIN_CHANGE = 0.03
-"""Singular value of the linearised residuals, in standard deviations per prior scale, below which it is noise."""
+"""Smallest significant singular value of the linearised residuals, in standard deviations per prior scale."""
 
-_SURE = 0.01
-"""Smallest standard deviation of a snap-off, over half a step of the drive."""
+_MIN_WIDTH = 0.01
+"""Smallest standard deviation of a snap-off, over half a step of the drive angle."""
 
 _RIDGE = 1e-12
 """Share by which precisions are raised, so that they stay positive definite despite rounding."""
@@ -99,12 +99,12 @@ class Observer:
         beyond /= self.noise
         return beyond, agree, late[:, self.ends]
 
-    def insist(self, point: Floats) -> bool:
+    def narrow_snap_offs(self, point: Floats) -> bool:
         """Reduce the widths of snap-offs that a point, (1, parameters), misses; return True if there are any."""
         _, _, late = self(self.model.contours(point), self.model.values(point))
         off = np.zeros(self._width.size, dtype=bool)
         off[self.ends] = np.abs(late[0]) * self._width[self.ends] > self._within[self.ends]
-        off &= self._width > _SURE * self._within
+        off &= self._width > _MIN_WIDTH * self._within
         self._width = np.where(off, self._width / 3.0, self._width)
         return bool(off.any())
 

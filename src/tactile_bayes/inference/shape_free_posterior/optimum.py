@@ -25,7 +25,7 @@ _ROUNDS = 20
 """Largest number of linearisations."""
 
 _GAINED = 0.5
-"""Gain in log-density below which the rounds end."""
+"""Smallest gain in log-density of a round for another one to follow."""
 
 _SHORTER = np.append(0.0, 0.5 ** np.arange(8))
 """Step lengths that are tried, over the full Gauss-Newton step."""
@@ -33,7 +33,7 @@ _SHORTER = np.append(0.0, 0.5 ** np.arange(8))
 _MAX_LOG_STEP = 0.7
 """Largest change of the logarithm of a scale in a round."""
 
-_INSIDE = 1e-3
+_MIN_BOUND_DISTANCE = 1e-3
 """Smallest distance of the logarithm of a scale from its bounds."""
 
 _DRAWS = 4000
@@ -63,7 +63,7 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
             if probability <= found[0]:
                 break
             found, best = (probability, scales, linear), -np.inf
-            if deadline.has_passed or not observer.insist(here):
+            if deadline.has_passed or not observer.narrow_snap_offs(here):
                 break
     _, scales, linear = found
     return Whitening(NormalApproximation(observer, prior, scales, linear), scales)
@@ -81,8 +81,8 @@ def _likeliest(model: ContourModel, approximation: NormalApproximation, scales: 
 
     here = np.log(scales)
     with np.errstate(divide="ignore"):
-        least = np.maximum(np.log(model.low[columns]) + _INSIDE, here - _MAX_LOG_STEP)
-        most = np.minimum(np.log(model.high[columns]) - _INSIDE, here + _MAX_LOG_STEP)
+        least = np.maximum(np.log(model.low[columns]) + _MIN_BOUND_DISTANCE, here - _MAX_LOG_STEP)
+        most = np.minimum(np.log(model.high[columns]) - _MIN_BOUND_DISTANCE, here + _MAX_LOG_STEP)
     return np.exp(
         minimize(cost, here, method="L-BFGS-B", bounds=list(zip(least.tolist(), most.tolist(), strict=True))).x
     )

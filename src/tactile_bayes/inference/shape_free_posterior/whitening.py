@@ -59,7 +59,7 @@ class Whitening:
         """Return the model's parameters, (n, parameters), and the log of the Jacobian determinant, (n,)."""
         points, growth = np.empty(coordinates.shape), np.empty(len(coordinates))
         for part in np.array_split(np.arange(len(coordinates)), max(1, len(coordinates) // 500)):
-            points[part], growth[part] = self._moved(coordinates[part])
+            points[part], growth[part] = self._parameters(coordinates[part])
         return points, growth
 
     def of(self, points: Floats) -> Floats:
@@ -69,9 +69,11 @@ class Whitening:
         return np.hstack([np.log(scales), (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled])
 
     def moves(self) -> Moves:
+        """Return the moves of an ensemble, with their shares."""
         return whitened_moves(self.bent)
 
-    def _moved(self, coordinates: Floats) -> tuple[Floats, Floats]:
+    def _parameters(self, coordinates: Floats) -> tuple[Floats, Floats]:
+        """Return parameters and log-determinants as `parameters` does, of all coordinates at once."""
         bent = self.bent
         middle = np.log(self.scales)
         away = coordinates[:, :bent] - middle
