@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 from scipy.special import gamma, kv
 
 from tactile_bayes.contours import Parabola, Smooth, paper_profile
@@ -81,6 +82,8 @@ def whitened(model):
 
 
 SI = Rod(length=0.1, flexural_rigidity=2e-4)
+RUBBING = ("friction", "bias", "suspension_compliance", "rigidity_scale")
+"""With those that may vanish, between others."""
 
 
 @pytest.mark.parametrize(
@@ -129,14 +132,21 @@ def test_in_its_coordinates_the_posterior_is_nearly_standard_normal():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("profile", "nuisances"), [("I", STANDARD), ("II", STANDARD), ("II", []), ("III", STANDARD)])
-def test_a_smooth_contour_is_within_its_band(profile, nuisances):
-    """Converged in less than 60,000 evaluations; 95 % band, of nine places at most one is outside."""
+@pytest.mark.parametrize(
+    ("profile", "nuisances", "evaluations"),
+    [("I", STANDARD, 100_000), ("II", STANDARD, 100_000), ("II", [], 60_000), ("III", STANDARD, 100_000)],
+)
+def test_a_smooth_contour_is_within_its_band(profile, nuisances, evaluations):
+    """Converged in some 250 steps; 95 % band, of nine places at most one is outside.
+
+    With the nuisances there are 43 parameters in place of 34, and as a step moves two walkers for each parameter in
+    each of four ensembles, it makes 344 evaluations in place of 272.
+    """
     truth = paper_profile(profile, q=0.5)
     measured = CELL.measure(scan(truth, drive_step=np.radians(1.0)).record, seed=1)
     result = infer_contour(measured, family="shape-free", load_cell=CELL, nuisances=nuisances, seed=1)
     assert result.attrs["converged"], result.attrs["message"]
-    assert result["sample_stats"].attrs["evaluations"] < 60_000
+    assert result["sample_stats"].attrs["evaluations"] < evaluations
     x = np.linspace(-0.6, 0.6, 9)
     band = contour_band(result, x)
     inside = (band.lower <= truth.height(x)) & (truth.height(x) <= band.upper)
@@ -171,6 +181,40 @@ def test_what_goes_on_from_a_checkpoint_is_the_same(tmp_path):
     resumed, whole = run(20, checkpoint=tmp_path / "run"), run(20)
     for name, draws in whole["posterior"].data_vars.items():
         np.testing.assert_array_equal(draws, resumed["posterior"][name])
+
+
+def test_what_may_vanish_does_not_end_the_coordinates():
+    """Their volume is that of the map, and the centre is possible, though the record was made without friction."""
+    model = model_of(RUBBING)
+    whitening = whitened(model)
+    vanishing = np.flatnonzero(model.may_vanish)
+    assert vanishing.size == 2
+    assert np.isfinite(model.log_probability(whitening.centre[None]))
+    normal = np.random.default_rng(3).normal(size=(200, whitening.middle.size - whitening.bent))
+    normal[:3, -2:] = [[-8.0, 8.0], [-40.0, 0.0], [30.0, -30.0]]
+    there = np.hstack([np.tile(np.log(whitening.scales), (200, 1)), normal])
+    points, growth = whitening.parameters(there)
+    assert np.all(points[3:, vanishing] > 0.0)
+    assert not np.isnan(growth).any()
+    np.testing.assert_allclose(whitening.of(points[3:]), there[3:], atol=1e-5)
+    steps = 1e-5 * np.eye(there.shape[1])
+    ahead, behind = (whitening.parameters(there[3] + sign * steps)[0] for sign in (1.0, -1.0))
+    _, determinant = np.linalg.slogdet((ahead - behind) / 2e-5)
+    assert growth[3] == pytest.approx(determinant, abs=1e-4)
+
+
+def test_time_that_ends_before_anything_possible_is_found_gives_what_the_prior_allows():
+    """Of a vertex far above where the rod was: no approximation by normal distributions leads there."""
+    kept = infer_contour(
+        CELL.measure(scan(Parabola(0.5, 0.5), drive_step=0.06).record, seed=1),
+        family="shape-free",
+        load_cell=CELL,
+        priors={"q": stats.uniform(0.9, 0.05)},
+        seed=1,
+        settings=SamplerSettings(ensembles=2, max_seconds=1e-3),
+    )
+    assert kept.attrs["message"].startswith("not converged, the time allowed ran out")
+    assert ((kept["posterior"].q > 0.9) & (kept["posterior"].q < 0.95)).all()
 
 
 def test_coordinates_lead_back():

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_triangular
+from scipy.special import log_ndtr, ndtri_exp
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours import Contour, Smooth
 from tactile_bayes.contours.shape_free_family import ShapeFreeFamily
 from tactile_bayes.inference.contour_model import ContourModel
+from tactile_bayes.inference.nuisances import MAY_VANISH
 from tactile_bayes.reconstruction import loaded_samples
 from tactile_bayes.record import CHANNELS
 
@@ -31,6 +34,9 @@ _MIN_WIDTH = 0.01
 _RIDGE = 1e-12
 """Share by which precisions are raised, so that they stay positive definite despite rounding."""
 
+_FAR_DOWN = -35.0
+"""Standard normal number of which, and of all below, a truncation at less changes nothing."""
+
 _HUBER_THRESHOLD = 4.0
 """Residual in standard deviations from which Huber's loss is linear."""
 
@@ -48,9 +54,12 @@ def scale_names(model: ContourModel) -> tuple[str, ...]:
 
 
 def linear_names(model: ContourModel) -> tuple[str, ...]:
-    """Return the parameters in which loads are linearised, r by its logarithm: all but those of `scale_names`."""
+    """Return the parameters in which loads are linearised, r by its logarithm: all but those of `scale_names`.
+
+    Those that may vanish come last.
+    """
     rough = [name for name in model.family.parameters if name not in _OF_ROUGHNESS]
-    return (*rough, *model.nuisances.names)
+    return (*rough, *sorted(model.nuisances.names, key=MAY_VANISH.__contains__))
 
 
 def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
@@ -61,9 +70,12 @@ def split(model: ContourModel, points: Floats) -> tuple[Floats, Floats]:
     return np.stack([values[name] for name in scale_names(model)], axis=1), linear
 
 
-def joined(scales: Floats, linear: Floats) -> Floats:
+def joined(model: ContourModel, scales: Floats, linear: Floats) -> Floats:
     """Return the model's parameters, (n, parameters), from scales and linear parameters."""
-    return np.hstack([np.exp(linear[:, :1]), scales[:, :2], linear[:, 1:], scales[:, 2:]])
+    names = (*scale_names(model), *linear_names(model))
+    points = np.empty((len(linear), len(names)))
+    points[:, [model.names.index(name) for name in names]] = np.hstack([scales, np.exp(linear[:, :1]), linear[:, 1:]])
+    return points
 
 
 class Observer:
@@ -126,7 +138,8 @@ class NormalApproximation:
     """Normal distribution of the linear parameters, given amplitude and length scale of the random radius, and noise.
 
     It is exact if loads and snap-offs are linear in the logarithms of the radii and in the rig, and priors are normal.
-    Its dependence on the length scale is tabulated at those of the random radius, and interpolated.
+    Its dependence on the length scale is tabulated at those of the random radius, and interpolated. Parameters that may
+    vanish, like friction, have the positive part of the distribution alone.
 
     Parameters
     ----------
@@ -143,6 +156,7 @@ class NormalApproximation:
         family = observer.model.family
         assert isinstance(family, ShapeFreeFamily)
         known, self._count = family.radius.directions, family.radius.count
+        self.vanishing = int(np.count_nonzero(observer.model.may_vanish))
         slopes, self._observed, self._kinds, self._readings = _linearised(observer, family, prior, scales, linear)
         # The map from linear parameters to observations, at every length scale of the tabulated directions.
         nodes = known.values.shape[1]
@@ -173,9 +187,44 @@ class NormalApproximation:
         return np.linalg.solve(root, pull)[..., 0], np.asarray(root)
 
     def mean(self, scales: Floats) -> Floats:
-        """Return the mean of the linear parameters, shape (d,), given scales of shape (scales,)."""
-        pulled, root = (of_one[0] for of_one in self.conditional(scales[None]))
-        return np.asarray(solve_triangular(root.T, pulled))
+        """Return the mean of the linear parameters, shape (d,), given scales of shape (scales,).
+
+        Of parameters that may vanish it is the median.
+        """
+        pulled, root = self.conditional(scales[None])
+        pulled += self.truncated(pulled, root, np.zeros(pulled.shape))[0]
+        return np.asarray(solve_triangular(root[0].T, pulled[0]))
+
+    def truncated(self, pulled: Floats, root: Floats, normal: Floats) -> tuple[Floats, Floats]:
+        """Return standard normal numbers, (n, d), as those by which parameters that may vanish are positive, and the
+        log of the determinant of that map, (n,); `conditional` gives the other arguments.
+
+        Since these parameters come last and Lᵀ is upper triangular, each depends on its own number and later ones only.
+        """
+        normal, growth = normal.copy(), np.zeros(len(normal))
+        for k, least in self._least(pulled, root, normal):
+            whole = log_ndtr(-least)
+            cut = np.where(normal[:, k] > _FAR_DOWN, -ndtri_exp(log_ndtr(-normal[:, k]) + whole), normal[:, k])
+            growth += 0.5 * (np.square(cut) - np.square(normal[:, k])) + whole
+            normal[:, k] = cut
+        return normal, growth
+
+    def untruncated(self, pulled: Floats, root: Floats, normal: Floats) -> Floats:
+        """Return the numbers of which `truncated` makes those given."""
+        numbers = normal.copy()
+        for k, least in self._least(pulled, root, normal):
+            share = np.minimum(log_ndtr(-normal[:, k]) - log_ndtr(-least), 0.0)
+            numbers[:, k] = np.where(normal[:, k] > _FAR_DOWN, -ndtri_exp(share), normal[:, k])
+        return numbers
+
+    def _least(self, pulled: Floats, root: Floats, normal: Floats) -> Iterator[tuple[int, Floats]]:
+        """Give columns of parameters that may vanish, and the numbers, (n,), at which they do, given later numbers."""
+        size = normal.shape[1]
+        linear = np.zeros((len(normal), 0))
+        for k in range(size - 1, size - 1 - self.vanishing, -1):
+            least = np.einsum("ij,ij->i", root[:, k + 1 :, k], linear) - pulled[:, k]
+            yield k, least
+            linear = np.column_stack([(normal[:, k] - least) / root[:, k, k], linear])
 
     def log_evidence(self, scales: Floats) -> float:
         """Return the log-density of readings and snap-offs given scales of shape (scales,), up to a constant."""
@@ -207,7 +256,8 @@ def _linearised(
     steps = _STEP * units
     points = np.concatenate([centre + np.diag(steps), centre - np.diag(steps), centre[None]])
     contours = Smooth(points[:, :nodes], q=points[:, nodes], x_c=points[:, nodes + 1])
-    residual, agree, late = observer(contours, dict(zip(model.nuisances.names, points[:, nodes + 2 :].T, strict=True)))
+    rig = linear_names(model)[count + 3 :]
+    residual, agree, late = observer(contours, dict(zip(rig, points[:, nodes + 2 :].T, strict=True)))
     # A sample that is loaded on one side of a difference only has no slope.
     smooth = agree[-1] & (agree == agree[-1]).all(axis=0)
     observed, counts = [], []

@@ -54,11 +54,11 @@ def whitening_at(model: ContourModel, point: Floats, rng: np.random.Generator, d
         approximation = NormalApproximation(observer, prior, scales, linear)
         scales = _likeliest(model, approximation, scales)
         tried = linear + _SHORTER[:, None] * (approximation.mean(scales) - linear)
-        density = observer.log_density(joined(np.tile(scales, (len(tried), 1)), tried))
+        density = observer.log_density(joined(model, np.tile(scales, (len(tried), 1)), tried))
         density -= 0.5 * (np.square(tried - prior.mean) * prior.precision).sum(axis=1)
         linear, before, best = tried[np.argmax(density)], best, float(density.max())
         if best - before < _GAINED or deadline.has_passed:
-            here = joined(scales[None], linear[None])
+            here = joined(model, scales[None], linear[None])
             probability = float(model.log_probability(here)[0])
             if probability <= found[0]:
                 break

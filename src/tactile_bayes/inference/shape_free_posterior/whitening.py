@@ -27,7 +27,8 @@ class Whitening:
 
     Given the scales (amplitude and length scale of the random radius, and the noise), the approximation gives mean and
     covariance of all other parameters. The coordinates are the logarithms of the scales, and the other parameters
-    standardised by that mean and covariance, which makes them nearly independent and standard normal.
+    standardised by that mean and covariance, which makes them nearly independent and standard normal; of those that may
+    vanish by the positive part of that distribution, so that no coordinate ends at a wall.
     """
 
     approximation: NormalApproximation
@@ -42,7 +43,7 @@ class Whitening:
     @property
     def digest(self) -> str:
         """Hash of all that determines the change of variables."""
-        arrays = (*self.approximation.arrays, self.scales)
+        arrays = (*self.approximation.arrays, self.scales, np.ones(self.approximation.vanishing))
         return hashlib.sha256(b"".join(np.ascontiguousarray(a, dtype="<f8").tobytes() for a in arrays)).hexdigest()
 
     @property
@@ -66,7 +67,8 @@ class Whitening:
         """Return the coordinates of the model's parameters, (n, parameters)."""
         scales, linear = split(self.approximation.model, points)
         pulled, root = self.approximation.conditional(scales)
-        return np.hstack([np.log(scales), (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled])
+        normal = (np.swapaxes(root, 1, 2) @ linear[..., None])[..., 0] - pulled
+        return np.hstack([np.log(scales), self.approximation.untruncated(pulled, root, normal)])
 
     def moves(self) -> Moves:
         """Return the moves of an ensemble, with their shares."""
@@ -79,8 +81,9 @@ class Whitening:
         away = coordinates[:, :bent] - middle
         scales: Floats = np.exp(middle + np.clip(away, -_FAR, _FAR))
         pulled, root = self.approximation.conditional(scales)
-        linear = np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + coordinates[:, bent:])[..., None])[..., 0]
+        normal, growth = self.approximation.truncated(pulled, root, coordinates[:, bent:])
+        linear = np.linalg.solve(np.swapaxes(root, 1, 2), (pulled + normal)[..., None])[..., 0]
         linear[:, 0] = np.clip(linear[:, 0], -_LARGEST, _LARGEST)
-        volume = np.log(scales).sum(axis=1) - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+        volume = np.log(scales).sum(axis=1) - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1) + growth
         volume[(np.abs(away) > _FAR).any(axis=1)] = -np.inf
-        return joined(scales, np.asarray(linear)), linear[:, 0] + volume
+        return joined(self.approximation.model, scales, np.asarray(linear)), linear[:, 0] + volume
