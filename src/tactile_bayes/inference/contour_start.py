@@ -30,6 +30,7 @@ from tactile_bayes.inference.ensembles import (
 from tactile_bayes.inference.flank_coordinates import FlankCoordinates
 from tactile_bayes.inference.misfit import what_to_try
 from tactile_bayes.inference.shape_free_posterior.optimum import whitening_at
+from tactile_bayes.inference.shape_free_posterior.whitening import Whitening
 from tactile_bayes.inference.start import Cloud, gather
 
 __all__ = ["Walk", "walk_of"]
@@ -113,10 +114,34 @@ def _whitened(
         other = whitening_at(model, optimum_of(model, rng, deadline).point, rng, deadline)
         if whitening is None or _misfit(model, other.centre) < _misfit(model, whitening.centre):
             whitening = other
+    try:
+        return _whitened_around(model, whitening, whitening.middle, seed, rng, settings, deadline)
+    except InferenceError as error:
+        if not deadline.has_passed:
+            raise _nothing_describes(model, "shape-free contour") from error
+    # Time is up, and nothing near where the search ended is possible: what is, however far from the record, will do.
+    drawn, _ = model.draw_prior(rng, _SCALE_DRAWS, deadline)
+    point = drawn[np.argmax(model.log_probability(drawn))]
+    whitening = whitening_at(model, point, rng, deadline)
+    return _whitened_around(model, whitening, whitening.of(point[None])[0], seed, rng, settings, deadline)
+
+
+def _whitened_around(
+    model: ContourModel,
+    whitening: Whitening,
+    centre: Floats,
+    seed: np.random.SeedSequence,
+    rng: np.random.Generator,
+    settings: SamplerSettings,
+    deadline: Deadline,
+) -> Walk:
+    """Walkers around a centre, in whitening coordinates."""
     log_probability = in_coordinates(model.log_probability, whitening)
-    spread = np.full(whitening.middle.size, _WHITENED_SPREAD)
+    spread = np.full(centre.size, _WHITENED_SPREAD)
     spread[: whitening.bent] = [_ROUGHNESS_SPREAD] * 2 + [_NOISE_SPREAD] * len(model.noise.names)
-    cloud = gather(log_probability, whitening.middle, np.diag(np.square(spread)), rng, deadline)
+    cloud = gather(log_probability, centre, np.diag(np.square(spread)), rng, deadline)
+    if not cloud.is_possible:
+        raise InferenceError("nothing near is possible")
     count = len(spread)
     start = scatter_walkers(
         lambda points: np.where(log_probability(points) > cloud.floor_by(deadline), 0.0, -np.inf),
@@ -127,6 +152,15 @@ def _whitened(
     )
     # If posteriors are standard normal in these coordinates, their evidences differ as their densities at the centre.
     return Walk(start, whitening, float(log_probability(whitening.middle[None])[0]))
+
+
+def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:
+    """The error that says what to look at, and what to try."""
+    return InferenceError(
+        f"no {what} was found that describes the record{nearest}: are units, signs, drive angle, rod and base right? "
+        "tactile-bayes inspect may tell. "
+        + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
+    )
 
 
 def _misfit(model: ContourModel, point: Floats) -> float:
@@ -180,11 +214,7 @@ def _scattered(
     except InferenceError as error:
         point = modes[0].optimum.point
         best = ", ".join(f"{name} = {value:.6g}" for name, value in zip(model.names, point, strict=False))
-        raise InferenceError(
-            f"no {model.family.name} was found that describes the record (the nearest has {best}): are units, "
-            "signs, drive angle, rod and base right? tactile-bayes inspect may tell. "
-            + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
-        ) from error
+        raise _nothing_describes(model, model.family.name, f" (the nearest has {best})") from error
     coordinates = common.with_proposal(proposal)
     if proposal.efficiency < _EFFICIENT and not deadline.has_passed:
         size = len(model.names)

@@ -187,6 +187,8 @@ class Cloud:
     """Least log-probability of a start."""
     ends: Ends = ANYTHING
     """Bounds of the points."""
+    is_possible: bool = True
+    """Whether any point was found that is possible."""
 
     @property
     def narrow_covariance(self) -> Floats:
@@ -245,6 +247,8 @@ def gather(
         floor = top - _DEFICIT * size
         if np.mean(values > floor) > 0.5 or (deadline.has_passed and np.mean(np.isfinite(values)) > _SOME):
             break
+        if top == -np.inf and deadline.has_passed:  # there is nothing to gather around
+            break
         best = np.argsort(values)[-12 * size :]
         best = best[np.isfinite(values[best])]
         if np.count_nonzero(values > floor) > 2 * size:
@@ -252,7 +256,8 @@ def gather(
         else:  # nearly all are far less probable than the best so far
             centre = points[best[-1]] if best.size and values[best[-1]] == top else centre
             covariance = 0.25 * covariance
-    return replace(cloud, floor=float(min(floor, np.quantile(values, 0.8, method="lower"))))
+    floor = float(min(floor, np.quantile(values, 0.8, method="lower")))
+    return replace(cloud, floor=floor, is_possible=top > -np.inf)
 
 
 def _square_root(covariance: Floats) -> Floats:
