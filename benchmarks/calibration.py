@@ -1,49 +1,111 @@
-"""Prints whether posteriors of contours are calibrated: ranks of the truth, and coverage of bands, in the gap and out.
+"""Prints whether posteriors are calibrated at the defaults of `infer`: coverage, ranks of the truth, and what was lost.
 
-Truths are drawn from the prior, of the contour and of everything that is not known of the rig by default; see
-`tactile_bayes.calibrate`. What is done is kept in results/calibration, so that a run that was stopped goes on.
+Truths are drawn from the default prior of a family and of what is not known of the rig, at the usual noise, a tenth of
+it and three times as much; see `tactile_bayes.calibrate`. Results are kept in results/calibration, so that a run that
+was stopped goes on. With the argument "published", the tables are those of the replicates in data/calibration.
 """
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import xarray as xr
-from scipy import stats
 
 import tactile_bayes as tb
+from tactile_bayes.calibration.calibrate import experiment_of
+from tactile_bayes.calibration.store import REPLICATES
+from tactile_bayes.calibration.summary import CLAIMS, summary
 
-OUT = Path("results/calibration")
-SIZE = stats.lognorm(s=0.4, scale=0.7)
-PRIORS: dict[str, dict[str, Any]] = {
-    "parabola": {"a": stats.lognorm(s=0.4, scale=0.6)},
-    "circle": {"r": SIZE},
-    "ellipse": {"a": SIZE, "b": SIZE},
+OUT, PUBLISHED = Path("results/calibration"), Path(__file__).parents[1] / "data" / "calibration"
+SEED = 2026
+FAMILIES = {
+    "parabola": "parabolas",
+    "circle": "circles",
+    "ellipse": "ellipses",
+    "power-law": "power laws",
+    "parabola/power-law": "parabola/power-law",
+    "shape-free": "shape-free",
 }
-VERTEX = {"q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
+REPLICATES_OF = {"parabola": 1000, "circle": 500, "ellipse": 500, "power-law": 500} | {
+    "parabola/power-law": 200,
+    "shape-free": 100,
+}
+NOISES = {"usual": 1.0, "tenth": 0.1, "threefold": 3.0}
+"""Standard deviations of the load cell, over 0.05 EI/L² and 0.02 EI/L."""
+TITLES = {
+    "usual": "at the usual noise",
+    "tenth": "at a tenth of the noise",
+    "threefold": "at three times the noise",
+}
 
 
-def main(replicates: int = 200, *families: str) -> None:
-    for family in families or PRIORS:
-        found = tb.calibrate(
-            family=family, replicates=replicates, priors=PRIORS[family] | VERTEX, seed=2026, out=OUT / family
-        )
-        print_one(family, found)
+def folder_of(family: str, noise: str) -> str:
+    return f"{family.replace('/', '-')}-{noise}"
 
 
-def print_one(family: str, found: xr.Dataset) -> None:
-    seconds = found.seconds
-    print(f"{family}: {found.attrs['verdict']}")  # which names replicates that were lost; below they hold nowhere
-    print(f"  seconds a replicate: {float(seconds.mean()):.1f}, the longest {float(seconds.max()):.1f}")
-    for name in found.claim.values:
-        row = found.sel(claim=name)
-        print(f"  {name:<22}{float(row.coverage):>8.3f} ± {float(row.coverage_error):.3f}")
-    p_values = zip(found.quantity.values, found.rank_p_value.values, strict=True)
-    print("  p: " + ", ".join(f"{name} {p:.3f}" for name, p in p_values) + "\n", flush=True)
+def load_cell(noise: str) -> tb.LoadCell:
+    return tb.LoadCell(force_noise=0.05 * NOISES[noise], moment_noise=0.02 * NOISES[noise])
+
+
+def published(noise: str) -> dict[str, xr.Dataset]:
+    """Return the calibrations whose replicates are published, by family."""
+    found = {}
+    for family in FAMILIES:
+        path = PUBLISHED / folder_of(family, noise) / "replicates.json"
+        if path.exists():
+            rows = json.loads(path.read_text(encoding="utf-8"))["replicates"]
+            outcomes = {row["number"]: REPLICATES.decode(row) for row in rows}
+            found[family] = summary(experiment_of(family=family, load_cell=load_cell(noise), seed=SEED), outcomes)
+    return found
+
+
+def table(title: str, calibrations: dict[str, xr.Dataset]) -> str:
+    """Return a table in Markdown with a column for each family."""
+    found = list(calibrations.values())
+
+    def row(name: str, cells: Iterable[str]) -> str:
+        return f"| {name} | {' | '.join(cells)} |"
+
+    def held(name: str) -> str:
+        return row(CLAIMS[name], (_share(one.sel(claim=name)) for one in found))
+
+    smallest = [f"{float(np.nanmin(one.rank_p_value)):.2g} of {one.sizes['quantity']}" for one in found]
+    return "\n".join(
+        [
+            row(title, (f"{one.sizes['replicate']} {FAMILIES[family]}" for family, one in calibrations.items())),
+            "|" + "---|" * (len(found) + 1),
+            *(held(name) for name in CLAIMS),
+            row("smallest p-value of the ranks", smallest),
+            row("verdict", (one.attrs["conclusion"] for one in found)),
+            row("ended in an error", (str(one.attrs["lost"]) for one in found)),
+            row("did not converge, and said so", (str(one.attrs["not_converged"]) for one in found)),
+            row("false alarms of the check of the record", (str(int((one.check_passed == 0).sum())) for one in found)),
+        ]
+    )
+
+
+def _share(claim: xr.Dataset) -> str:
+    return f"{100 * float(claim.coverage):.1f} ± {100 * float(claim.coverage_error):.1f} %"
+
+
+def calibrated(family: str, noise: str) -> xr.Dataset:
+    replicates = REPLICATES_OF[family] // (1 if noise == "usual" else 2)
+    cell, out = load_cell(noise), OUT / folder_of(family, noise)
+    found = tb.calibrate(family=family, replicates=replicates, load_cell=cell, seed=SEED, out=out)
+    print(f"{family}, {noise} noise: {found.attrs['verdict']}", flush=True)
+    return found
+
+
+def main(*chosen: str) -> None:
+    families = [name for name in FAMILIES if name in chosen] or FAMILIES
+    for noise in [name for name in NOISES if name in chosen] or NOISES:
+        made = published(noise) if "published" in chosen else {name: calibrated(name, noise) for name in families}
+        print(f"\n{table(TITLES[noise], made)}\n", flush=True)
 
 
 if __name__ == "__main__":
-    counts, chosen = [a for a in sys.argv[1:] if a.isdigit()], [a for a in sys.argv[1:] if not a.isdigit()]
-    main(*map(int, counts or ["200"]), *chosen)
+    main(*sys.argv[1:])

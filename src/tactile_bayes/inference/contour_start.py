@@ -180,6 +180,10 @@ class _Mode(NamedTuple):
     usual: _Mode | None = None
     """The mode in the model's own coordinates, if those are others."""
 
+    @property
+    def flank(self) -> FlankCoordinates | None:
+        return self.coordinates if isinstance(self.coordinates, FlankCoordinates) else None
+
 
 def _scattered(
     model: ContourModel,
@@ -247,7 +251,7 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
         elif _is_known(model, optimum, found):
             repeats += 1
         else:
-            found.append(_mode(model, optimum, rng, deadline))
+            found.append(_mode(model, optimum, found, rng, deadline))
         normal = bool(found) and found[-1].proposal.efficiency > _EFFICIENT
         if many_samples and (normal or repeats == _REPEATS):
             break
@@ -259,7 +263,7 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
         least = min((mode.optimum.cost for mode in found), default=optimum.cost)
         late = found and deadline.has_passed
         if optimum.cost < least + _MAX_EXCESS_COST and not late and not _is_known(model, optimum, found):
-            found.append(_mode(model, optimum, rng, deadline))
+            found.append(_mode(model, optimum, found, rng, deadline))
     if not found:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
     found.sort(key=lambda mode: -mode.proposal.log_mass)
@@ -274,22 +278,27 @@ def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) 
     return any(np.linalg.norm(mode.proposal.steps(mode.coordinates.of(point))) < far for mode in found)
 
 
-def _mode(model: ContourModel, optimum: ContourOptimum, rng: np.random.Generator, deadline: Deadline) -> _Mode:
-    """Approximate a mode around an optimum, in the coordinates in which the posterior is nearer to a normal one."""
+def _mode(
+    model: ContourModel, optimum: ContourOptimum, found: list[_Mode], rng: np.random.Generator, deadline: Deadline
+) -> _Mode:
+    """Approximate a mode around an optimum, in the coordinates in which the posterior is nearer to a normal one.
+
+    Modes on the same flank share the coordinates of the first.
+    """
     usual = _mode_in(model, optimum, model.coordinates, optimum.covariance, rng, deadline, model.walked_ends)
     if usual.proposal.efficiency > _EFFICIENT or deadline.has_passed:
         return usual
-    flank = FlankCoordinates.at_contacts(model, optimum.point)
-    if flank is None:
-        return usual
-    covariance = flank.covariance(optimum.point, optimum.covariance)
-    if not np.isfinite(covariance).all():  # the vertex is too near
-        return usual
-    mode = _mode_in(model, optimum, flank, covariance, rng, deadline)
-    reaches_vertex = flank.reach_vertex(mode.proposal.draw(rng, _SCALE_DRAWS)[0])
-    if reaches_vertex or mode.proposal.efficiency < usual.proposal.efficiency:
-        return usual
-    return mode._replace(usual=usual)
+    for flank in [*(mode.flank for mode in found), FlankCoordinates.at_contacts(model, optimum.point)]:
+        if flank is None:
+            continue
+        covariance = flank.covariance(optimum.point, optimum.covariance)
+        if not np.isfinite(covariance).all():  # the vertex is too near, or on the other side
+            continue
+        mode = _mode_in(model, optimum, flank, covariance, rng, deadline)._replace(usual=usual)
+        is_better = bool(found) or mode.proposal.efficiency > usual.proposal.efficiency
+        if is_better and not flank.reach_vertex(mode.proposal.draw(rng, _SCALE_DRAWS)[0]):
+            return mode
+    return usual
 
 
 def _mode_in(
