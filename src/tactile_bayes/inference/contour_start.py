@@ -52,6 +52,10 @@ samples, and for any record if the posterior is nearly normal around the last mo
 _EFFICIENT = 0.35
 """Efficiency of a proposal above which the posterior is nearly normal around it."""
 
+_FLANK_EFFICIENCY = 0.4
+"""Efficiency of the proposal in coordinates of a flank, over that in the model's own, from which they are preferred:
+a ridge that bends beyond the draws of the importance sampling looks straight."""
+
 _PILOT_WALKERS = 6
 """Largest number of walkers per parameter in the pilot run that learns coordinates."""
 
@@ -295,7 +299,7 @@ def _mode(
         if not np.isfinite(covariance).all():  # the vertex is too near, or on the other side
             continue
         mode = _mode_in(model, optimum, flank, covariance, rng, deadline)._replace(usual=usual)
-        is_better = bool(found) or mode.proposal.efficiency > usual.proposal.efficiency
+        is_better = bool(found) or mode.proposal.efficiency > _FLANK_EFFICIENCY * usual.proposal.efficiency
         if is_better and not flank.reach_vertex(mode.proposal.draw(rng, _SCALE_DRAWS)[0]):
             return mode
     return usual
