@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import pytest
 import typer
+from benchmarks.calibration import TITLES, published, table
 
 import tactile_bayes as tb
 from helpers.commands import call
@@ -139,6 +140,11 @@ def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
             options = {option for parameter in COMMANDS[known].params for option in parameter.opts}
             used = {word.split("=")[0] for word in words if word.startswith("--")}
             assert used <= options, f"{' '.join(known)} has no option {used - options}"
+
+
+@pytest.mark.parametrize(("noise", "page"), [("usual", ROOT / "README.md")])
+def test_a_table_of_calibrations_is_that_of_the_published_replicates(noise: str, page: Path) -> None:
+    assert table(TITLES[noise], published(noise)) in TEXTS[page]
 
 
 def test_every_notebook_is_named() -> None:

@@ -86,7 +86,10 @@ def test_a_checkpoint_distinguishes_them():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("family", "number"),
-    [*(("power-law", number) for number in (15, 25, 43, 65, 373, 420)), *(("ellipse", number) for number in (39, 51, 53))],
+    [
+        *(("power-law", number) for number in (15, 25, 43, 65, 373, 420)),
+        *(("ellipse", number) for number in (39, 51, 53)),
+    ],
 )
 def test_a_flank_known_to_a_hundred_thousandth_is_found_and_sampled(family, number):
     """Pivots next to the object, loads of up to 65,000 times their noise: replicates of the published calibration."""
