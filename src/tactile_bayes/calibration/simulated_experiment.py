@@ -50,7 +50,7 @@ class SimulatedExperiment:
                 "the load cell has no noise, so that there is nothing to calibrate: give "
                 "LoadCell(force_noise=0.05, moment_noise=0.02), in the record's units"
             )
-        refuse_unknown_priors(self.world.priors, self.names, "of the misspecification ")
+        refuse_unknown_priors(self.world.priors, self.names, "of the misspecification (world) ")
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: the model is built again where it is needed."""
