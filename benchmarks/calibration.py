@@ -11,6 +11,7 @@ import json
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -22,24 +23,32 @@ from tactile_bayes.calibration.summary import CLAIMS, summary
 
 OUT, PUBLISHED = Path("results/calibration"), Path(__file__).parents[1] / "data" / "calibration"
 SEED = 2026
+
+
+class Family(NamedTuple):
+    title: str
+    replicates: int
+    """At the usual noise; half as many at others."""
+
+
+class Noise(NamedTuple):
+    title: str
+    factor: float
+    """On standard deviations of 0.05 EI/L² and 0.02 EI/L."""
+
+
 FAMILIES = {
-    "parabola": "parabolas",
-    "circle": "circles",
-    "ellipse": "ellipses",
-    "power-law": "power laws",
-    "parabola/power-law": "parabola/power-law",
-    "shape-free": "shape-free",
+    "parabola": Family("parabolas", 1000),
+    "circle": Family("circles", 500),
+    "ellipse": Family("ellipses", 500),
+    "power-law": Family("power laws", 500),
+    "parabola/power-law": Family("parabola/power-law", 200),
+    "shape-free": Family("shape-free", 100),
 }
-REPLICATES_OF = {"parabola": 1000, "circle": 500, "ellipse": 500, "power-law": 500} | {
-    "parabola/power-law": 200,
-    "shape-free": 100,
-}
-NOISES = {"usual": 1.0, "tenth": 0.1, "threefold": 3.0}
-"""Standard deviations of the load cell, over 0.05 EI/L² and 0.02 EI/L."""
-TITLES = {
-    "usual": "at the usual noise",
-    "tenth": "at a tenth of the noise",
-    "threefold": "at three times the noise",
+NOISES = {
+    "usual": Noise("at the usual noise", 1.0),
+    "tenth": Noise("at a tenth of the noise", 0.1),
+    "threefold": Noise("at three times the noise", 3.0),
 }
 
 
@@ -48,7 +57,8 @@ def folder_of(family: str, noise: str) -> str:
 
 
 def load_cell(noise: str) -> tb.LoadCell:
-    return tb.LoadCell(force_noise=0.05 * NOISES[noise], moment_noise=0.02 * NOISES[noise])
+    factor = NOISES[noise].factor
+    return tb.LoadCell(force_noise=0.05 * factor, moment_noise=0.02 * factor)
 
 
 def published(noise: str) -> dict[str, xr.Dataset]:
@@ -63,7 +73,7 @@ def published(noise: str) -> dict[str, xr.Dataset]:
     return found
 
 
-def table(title: str, calibrations: dict[str, xr.Dataset]) -> str:
+def table(noise: str, calibrations: dict[str, xr.Dataset]) -> str:
     """Return a table in Markdown with a column for each family."""
     found = list(calibrations.values())
 
@@ -73,10 +83,14 @@ def table(title: str, calibrations: dict[str, xr.Dataset]) -> str:
     def held(name: str) -> str:
         return row(CLAIMS[name], (_share(one.sel(claim=name)) for one in found))
 
+    columns = [f"{one.sizes['replicate']} {FAMILIES[family].title}" for family, one in calibrations.items()]
     smallest = [f"{float(np.nanmin(one.rank_p_value)):.2g} of {one.sizes['quantity']}" for one in found]
     return "\n".join(
         [
-            row(title, (f"{one.sizes['replicate']} {FAMILIES[family]}" for family, one in calibrations.items())),
+            row(
+                NOISES[noise].title,
+                (f"{one.sizes['replicate']} {FAMILIES[family].title}" for family, one in calibrations.items()),
+            ),
             "|" + "---|" * (len(found) + 1),
             *(held(name) for name in CLAIMS),
             row("smallest p-value of the ranks", smallest),
@@ -93,7 +107,7 @@ def _share(claim: xr.Dataset) -> str:
 
 
 def calibrated(family: str, noise: str) -> xr.Dataset:
-    replicates = REPLICATES_OF[family] // (1 if noise == "usual" else 2)
+    replicates = FAMILIES[family].replicates // (1 if noise == "usual" else 2)
     cell, out = load_cell(noise), OUT / folder_of(family, noise)
     found = tb.calibrate(family=family, replicates=replicates, load_cell=cell, seed=SEED, out=out)
     print(f"{family}, {noise} noise: {found.attrs['verdict']}", flush=True)
@@ -104,7 +118,7 @@ def main(*chosen: str) -> None:
     families = [name for name in FAMILIES if name in chosen] or FAMILIES
     for noise in [name for name in NOISES if name in chosen] or NOISES:
         made = published(noise) if "published" in chosen else {name: calibrated(name, noise) for name in families}
-        print(f"\n{table(TITLES[noise], made)}\n", flush=True)
+        print(f"\n{table(noise, made)}\n", flush=True)
 
 
 if __name__ == "__main__":

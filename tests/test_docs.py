@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 import pytest
 import typer
-from benchmarks.calibration import TITLES, published, table
+from benchmarks.calibration import published, table
 
 import tactile_bayes as tb
 from helpers.commands import call
@@ -144,7 +144,7 @@ def test_commands_and_options_that_are_shown_exist(path: Path) -> None:
 
 @pytest.mark.parametrize(("noise", "page"), [("usual", ROOT / "README.md")])
 def test_a_table_of_calibrations_is_that_of_the_published_replicates(noise: str, page: Path) -> None:
-    assert table(TITLES[noise], published(noise)) in TEXTS[page]
+    assert table(noise, published(noise)) in TEXTS[page]
 
 
 def test_every_notebook_is_named() -> None:

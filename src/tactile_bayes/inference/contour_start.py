@@ -139,7 +139,7 @@ def _whitened_around(
     settings: SamplerSettings,
     deadline: Deadline,
 ) -> Walk:
-    """Walkers around a centre, in whitening coordinates."""
+    """Return the start around a centre, in whitening coordinates."""
     log_probability = in_coordinates(model.log_probability, whitening)
     spread = np.full(centre.size, _WHITENED_SPREAD)
     spread[: whitening.bent] = [_ROUGHNESS_SPREAD] * 2 + [_NOISE_SPREAD] * len(model.noise.names)
@@ -159,7 +159,7 @@ def _whitened_around(
 
 
 def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> InferenceError:
-    """The error that says what to look at, and what to try."""
+    """Return the error that states what to check, and what to try."""
     return InferenceError(
         f"no {what} was found that describes the record{nearest}: are units, signs, drive angle, rod and base right? "
         "tactile-bayes inspect may tell. "
@@ -292,7 +292,8 @@ def _mode(
     usual = _mode_in(model, optimum, model.coordinates, optimum.covariance, rng, deadline, model.walked_ends)
     if usual.proposal.efficiency > _EFFICIENT or deadline.has_passed:
         return usual
-    for flank in [*(mode.flank for mode in found), FlankCoordinates.at_contacts(model, optimum.point)]:
+    flanks = [*(mode.flank for mode in found), FlankCoordinates.at_contacts(model, optimum.point)]
+    for flank in dict.fromkeys(flanks):  # each once, since modes share them
         if flank is None:
             continue
         covariance = flank.covariance(optimum.point, optimum.covariance)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.inference.ensembles.modes import Mode
+from tactile_bayes.numerics.selection import evenly_spread
 
 __all__ = ["Draws"]
 
@@ -60,8 +59,7 @@ class Draws:
 
     def evenly(self, most: int) -> Index:
         """Return the indices of at most so many draws of each chain, evenly spread."""
-        count = self.samples.shape[1]
-        return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+        return evenly_spread(self.samples.shape[1], most)
 
     def by_walker(self) -> Floats:
         """Return the samples as (chain, walker, step, parameter)."""
