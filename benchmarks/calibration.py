@@ -83,7 +83,6 @@ def table(noise: str, calibrations: dict[str, xr.Dataset]) -> str:
     def held(name: str) -> str:
         return row(CLAIMS[name], (_share(one.sel(claim=name)) for one in found))
 
-    columns = [f"{one.sizes['replicate']} {FAMILIES[family].title}" for family, one in calibrations.items()]
     smallest = [f"{float(np.nanmin(one.rank_p_value)):.2g} of {one.sizes['quantity']}" for one in found]
     return "\n".join(
         [

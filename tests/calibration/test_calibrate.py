@@ -83,7 +83,7 @@ def test_what_is_found(small):
     assert np.all((found.coverage >= 0.0) & (found.coverage <= 1.0))
     assert np.all(found.width_in_gap > 0.0)
     assert np.all(found.evaluations > 0)
-    assert found.attrs["verdict"].startswith("Too few replicates to judge: 2 posteriors, and 20 are the least.")
+    assert found.attrs["verdict"].startswith("Too few replicates to judge: 2 posteriors, and at least 20 are needed.")
 
 
 SNAP_OFFS = ("snap_off_forward", "snap_off_backward")
@@ -152,8 +152,8 @@ def test_what_is_lost_holds_nowhere(with_lost):
 def test_what_is_lost_is_named_with_the_way_to_it(with_lost):
     found, _ = with_lost
     said = found.attrs["verdict"]
-    assert said.startswith("Too few replicates to judge: 1 posteriors, and 20 are the least. ")
-    assert "3 lost, and counted as not holding: 0, 1, 2 (_StrangeError). To see why, add --replicate 0 --debug" in said
+    assert said.startswith("Too few replicates to judge: 1 posteriors, and at least 20 are needed. ")
+    assert "3 lost, in which no claim holds: 0, 1, 2 (_StrangeError). To see why, add --replicate 0 --debug" in said
 
 
 def test_what_is_lost_is_kept(with_lost, monkeypatch):

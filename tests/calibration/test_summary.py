@@ -72,8 +72,8 @@ def test_right_posteriors_are_calibrated():
     assert verdict.startswith(
         "Calibrated, as far as 100 replicates tell: ranks of the truth are uniform (smallest p of 8"
     )
-    assert "and what is stated with 90% holds as often. Of those with 90% hold: band, in the gap" in verdict
-    assert verdict.endswith("The check of the record raises alarm in 0.0% of 100.")
+    assert "and bands and regions of 90% hold as often as stated. Coverage at 90%: band, in the gap" in verdict
+    assert verdict.endswith("The check of the record raises an alarm in 0.0% of 100.")
     assert found.sizes == {"replicate": 100, "quantity": 8, "claim": 6}
     assert found.attrs["false_alarm"] == FALSE_ALARM == 0.01
     assert (found.attrs["family"], found.attrs["seed"], found.attrs["probability"]) == ("parabola", "1", 0.9)
@@ -120,7 +120,7 @@ def test_false_alarms_are_as_rare_as_stated(sets, count):
 def test_what_is_wrong_is_named_with_its_direction(wrong, words):
     found = judged(100, **wrong)
     assert found.attrs["calibrated"] == 0
-    assert found.attrs["verdict"].startswith(f"Not calibrated, over 100 replicates: {words}. Of those with 90% hold")
+    assert found.attrs["verdict"].startswith(f"Not calibrated, over 100 replicates: {words}. Coverage at 90%")
     assert float(found.rank_p_value.sel(quantity=next(iter(wrong)))) < 1e-3
 
 
@@ -163,7 +163,7 @@ def test_a_little_is_not_told_from_nothing():
 def test_few_are_too_few(count):
     found = judged(count, q={"shift": 9.0})
     assert found.attrs["calibrated"] == 0
-    said = f"Too few replicates to judge: {count} posteriors, and 20 are the least."
+    said = f"Too few replicates to judge: {count} posteriors, and at least 20 are needed."
     assert found.attrs["verdict"].startswith(said)
     assert np.isnan(found.rank_p_value).all()
 
@@ -200,7 +200,7 @@ def test_lost_replicates_are_named_with_what_to_do():
         summary(EXPERIMENT, rows)
         .attrs["verdict"]
         .endswith(
-            " 3 lost, and counted as not holding: 7, 31, 99 (InferenceError, ReachError). To see why, add --replicate "
+            " 3 lost, in which no claim holds: 7, 31, 99 (InferenceError, ReachError). To see why, add --replicate "
             "7 --debug to the command, or call calibration_replicate(7, …) with the options of calibrate."
         )
     )
@@ -213,8 +213,8 @@ def test_too_many_lost_are_no_calibration():
     assert (found.attrs["calibrated"], found.attrs["conclusion"], found.attrs["lost"]) == (0, "undecided", 60)
     assert np.all(found.coverage < 0.65)
     assert found.attrs["verdict"].startswith(
-        "It cannot be said whether posteriors are right: of 160 replicates 60 were lost (at most 1% may be); no other "
-        "fault is found. Of those with 90% hold: band, in the gap"
+        "Undecided: of 160 replicates 60 were lost (at most 1% may be); no other "
+        "fault is found. Coverage at 90%: band, in the gap"
     )
 
 
@@ -244,9 +244,9 @@ def test_nothing_but_failures():
     assert (found.attrs["calibrated"], found.attrs["conclusion"]) == (0, "undecided")
     assert (found.sizes["quantity"], found.sizes["claim"]) == (0, 0)
     assert found.attrs["verdict"].startswith(
-        "It cannot be said whether posteriors are right: of 30 replicates 30 were lost (at most 1% may be); 0 "
-        "posteriors are left, and 20 the least. "
-        "30 lost, and counted as not holding: 0, 1, 2, 3, 4, … (InferenceError). "
+        "Undecided: of 30 replicates 30 were lost (at most 1% may be); 0 "
+        "posteriors are left, 20 are needed. "
+        "30 lost, in which no claim holds: 0, 1, 2, 3, 4, … (InferenceError). "
     )
 
 
@@ -255,14 +255,14 @@ def test_too_many_that_did_not_converge_are_no_calibration():
     unconverged = replicates(100, numbers={"converged": 0.0})
     few = summary(EXPERIMENT, rows | {number: unconverged[number] for number in range(5)})
     assert (few.attrs["conclusion"], few.attrs["not_converged"]) == ("calibrated", 5)
-    assert few.attrs["verdict"].endswith(" 5 did not converge, and are counted like all others.")
+    assert few.attrs["verdict"].endswith(" 5 did not converge, and are included.")
     many = summary(EXPERIMENT, rows | {number: unconverged[number] for number in range(6)})
     assert (many.attrs["conclusion"], many.attrs["not_converged"]) == ("undecided", 6)
     assert "of 100 replicates 6 did not converge (at most 5% may); no other fault is found" in many.attrs["verdict"]
 
 
 def test_alarms_of_the_check_are_counted():
-    assert "raises alarm in 100.0% of 20" in judged(20, numbers={"check_passed": 0.0}).attrs["verdict"]
+    assert "raises an alarm in 100.0% of 20" in judged(20, numbers={"check_passed": 0.0}).attrs["verdict"]
 
 
 # ---- power
@@ -279,7 +279,7 @@ def test_power_is_stated():
         assert (float(of_claim.noticed_below), float(of_claim.noticed_above)) == expected
     least, most = float(found.noticed_below.min()), float(found.noticed_above.max())
     assert (
-        f"What would have been noticed with a probability of 90%: coverage of at most {least:.1%} or at least "
+        f"Faults that would have been detected with a probability of 90%: coverage of at most {least:.1%} or at least "
         f"{most:.1%} in place of 90%, posteriors off by {ranks.shift:.2g} standard deviations, too narrow by a "
         f"factor of {ranks.narrow:.2f}, too wide by a factor of {ranks.wide:.2f}. " in attrs["verdict"]
     )
@@ -297,7 +297,7 @@ def test_what_is_noticed_by_none_is_left_out():
     found = judged(20)
     assert np.isnan(found.noticed_above).all()
     assert np.isnan(found.attrs["noticed_wide"])
-    words = found.attrs["verdict"].partition("What would have been noticed")[2].partition(". ")[0]
+    words = found.attrs["verdict"].partition("Faults that would have been detected")[2].partition(". ")[0]
     assert "at most" in words
     assert "at least" not in words
     assert "too wide" not in words

@@ -40,22 +40,20 @@ def test_conclusions(tally, has_faults, expected):
         (
             "undecided",
             Tally(200, lost=3),
-            "It cannot be said whether posteriors are right: of 200 replicates 3 were lost (at most 1% may be); no "
-            "other fault is found.",
+            "Undecided: of 200 replicates 3 were lost (at most 1% may be); no other fault is found.",
         ),
         (
             "undecided",
             Tally(200, unconverged=11),
-            "It cannot be said whether posteriors are right: of 200 replicates 11 did not converge (at most 5% may); "
-            "no other fault is found.",
+            "Undecided: of 200 replicates 11 did not converge (at most 5% may); no other fault is found.",
         ),
         (
             "undecided",
             Tally(200, lost=185, unconverged=11),
-            "It cannot be said whether posteriors are right: of 200 replicates 185 were lost (at most 1% may be) and "
-            "11 did not converge (at most 5% may); 15 posteriors are left, and 20 the least.",
+            "Undecided: of 200 replicates 185 were lost (at most 1% may be) and "
+            "11 did not converge (at most 5% may); 15 posteriors are left, 20 are needed.",
         ),
-        ("too few", Tally(19, lost=4), "Too few replicates to judge: 15 posteriors, and 20 are the least."),
+        ("too few", Tally(19, lost=4), "Too few replicates to judge: 15 posteriors, and at least 20 are needed."),
     ],
 )
 def test_statements(concluded, tally, said):
@@ -65,20 +63,20 @@ def test_statements(concluded, tally, said):
 
 def test_lost_ones_in_words():
     assert lost_message({3: "ValueError: a: b"}) == (
-        "1 lost, and counted as not holding: 3 (ValueError). To see why, add --replicate 3 --debug to the command, or "
+        "1 lost, in which no claim holds: 3 (ValueError). To see why, add --replicate 3 --debug to the command, or "
         "call calibration_replicate(3, …) with the options of calibrate."
     )
     many = {number: "ReachError: x" if number % 2 else "KeyError: 'x'" for number in range(4, 10)}
     assert lost_message(many).startswith(
-        "6 lost, and counted as not holding: 4, 5, 6, 7, 8, … (KeyError, ReachError). To see why, add --replicate 4 "
+        "6 lost, in which no claim holds: 4, 5, 6, 7, 8, … (KeyError, ReachError). To see why, add --replicate 4 "
     )
 
 
 def test_power_message():
     assert power_message(0.9, 0.7694, 0.9844, NoticedRanks(0.391, 1.433, 1.521)) == (
-        "What would have been noticed with a probability of 90%: coverage of at most 76.9% or at least 98.4% in place "
-        "of 90%, posteriors off by 0.39 standard deviations, too narrow by a factor of 1.43, too wide by a factor of "
-        "1.52."
+        "Faults that would have been detected with a probability of 90%: coverage of at most 76.9% or at least 98.4% "
+        "in place of 90%, posteriors off by 0.39 standard deviations, too narrow by a factor of 1.43, too wide by a "
+        "factor of 1.52."
     )
     without = power_message(0.9, 0.43, np.nan, NOTHING)
     assert without.endswith("90%: coverage of at most 43.0% in place of 90%.")

@@ -185,7 +185,7 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
     result = call("infer", record, "--out", tmp_path / "run", "--quiet")
     assert result.exit_code == 0, result.output
     assert said in result.stdout.split("\n\n")[0].splitlines()
-    assert result.stderr == "tactile-bayes: left out: band; tactile-bayes --debug ... shows where that comes from\n"
+    assert result.stderr == "tactile-bayes: left out: band; tactile-bayes --debug ... shows the traceback\n"
     assert (tmp_path / "run" / "posterior.nc").exists()
     assert not (tmp_path / "run" / "band.csv").exists()
     traced = call("--debug", "infer", record, "--out", tmp_path / "run", "--json")
@@ -202,7 +202,7 @@ def test_what_cannot_be_made_of_a_posterior_is_told_and_no_refusal(record, tmp_p
 def test_a_demonstration_explains_itself_and_compares_with_the_truth(tmp_path):
     result = call("demo", "--out", tmp_path / "demo")
     assert result.exit_code == 0, result.output
-    assert "the same job on your own: tactile-bayes infer RECORD --as-stated" in result.stdout
+    assert "for your own record: tactile-bayes infer RECORD --as-stated" in result.stdout
     assert "truth" in result.stdout
     assert f"record       {tmp_path / 'demo' / 'record.csv'}" in result.stdout
 
@@ -370,7 +370,7 @@ def test_an_error_that_nobody_foresaw_is_no_traceback_unless_asked(record, tmp_p
         assert last == first
     else:
         assert before == [first]
-        assert last == "Run it again as tactile-bayes --debug ... to see where it comes from."
+        assert last == "Run it again as tactile-bayes --debug ... to see the traceback."
 
 
 @pytest.mark.filterwarnings("always::tactile_bayes.errors.StrainWarning")
@@ -433,10 +433,10 @@ def test_control_c_while_sampling_keeps_what_there_is(record, tmp_path):
     code, out, errors = interrupted_while_sampling("infer", record, tmp_path, setup=NO_FIGURES)
     assert code == 130
     answer, end = errors.split("\n", 2)[1:]
-    assert answer.startswith("tactile-bayes: stopping; what has been drawn is judged, drawn and written now")
+    assert answer.startswith("tactile-bayes: stopping; the draws made so far are checked, plotted and written now")
     assert end == (
-        "tactile-bayes: interrupted, results are of what was drawn by then: give --checkpoint FOLDER, and the same "
-        "command can go on after an interrupt\n"
+        "tactile-bayes: interrupted, results are from the draws made by then: with --checkpoint FOLDER the same "
+        "command can resume an interrupted run\n"
     )
     assert "NOT CONVERGED, interrupted after " in out.split("\n\n")[0]
     assert {path.name for path in (tmp_path / "run").iterdir()} == {

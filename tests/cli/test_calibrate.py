@@ -38,7 +38,7 @@ def done(tmp_path_factory, coarse_pictures):
 def test_the_verdict_comes_first_then_what_holds_then_the_files(done):
     out, said = done
     lines = said.splitlines()
-    assert lines[0].startswith("Too few replicates to judge: 2 posteriors, and 20 are the least.")
+    assert lines[0].startswith("Too few replicates to judge: 2 posteriors, and at least 20 are needed.")
     assert lines[0] == (out / "verdict.txt").read_text(encoding="utf-8").strip()
     assert lines[2].split() == ["stated", "with", "90%", "holds", "in", "of", "replicates"]
     assert any(line.startswith("band, in the gap") for line in lines)
@@ -130,7 +130,7 @@ def test_a_lost_replicate_is_said_to_be(tmp_path, monkeypatch):
     result = call("--out", tmp_path / "out", "--replicate", 3, *QUICK)
     assert result.exit_code == 0, result.output
     lines = result.stdout.splitlines()
-    assert lines[0] == "Replicate 3 was lost: ZeroDivisionError: nothing left. --debug shows where."
+    assert lines[0] == "Replicate 3 was lost: ZeroDivisionError: nothing left. --debug shows the traceback."
     assert [line.split()[0] for line in lines[3:7]] == ["a", "q", "x_c", "noise_scale"]
     assert not (tmp_path / "out").exists()
 
@@ -150,7 +150,7 @@ def test_lost_replicates_end_no_run(tmp_path, monkeypatch):
     monkeypatch.setattr(making, "sampled", fail)
     result = call("--out", tmp_path, "--replicates", 2, *QUICK)
     assert result.exit_code == 0, result.output
-    assert "2 lost, and counted as not holding: 0, 1 (ZeroDivisionError)" in result.stdout
+    assert "2 lost, in which no claim holds: 0, 1 (ZeroDivisionError)" in result.stdout
     assert "add --replicate 0 --debug to the command" in result.stdout
     told = json.loads(call("--out", tmp_path, "--replicates", 2, "--json", *QUICK).stdout)
     assert (told["conclusion"], told["lost"], told["claims"]) == ("too few", 2, [])

@@ -115,7 +115,7 @@ def test_the_table_says_how_samples_are_predicted(instead, record, tmp_path, mon
         "circle": ">0.999 -100.0 0 1 0.400 yes",
         "ellipse": "<0.001 -108.1 -9.0 ± 3.0 0 0.001 no",
     }
-    assert "Leave-one-out densities cannot all be trusted (Pareto k̂ above 0.7): circle, ellipse\n" in result.stdout
+    assert "Leave-one-out densities are unreliable (Pareto k̂ above 0.7) for circle, ellipse\n" in result.stdout
 
 
 def test_that_none_fits_is_the_first_line(instead, record, tmp_path):

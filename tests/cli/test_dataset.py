@@ -172,7 +172,7 @@ def test_what_was_made_is_said_in_three_lines(small):
     assert result.stderr == ""
     first, *rest = result.stdout.splitlines()
     assert re.fullmatch(r"6 records in 3 files, 0\.\d MB: 6 made in \S+ s, [\d,]+ records/s", first)
-    assert rest[-1] == f"{folder / 'README.md'} says what is in the files"
+    assert rest[-1] == f"{folder / 'README.md'} describes the files"
     assert len(list(folder.glob("shard-*.nc"))) == 3
 
 
@@ -180,7 +180,7 @@ def test_what_is_there_is_not_made_again(small, tmp_path):
     folder, _ = small
     result = call("generate", folder.parent / "small.toml", "--out", folder)
     assert result.exit_code == 0
-    words = ": all were there already, by their sizes; dataset verify compares every byte"
+    words = ": all existed already, with the right sizes; dataset verify compares every byte"
     assert result.stdout.splitlines()[0].endswith(words)
 
 
@@ -291,7 +291,7 @@ def test_control_c_says_how_to_go_on_and_the_same_command_does(
         process.send_signal(sent)
         out, errors = process.communicate(timeout=60)
     assert (process.returncode, out) == (code, "")
-    assert errors == f"tactile-bayes: {word}, 4 of 6 records are in set: the same command goes on\n"
+    assert errors == f"tactile-bayes: {word}, 4 of 6 records are in set: the same command resumes\n"
     monkeypatch.chdir(tmp_path)
     done = call(*arguments[1:])
     assert done.exit_code == 0, done.output
@@ -312,7 +312,7 @@ def test_workers_end_when_it_is_terminated(specification, tmp_path):
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=60)
     assert process.returncode == 143
-    assert errors == "tactile-bayes: terminated, no further file was finished: the same command goes on\n"
+    assert errors == "tactile-bayes: terminated, no further file was finished: the same command resumes\n"
     wait_until(lambda: not any(map(alive, team)), seconds=5.0)
 
 

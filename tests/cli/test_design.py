@@ -68,8 +68,8 @@ def test_what_is_wrong_is_said_in_a_line(tmp_path, wrong, message):
 @pytest.mark.parametrize(
     ("nested", "told"),
     [
-        ([], "nothing was written: the same command begins anew"),
-        (["--nested"], "0 of 2 candidates are in {}/nested: the same command goes on"),
+        ([], "nothing was written: the same command starts again"),
+        (["--nested"], "0 of 2 candidates are in {}/nested: the same command resumes"),
     ],
 )
 def test_an_interrupt_says_what_the_same_command_does(tmp_path, monkeypatch, nested, told):

@@ -216,7 +216,7 @@ def test_friction_that_is_not_stated_comes_first(tmp_path):
     write_record(measured, tmp_path / "r.csv")
     lines = call("reconstruct", tmp_path / "r.csv", "--out", tmp_path).stdout.splitlines()
     assert lines[0].startswith("The loads of single samples contradict one another, misfit ")
-    assert "as friction makes it: give --friction, or have infer find it" in lines[1]
+    assert "as with friction: give --friction, or have infer find it" in lines[1]
     mended = call("reconstruct", tmp_path / "r.csv", "--friction", 0.3, "--out", tmp_path)
     assert "which noise explains with probability" in mended.stdout
     assert "contradict" not in mended.stdout
@@ -239,11 +239,11 @@ def test_noise_that_cannot_be_known_is_not_said_to_be_none(rig, tmp_path):
     result = call("reconstruct", tmp_path / "loaded.csv", *READING, "--out", tmp_path / "run")
     assert result.exit_code == 0, result.output
     assert (
-        "No noise is known: neither stated, nor to be found without unloaded samples; every sample counts as loaded. "
+        "No noise is stated, and too few samples are unloaded to estimate it: every sample counts as loaded. "
         "Give --force-noise and --moment-noise.\n"
     ) in result.stdout
     inspected = call("inspect", tmp_path / "loaded.csv", *READING)
-    assert "noise not stated, and not to be found without unloaded samples\n" in inspected.stdout
+    assert "noise not stated, and too few unloaded samples to estimate it\n" in inspected.stdout
 
 
 def test_no_map_of_other_contacts_is_left(tmp_path):

@@ -217,7 +217,7 @@ def test_control_c_says_how_to_go_on_and_the_same_command_does(asked, monkeypatc
     result = call("--out", tmp_path, *STUDY)
     assert result.exit_code == 130
     told = have.format(tmp_path / "study")
-    assert result.stderr == f"tactile-bayes: interrupted, {told}: the same command goes on\n"
+    assert result.stderr == f"tactile-bayes: interrupted, {told}: the same command resumes\n"
     assert result.stdout == ""
     assert (tmp_path / "words.txt").exists()  # the analysis is there before the study begins
     monkeypatch.setattr(error_map_module, "error_cell", whole)
@@ -247,7 +247,7 @@ def test_another_study_is_refused(asked, tmp_path):
         (["--as-stated", "--nuisance", "bias"], "--as-stated and --nuisance contradict each other"),
         (["--samples", "9"], "samples is 9"),
         (["--distance", "1.5", "--samples", "8"], "the contour is out of reach"),
-        (["--band-width", "1e-12", "--samples", "8"], "a band of 1e-12 cannot be had with any noise"),
+        (["--band-width", "1e-12", "--samples", "8"], "no noise gives a band of 1e-12: without any it would be"),
         (["--study", "--study-profile", "V"], "there is no profile 'V': choose 'I', 'II', 'III' or 'IV'"),
         (["--study", "--workers", "1", "--scheduler", "tcp://a:1"], "--workers and --scheduler exclude each other"),
         (["--noise-factor", "1"], "--noise-factor is for a study: give --study"),
@@ -280,7 +280,7 @@ def test_a_material_asks_for_the_rod(tmp_path, monkeypatch):
     answer = json.loads(result.stdout)
     assert answer["rod"]["length"] == pytest.approx(0.2)
     assert answer["rod"]["diameter"] == pytest.approx(0.7e-3, rel=1e-3)  # of music wire of this stiffness
-    said = "Of 3 rods of this material (1 bent too far) the load cell wants one 200 mm long and 0.7 mm thick"
+    said = "Of 3 rods of this material (1 bent too far) one 200 mm long and 0.7 mm thick suits the load cell best"
     assert answer["words"][-1].startswith(said)
     assert (tmp_path / "words.txt").read_text(encoding="utf-8").splitlines()[-1] == answer["words"][-1]
     assert (tmp_path / "required_rod.png").is_file()
@@ -293,7 +293,7 @@ def test_no_rod_that_serves_is_said():
         {"status": (("length", "diameter"), [["bent too far", "does not reach"]]), "best_width": ((), np.nan)}
     )
     words = sensitivity_run.rod_message(rods)
-    assert words == "None of 2 rods of this material serves (1 bent too far, 1 does not reach)."
+    assert words == "None of 2 rods of this material suits the load cell (1 bent too far, 1 does not reach)."
 
 
 @pytest.mark.parametrize(

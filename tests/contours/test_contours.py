@@ -427,7 +427,7 @@ def test_an_edge_turns_on_the_spot():
     assert np.all(np.diff(here.slope_angle) > 0)
     assert np.all(np.diff(here.x) >= 0)
     assert np.abs(np.diff(here.slope_angle)).max() < 2 * np.diff(p).max()
-    assert [edge.end_name(side) for side in ("left", "right")] == ["where it is over", "where it stands upright"]
+    assert [edge.end_name(side) for side in ("left", "right")] == ["where it ends", "where it is vertical"]
 
 
 @pytest.mark.parametrize(

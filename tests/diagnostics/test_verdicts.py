@@ -36,7 +36,7 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     found = verdicts(taken_for_a_parabola("IV"))
     assert re.match(
         "The family parabola and the rig as assumed do not describe the record: none of [0-9]+ records that the "
-        "posterior predicts is so far off. Worst is (holding_moment|force_x|force_y), whose ",
+        "posterior predicts is so far off. The worst channel is (holding_moment|force_x|force_y), whose ",
         found[0],
     )
     assert found[0].endswith(
@@ -46,7 +46,7 @@ def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():
     )
     assert found[1].startswith("NOT CONVERGED, the steps allowed ran out after 60 steps")
     assert found[2].startswith("The noise is ")
-    assert found[2].endswith(" as stated: the rest is misfit, no noise.")
+    assert found[2].endswith(" as stated: the rest is misfit, not noise.")
 
 
 def test_a_forgotten_tare_is_told_with_its_size():
@@ -103,13 +103,13 @@ def test_loads_that_contradict_one_another_unless_noise_does_it():
     found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0}))
     assert found[0].startswith("The loads of single samples contradict one another, whatever the contour (noise expl")
     assert "below 1e-99" in found[0]
-    assert "friction makes it" not in found[0]
+    assert "with friction" not in found[0]
     dragged = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
-    assert dragged[0].endswith("too small by 20 standard errors, as friction makes it: infer it (--nuisance friction).")
+    assert dragged[0].endswith("too small by 20 standard errors, as with friction: infer it (--nuisance friction).")
     sought = predicted()
     sought.attrs |= {"nuisances": '["friction"]'}
     dragged = verdicts(sought, xr.Dataset(attrs={"misfit_probability": 0.0, "axial_score": -20.0}))
-    assert dragged[0].endswith("too small by 20 standard errors, as more friction than was found makes it.")
+    assert dragged[0].endswith("too small by 20 standard errors, as with more friction than was inferred.")
 
 
 def test_a_prior_that_is_largest_at_its_end_allows_what_is_there():
@@ -128,12 +128,12 @@ def test_what_the_prior_forbids_and_what_it_says_alone():
     noise = np.ones((4, 250))
     far = {"rigidity_scale": rng.normal(1.3, 0.01, (4, 250)), "x_c": rng.normal(0.0, 0.9, (4, 250))}
     found = verdicts(changed(tree, "posterior", noise_scale=noise, **far))
-    assert found[0].startswith("The record wants what the prior hardly allows: rigidity_scale = 1.3 (prior: 0.8")
-    assert found[1] == "The record tells little more than the prior of x_c."
+    assert found[0].startswith("The record contradicts the prior: rigidity_scale = 1.3 (prior: 0.8")
+    assert found[1] == "The record adds little to the prior of x_c."
     near = {**far, "rigidity_scale": rng.normal(1.0, 0.01, (4, 250))}
     found = verdicts(changed(tree, "posterior", noise_scale=noise, **near))
     assert found[0].startswith("All is well")
-    assert found[1] == "The record tells little more than the prior of x_c."
+    assert found[1] == "The record adds little to the prior of x_c."
 
 
 def drifted(tree, sizes=(0.0, 0.2, 0.0)):

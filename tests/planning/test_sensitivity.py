@@ -76,7 +76,7 @@ def test_words_say_the_numbers():
     told = in_si()["information"]
     (line,) = [line for line in words(in_si()) if "band of the contour" in line]
     touched, gap = (1e3 * float(told[f"{kind}_width"]) for kind in ("touched", "gap"))
-    assert f"{touched:.3g} mm wide where it is touched and {gap:.3g} mm wide in the gap" in line
+    assert f"{touched:.3g} mm where the contour is touched and {gap:.3g} mm in the gap" in line
     assert line.startswith("The 95% band")
     needed = in_si()["required_noise"]
     lines = [line for line in words(in_si()) if line.startswith("A mean band")]
@@ -90,12 +90,12 @@ def test_words_say_the_numbers():
 
 def test_words_name_the_channel_that_is_missed_most():
     """Without the moment bounds grow most, as plans without it say."""
-    (line,) = [line for line in words(plain()) if line.startswith("Most is lost without")]
+    (line,) = [line for line in words(plain()) if line.startswith("Most information is lost without")]
     told = plain()["information"]
     ratio = (told.bound_without_channel / told.bound_with_priors).drop_sel(parameter="noise_scale")
     mean = np.exp(np.log(ratio).mean("parameter"))
     assert str(mean.channel[int(np.argmax(mean.values))].values) == "holding_moment"
-    assert line.startswith("Most is lost without the moment")
+    assert line.startswith("Most information is lost without the moment")
     assert f"{float(mean.max()):.1f} times" in line
 
 
@@ -119,13 +119,13 @@ def test_an_answer_can_be_written_and_read(tmp_path):
 
 def test_a_wide_band_is_what_priors_give():
     tree = sensitivity(seed=1, parts=["required_noise"], band_widths=[100.0])
-    assert words(tree) == ["A mean band of 100 L is what the priors give without any record."]
+    assert words(tree) == ["A mean band of 100 L follows from the priors without any record."]
 
 
 def test_where_first_order_does_not_hold_the_words_say_so():
     loud = tb.LoadCell(force_noise=50.0, moment_noise=20.0)
     tree = sensitivity(seed=1, parts=["amplification"], load_cell=loud)
-    assert "No raw contact point is to be trusted to first order at this noise." in words(tree)
+    assert "First order holds for no raw contact point at this noise." in words(tree)
 
 
 @pytest.mark.parametrize("parts", [["informations"], "information", [], ["information", "gap"]])

@@ -36,7 +36,7 @@ def test_a_grid_of_three_heights_is_a_map_of_the_criterion():
     np.testing.assert_allclose(edges[0, :, 0], [-0.4, -0.2, 0.0, 0.2, 0.4])
     np.testing.assert_allclose(edges[:, 0, 1], [-0.25, -0.15, -0.05, 0.05])
     assert len(ax.figure.axes) == 2
-    assert "width of the band to be expected [$L$]" in (ax.figure.axes[1].get_xlabel(), ax.figure.axes[1].get_ylabel())
+    assert "expected width of the band [$L$]" in (ax.figure.axes[1].get_xlabel(), ax.figure.axes[1].get_ylabel())
 
 
 def test_the_order_of_candidates_does_not_matter():
@@ -84,7 +84,7 @@ def test_other_criteria_have_maps_too(criterion, words):
 
 def test_in_si_the_axes_are_in_millimetres():
     ax = design(made_up(XS, YS, length=0.1, pivots=[(0.0, 0.0)]))
-    assert ax.get_xlabel() == "place of the pivot $x$ [mm]"
+    assert ax.get_xlabel() == "position of the pivot $x$ [mm]"
     assert ax.get_xlim() == pytest.approx((-0.04, 0.04))
     assert labels(ax)[1].endswith("µm") or labels(ax)[1].endswith("mm")
 

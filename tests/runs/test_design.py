@@ -44,9 +44,9 @@ def test_the_outermost_candidate_is_said_to_be_so(best, outermost):
     if outermost is None:
         assert said == []
     else:
-        assert said == [f"It is the {outermost} of the candidates: beyond there may be a better one, try with more."]
+        assert said == [f"It is the {outermost} of the candidates: a better one may lie beyond, try more."]
 
 
 def test_a_gap_that_is_not_known_is_not_told():
     first, *_ = design_messages(found(GRID[:2], [1e-3, 2e-3], [np.nan, 3e-3]))
-    assert first.endswith("band is then to be expected 1 mm wide; now it is 5 mm.")
+    assert first.endswith("band is then 1 mm wide on the mean; now it is 5 mm.")

@@ -158,8 +158,8 @@ def _uniform_and_covered(data: xr.Dataset) -> str:
     """Return the reason why posteriors without a fault are called calibrated."""
     least, stated = float(np.nanmin(data.rank_p_value)), data.attrs["probability"]
     return (
-        f"ranks of the truth are uniform (smallest p of {data.sizes['quantity']} quantities {least:.2g}), and what is "
-        f"stated with {stated:.0%} holds as often"
+        f"ranks of the truth are uniform (smallest p of {data.sizes['quantity']} quantities {least:.2g}), and "
+        f"bands and regions of {stated:.0%} hold as often as stated"
     )
 
 
@@ -171,16 +171,16 @@ def _further(data: xr.Dataset, ranks_noticed: NoticedRanks, lost: Mapping[int, s
     if judged.sizes["claim"]:
         shares = zip(judged.claim.values, judged.coverage.values, judged.coverage_error.values, strict=True)
         held = [f"{CLAIMS[str(name)]} {share:.1%} ± {error:.1%}" for name, share, error in shares]
-        sentences.append(f"Of those with {probability:.0%} hold: {', '.join(held)}.")
+        sentences.append(f"Coverage at {probability:.0%}: {', '.join(held)}.")
         # The claim with the least power counts; NaN if one has none.
         below, above = float(np.min(judged.noticed_below.values)), float(np.max(judged.noticed_above.values))
     if np.isfinite([below, *ranks_noticed]).any():
         sentences.append(power_message(probability, below, above, ranks_noticed))
     if "check_passed" in data:
         passed = data.check_passed.values[np.isfinite(data.check_passed.values)]
-        sentences.append(f"The check of the record raises alarm in {np.mean(passed == 0.0):.1%} of {passed.size}.")
+        sentences.append(f"The check of the record raises an alarm in {np.mean(passed == 0.0):.1%} of {passed.size}.")
     if data.attrs["not_converged"]:
-        sentences.append(f"{data.attrs['not_converged']} did not converge, and are counted like all others.")
+        sentences.append(f"{data.attrs['not_converged']} did not converge, and are included.")
     if lost:
         sentences.append(lost_message(lost))
     return sentences

@@ -62,16 +62,16 @@ def statement(concluded: Conclusion, tally: Tally, reason: str) -> str:
     """Return the sentence of a conclusion, with the reason why posteriors are called calibrated or not."""
     count, left = tally.replicates, tally.replicates - tally.lost
     if concluded == "calibrated":
-        return f"Calibrated, as far as {count} replicates tell: {reason}."
+        return f"Calibrated, as far as {count} replicates show: {reason}."
     if concluded == "not calibrated":
         return f"Not calibrated, over {count} replicates: {reason}."
     if concluded == "too few":
-        return f"Too few replicates to judge: {left} posteriors, and {FEWEST} are the least."
+        return f"Too few replicates to judge: {left} posteriors, and at least {FEWEST} are needed."
     too_many = [] if tally.has_few_lost else [f"{tally.lost} were lost (at most {_MOST_LOST:.0%} may be)"]
     if not tally.has_few_unconverged:
         too_many.append(f"{tally.unconverged} did not converge (at most {_MOST_UNCONVERGED:.0%} may)")
-    rest = "no other fault is found" if left >= FEWEST else f"{left} posteriors are left, and {FEWEST} the least"
-    return f"It cannot be said whether posteriors are right: of {count} replicates {' and '.join(too_many)}; {rest}."
+    rest = "no other fault is found" if left >= FEWEST else f"{left} posteriors are left, {FEWEST} are needed"
+    return f"Undecided: of {count} replicates {' and '.join(too_many)}; {rest}."
 
 
 def power_message(probability: float, below: float, above: float, ranks: NoticedRanks) -> str:
@@ -82,7 +82,7 @@ def power_message(probability: float, below: float, above: float, ranks: Noticed
     faults += [f"posteriors off by {ranks.shift:.2g} standard deviations"] if np.isfinite(ranks.shift) else []
     widths = {"narrow": ranks.narrow, "wide": ranks.wide}
     faults += [f"too {way} by a factor of {factor:.2f}" for way, factor in widths.items() if np.isfinite(factor)]
-    return f"What would have been noticed with a probability of {POWER:.0%}: {', '.join(faults)}."
+    return f"Faults that would have been detected with a probability of {POWER:.0%}: {', '.join(faults)}."
 
 
 def lost_message(messages: Mapping[int, str]) -> str:
@@ -91,6 +91,6 @@ def lost_message(messages: Mapping[int, str]) -> str:
     first = ", ".join(map(str, numbers[:_NAMED])) + (", …" if len(numbers) > _NAMED else "")
     kinds = ", ".join(dict.fromkeys(message.partition(":")[0] for message in messages.values()))
     return (
-        f"{len(numbers)} lost, and counted as not holding: {first} ({kinds}). To see why, add --replicate {numbers[0]} "
+        f"{len(numbers)} lost, in which no claim holds: {first} ({kinds}). To see why, add --replicate {numbers[0]} "
         f"--debug to the command, or call calibration_replicate({numbers[0]}, …) with the options of calibrate."
     )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["demo", "infer"]
 
-_STOPPING = "stopping; what has been drawn is judged, drawn and written now (Ctrl-C again drops it)"
+_STOPPING = "stopping; the draws made so far are checked, plotted and written now (Ctrl-C again discards them)"
 
 
 def infer(
@@ -52,7 +52,7 @@ def infer(
     checkpoint: Annotated[
         Path | None,
         typer.Option(
-            help="Folder in which every block of steps is kept: the same command goes on where it was stopped.",
+            help="Folder in which every block of steps is kept: the same command resumes a stopped run.",
             file_okay=False,
         ),
     ] = None,
@@ -81,9 +81,9 @@ def infer(
             command=ctx.meta["words"],
             progress=progress,
         )
-    go_on = "give --checkpoint FOLDER, and the same command can go on after an interrupt"
+    go_on = "with --checkpoint FOLDER the same command can resume an interrupted run"
     if checkpoint is not None:
-        go_on = f"the same command goes on with the steps in {checkpoint}"
+        go_on = f"the same command resumes from the steps in {checkpoint}"
     return _answer(ctx, run, run.files, {}, go_on)
 
 
@@ -104,8 +104,8 @@ def demo(
         print(
             f"A wire of {ROD.length * 1e3:g} mm and {ROD.diameter * 1e3:g} mm diameter has swept forward and backward "
             f"along a parabola; a load cell\nwith {LOAD_CELL.force_noise * 1e3:g} mN and "
-            f"{LOAD_CELL.moment_noise * 1e3:g} mN m of noise has recorded {path}.\nFrom here on this file is all there "
-            f"is, and the rig is taken as stated; the same job on your own: tactile-bayes infer RECORD --as-stated "
+            f"{LOAD_CELL.moment_noise * 1e3:g} mN m of noise has recorded {path}.\nFrom here on only this file is "
+            f"used, and the rig is taken as stated; for your own record: tactile-bayes infer RECORD --as-stated "
             f"--out RUN\n",
             flush=True,
         )
@@ -121,7 +121,7 @@ def demo(
             command=ctx.meta["words"],
             progress=progress,
         )
-    return _answer(ctx, run, {"record": path, **run.files}, TRUTH, "the same command begins anew")
+    return _answer(ctx, run, {"record": path, **run.files}, TRUTH, "the same command starts again")
 
 
 def _answer(
@@ -134,7 +134,7 @@ def _answer(
     return Answer(
         _words(run, files, truth),
         lambda: _numbers(run, files, truth),
-        interrupted=f"interrupted, results are of what was drawn by then: {go_on}" if interrupted else "",
+        interrupted=f"interrupted, results are from the draws made by then: {go_on}" if interrupted else "",
     )
 
 
@@ -146,7 +146,7 @@ def _trace_back(run: ContourRun, *, in_full: bool) -> None:
             typer.echo("".join(traceback.format_exception(error)), err=True)
     else:
         names = ", ".join(run.left_out)
-        typer.echo(f"tactile-bayes: left out: {names}; tactile-bayes --debug ... shows where that comes from", err=True)
+        typer.echo(f"tactile-bayes: left out: {names}; tactile-bayes --debug ... shows the traceback", err=True)
 
 
 def _numbers(run: ContourRun, files: Mapping[str, Path], truth: Mapping[str, float]) -> dict[str, Any]:

@@ -56,7 +56,7 @@ class _Commands(TyperGroup):
 
                 typer.echo(traceback.format_exc(), err=True)
             elif code == 1:
-                words += "\nRun it again as tactile-bayes --debug ... to see where it comes from."
+                words += "\nRun it again as tactile-bayes --debug ... to see the traceback."
         typer.echo(f"tactile-bayes: {words}", err=True)
         raise typer.Exit(code)
 
@@ -106,7 +106,7 @@ tactile-bayes --install-completion has the shell complete commands and options."
 
 app = typer.Typer(
     cls=_Commands,
-    help="Contours from what a flexible rod's base feels: contact points, posteriors, bands.",
+    help="Contours from the loads at the base of a flexible rod: contact points, posteriors, bands.",
     epilog=_EXIT_CODES,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -152,8 +152,6 @@ def _options(
         bool,
         typer.Option("--version", help="Print the version and stop.", callback=_print_version, is_eager=True),
     ] = False,
-    debug: Annotated[
-        bool, typer.Option("--debug", help="Show where a refusal or an error comes from, with the traceback.")
-    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error or a refusal.")] = False,
 ) -> None:
     pass

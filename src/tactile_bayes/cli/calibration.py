@@ -48,16 +48,16 @@ def calibrate(
     seed: Seed = 1,
     replicate: Annotated[
         int | None,
-        typer.Option(help="Make this replicate alone, once more, and print its result; nothing is written.", min=0),
+        typer.Option(help="Repeat this replicate alone, and print its result; nothing is written.", min=0),
     ] = None,
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show where an error comes from; with --replicate, the one that lost it.")
+        bool, typer.Option("--debug", help="Show the traceback of an error; with --replicate, of the one that lost it.")
     ] = False,
     output: Output,
 ) -> Answer:
     """Measure how often intervals hold: simulate records, infer from each, and compare with the truth.
 
-    A run that was stopped goes on by the same command; with more replicates it begins with those that are there. An
+    The same command resumes a stopped run; with more replicates it begins with those already made. An
     error in a replicate does not end the run, but counts against it; --replicate shows which error it was.
     """
     import numpy as np
@@ -119,8 +119,8 @@ def _of_replicate(made: Replicate) -> Answer:
     outcome = made.outcome
 
     def words() -> Iterator[str | Table]:
-        how = f"was lost: {outcome.message}. --debug shows where" if outcome.is_lost else f"is done: {outcome.message}"
-        yield f"Replicate {made.number} {how}."
+        lost = f"was lost: {outcome.message}. --debug shows the traceback"
+        yield f"Replicate {made.number} {lost if outcome.is_lost else f'is done: {outcome.message}'}."
         quantities = [
             (name, f"{made.truth[name]:.6g}" if name in made.truth else "", str(outcome.ranks.get(name, "")))
             for name in dict.fromkeys([*made.truth, *outcome.ranks])

@@ -98,7 +98,7 @@ def _reservations(found: xr.Dataset) -> Iterator[str]:
     if "largest_k" in found:
         poor = found.family.values[found.largest_k.values > _POOR_K]
         if poor.size:
-            yield f"Leave-one-out densities cannot all be trusted (Pareto k̂ above {_POOR_K}): {', '.join(poor)}"
+            yield f"Leave-one-out densities are unreliable (Pareto k̂ above {_POOR_K}) for {', '.join(poor)}"
 
 
 def _table(found: xr.Dataset) -> Table:

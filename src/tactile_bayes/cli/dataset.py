@@ -45,7 +45,7 @@ def example() -> None:
 def generate(
     *,
     specification: Annotated[
-        Path, typer.Argument(metavar="SPEC.toml", help="What to draw, sweep and measure: see dataset example.")
+        Path, typer.Argument(metavar="SPEC.toml", help="Specification, .toml: see dataset example.")
     ],
     out: Annotated[Path, typer.Option(help="Folder for the data set; created if missing.", file_okay=False)],
     work: WorkerOptions,
@@ -137,7 +137,7 @@ def _numbers(folder: Path, manifest: Manifest) -> dict[str, Any]:
 
 def _words(out: Path, manifest: Manifest, last: Production | None) -> Iterator[str]:
     size = sum(shard.bytes for shard in manifest.shards)
-    made = "all were there already, by their sizes; dataset verify compares every byte"
+    made = "all existed already, with the right sizes; dataset verify compares every byte"
     if last is not None:
         rate = last.made / max(last.seconds, 1e-9)
         made = f"{last.made:,} made in {last.seconds:.3g} s, {rate:,.0f} records/s"
@@ -148,7 +148,7 @@ def _words(out: Path, manifest: Manifest, last: Production | None) -> Iterator[s
         yield f"{total:,} contours were drawn again: {why}"
     if manifest.strained:
         strained = counted(manifest.strained, "record")
-        yield f"{strained} with a rod strained beyond the model: their loads are not to be trusted"
+        yield f"{strained} with a rod strained beyond the model: their loads are unreliable"
     if manifest.untouched:
         yield f"{counted(manifest.untouched, 'sweep')} without a sample in contact"
-    yield f"{out / 'README.md'} says what is in the files"
+    yield f"{out / 'README.md'} describes the files"

@@ -68,8 +68,8 @@ def design(
         bool,
         typer.Option(
             "--nested",
-            help="Sample each candidate's posteriors as well, which takes longer; the same command goes on where it "
-            "was stopped.",
+            help="Sample each candidate's posteriors as well, which takes longer; the same command resumes a stopped "
+            "run.",
         ),
     ] = False,
     draws: Annotated[int, typer.Option(help="Number of objects drawn from posterior or prior.", min=2)] = 24,
@@ -106,7 +106,7 @@ def design(
             return "nothing was written"
         return f"{done or 0:,} of {counted(count, 'candidate')} are in {out / 'nested'}"
 
-    then = "the same command goes on" if nested else "the same command begins anew"
+    then = "the same command resumes" if nested else "the same command starts again"
     with resumable_bar(count, "candidate", output.is_silent, have, then=then) as note:
         made = design_into(
             out,

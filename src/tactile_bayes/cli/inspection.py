@@ -29,7 +29,7 @@ _SOURCES = {
     "data sheet": "as the file states",
     "unloaded samples": "not stated, found in the unloaded samples",
     "nothing": "neither stated nor found",
-    "too few unloaded samples": "not stated, and not to be found without unloaded samples",
+    "too few unloaded samples": "not stated, and too few unloaded samples to estimate it",
 }
 
 
@@ -97,7 +97,7 @@ def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
         of_rod += [f"EI/L = {quantity(rod.moment_unit, 'N m')}", f"EI/L² = {quantity(rod.force_unit, 'N')}"]
         units = f"SI, rod: {', '.join(of_rod)}"
     else:
-        assumed = ", which the file does not say" if record.attrs.get("units_source") == "assumed" else ""
+        assumed = ", which the file does not state" if record.attrs.get("units_source") == "assumed" else ""
         units = f"dimensionless, in units of the rod{assumed}"
     axes = "fixed, along x and y" if frame_of(record) == "fixed" else "turning with the drive, along the rod and across"
     taken = [f"{name} = {origins[name]}" if name in origins else name for name in MEASURED]

@@ -21,7 +21,7 @@ _USUAL: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, 
 
 
 @contextmanager
-def resumable(have: Callable[[], str], *, then: str = "the same command goes on") -> Iterator[Callable[[], object]]:
+def resumable(have: Callable[[], str], *, then: str = "the same command resumes") -> Iterator[Callable[[], object]]:
     """Run a block that an interrupt ends with a message on what was kept, and what the same command then does.
 
     Call the yielded function regularly: it raises an interrupt that was lost.

@@ -51,11 +51,11 @@ class FlawOptions:
         str | None, typer.Option(help=f"Standard deviation of a bias that is drawn for this record, {_THREE}.")
     ] = None
     random_walk: Annotated[
-        str | None, typer.Option(help="Drift that walks away: MOMENT,FORCE, standard deviations of a step.")
+        str | None, typer.Option(help="Random-walk drift: MOMENT,FORCE, standard deviations of a step.")
     ] = None
     ornstein_uhlenbeck: Annotated[
         str | None,
-        typer.Option(help="Drift that wanders and forgets: MOMENT,FORCE,TIME, of the drift and in samples."),
+        typer.Option(help="Ornstein-Uhlenbeck drift: MOMENT,FORCE,TIME, standard deviations and samples."),
     ] = None
     gain: Annotated[
         list[str] | None,
@@ -114,7 +114,7 @@ def measure(
     out: RecordFile,
     flaws: FlawOptions,
     keep_truth: Annotated[
-        bool, typer.Option("--keep-truth", help="Keep the columns of the truth, which no laboratory has.")
+        bool, typer.Option("--keep-truth", help="Keep the columns of the truth, which a laboratory does not have.")
     ] = False,
     seed: Seed = 1,
     output: Output,
@@ -139,7 +139,7 @@ def measure(
         ideal = read_record(record)
         if LoadCell.from_record(ideal) is not None:
             raise ParameterError(
-                f"{record} has been measured already (its header states a load cell), and noise would be there twice: "
+                f"{record} has been measured already (its header states a load cell), and would have noise twice: "
                 "give the ideal record, as scan writes it"
             )
         show(1, 2)
@@ -148,7 +148,7 @@ def measure(
             measured = measured.drop_vars([name for name in measured.data_vars if str(name).startswith("truth_")])
         out.parent.mkdir(parents=True, exist_ok=True)
         write_record(measured, out)
-    truth = "with the columns of the truth" if keep_truth else "as a laboratory has it, without truth"
+    truth = "with the columns of the truth" if keep_truth else "without columns of the truth"
     samples, files = measured.sizes["sample"], {"record": out}
     return Answer(
         [

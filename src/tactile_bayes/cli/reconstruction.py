@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 __all__ = ["reconstruct"]
 
 _SOURCES = {
-    "data sheet": "The noise is what the file states of its load cell.",
+    "data sheet": "The noise is that of the load cell as the file states it.",
     "unloaded samples": "No noise is stated: bias and noise are taken from the unloaded samples.",
     "nothing": "There is no noise, neither stated nor in unloaded samples: no standard deviations.",
-    "too few unloaded samples": "No noise is known: neither stated, nor to be found without unloaded samples; every "
+    "too few unloaded samples": "No noise is stated, and too few samples are unloaded to estimate it: every "
     "sample counts as loaded. Give --force-noise and --moment-noise.",
 }
 

@@ -90,7 +90,7 @@ def refuse_other_suffix(path: Path, known: tuple[str, ...] = (".csv", ".nc"), wh
 
     if path.suffix not in known:
         kinds = f"{', '.join(known[:-1])} or {known[-1]}"
-        raise ParameterError(f"{path}: {what} is a {kinds} file, so give a name that ends so")
+        raise ParameterError(f"{path}: {what} is a {kinds} file, so give a name with that ending")
     above = next(folder for folder in path.absolute().parents if folder.exists())
     if not above.is_dir():
         raise ParameterError(f"{above} is a file, and no folder for {path.name}: give {what} another name")

@@ -95,7 +95,7 @@ def sensitivity(
 ) -> Answer:
     """Compute the effect of the sensor's errors on contact points and contour, and how small they have to be.
 
-    A study that was stopped goes on by the same command.
+    The same command resumes a stopped study.
     """
     from tactile_bayes.contours import paper_profile
     from tactile_bayes.mechanics.rod import Rod

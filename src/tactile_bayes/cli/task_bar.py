@@ -24,7 +24,7 @@ def resumable_bar(
     quiet: bool,
     have: Callable[[int | None], str],
     *,
-    then: str = "the same command goes on",
+    then: str = "the same command resumes",
 ) -> Iterator[Callable[[int], object]]:
     """Show a bar, and yield a function that takes the number of tasks done; at an interrupt, report what was kept.
 

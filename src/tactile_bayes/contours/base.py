@@ -104,7 +104,7 @@ class Contour(ABC):
 
     def end_name(self, side: Literal["left", "right"]) -> str:
         """Description of the end on one side, for messages."""
-        return "where it is over"
+        return "where it ends"
 
     def parameter_of_slope(self, slope_angle: ArrayLike) -> Floats:
         """Contour's own parameter at a slope angle.

@@ -88,13 +88,13 @@ def refuse_unless_convex(bends: Bends, freedom: float, place: Callable[[float], 
         raise ContourError(
             f"from_points: the points are not convex from x = {place(first):.6g} to {place(last):.6g}: there they bend "
             f"downward by {-bends.errors[worst]:.1f} standard errors ({limit:.1f} pass as chance), and stand off a "
-            f"chord by {off_chord:.3g} ({remark}). Leave this stretch out, or give a larger scatter; an object that "
-            "has a dent is outside this package"
+            f"chord by {off_chord:.3g} ({remark}). Leave this stretch out, or give a larger scatter; an object "
+            "with a dent cannot be modelled"
         )
     if bends.errors[-1] < _LEAST_BEND:
         raise ContourError(
             f"from_points: the points cannot be distinguished from a straight line: as a whole they bend upward by "
-            f"{bends.errors[-1]:.1f} standard errors, and it takes {_LEAST_BEND:g} ({remark}){STRAIGHT}"
+            f"{bends.errors[-1]:.1f} standard errors, and {_LEAST_BEND:g} are needed ({remark}){STRAIGHT}"
         )
 
 

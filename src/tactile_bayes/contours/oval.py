@@ -35,7 +35,7 @@ class _Oval(Vertexed):
         return Halves(half, half, np.asarray(self.x_c), np.asarray(self.q))
 
     def end_name(self, side: Literal["left", "right"]) -> str:
-        return "where it stands upright"
+        return "where it is vertical"
 
     def parameter_of_x(self, x: ArrayLike) -> Floats:
         with np.errstate(invalid="ignore"):

@@ -88,7 +88,7 @@ class ShapeFree(Tabled):
         log_radius = CubicSpline(knots, self.log_radius.reshape(-1, knots.size), axis=-1)(alpha)
         if np.abs(log_radius).max(initial=0.0) > _LARGEST:
             raise ContourError(
-                f"ShapeFree: between the knots log_radius runs off to {np.abs(log_radius).max():.3g}: knots that "
+                f"ShapeFree: between the knots log_radius reaches {np.abs(log_radius).max():.3g}: knots that "
                 "nearly coincide make the spline overshoot; move them apart, or make their values alike"
             )
         radius = np.exp(log_radius)

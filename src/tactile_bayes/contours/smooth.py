@@ -139,7 +139,7 @@ def _tabulated(coefficients: Floats) -> Floats:
     log_radius = coefficients.T @ values
     if np.abs(log_radius).max(initial=0.0) > _LARGEST:
         raise ContourError(
-            f"Smooth: log_radius runs off to {np.abs(log_radius).max():.3g}: give values that belong to a smooth "
+            f"Smooth: log_radius reaches {np.abs(log_radius).max():.3g}: give values that belong to a smooth "
             "curve, or fewer"
         )
     width = 2.0 * _UPRIGHT / _CELLS

@@ -131,4 +131,4 @@ def _reading(path: Path) -> Iterator[None]:
         with reading(path, lambda what: SpecificationError(f"{path} {what}: run dataset verify")):
             yield
     except FileNotFoundError:
-        raise SpecificationError(f"{path} is gone: dataset generate makes it again") from None
+        raise SpecificationError(f"{path} is missing: dataset generate makes it again") from None

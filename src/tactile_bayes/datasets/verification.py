@@ -116,6 +116,6 @@ def _compare(spec: Specification, manifest: Manifest, folder: Path, number: int)
         for name, variable in again.variables.items():
             if not np.array_equal(stored[name].values, variable.values, equal_nan=variable.dtype.kind == "f"):
                 raise SpecificationError(
-                    f"{folder / shard.file}: {name} comes out otherwise when it is made again (it was made with "
+                    f"{folder / shard.file}: {name} differs when it is made again (it was made with "
                     f"{', '.join(f'{k} {v}' for k, v in manifest.versions.items())})"
                 )

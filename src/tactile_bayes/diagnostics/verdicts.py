@@ -49,7 +49,7 @@ _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
     "neighbours": "whose residuals do not scatter about zero but stay on one side",
     "largest": "of which single samples are far off",
-    "loaded": "whose loaded samples are further from what is predicted than its unloaded ones",
+    "loaded": "whose loaded samples are further from the prediction than its unloaded ones",
     "zero": "whose unloaded samples are off zero",
 }
 
@@ -135,7 +135,7 @@ def doubtful_sides(attrs: Mapping[Any, Any]) -> list[str]:
     probability = attrs.get("sides_probability")
     sure = "" if probability is None else f", with probability {probability:.2g}"
     return [
-        f"The moment leaves doubt on which side of the object it was touched; taken is {taken}{sure}. Is the sign of "
+        f"The moment leaves the side of contact in doubt; taken is {taken}{sure}. Is the sign of "
         "the moment right, and the direction, and was the load cell tared?"
     ]
 
@@ -190,9 +190,9 @@ def _not_described(posterior: xr.DataTree, check: xr.Dataset) -> str:
     like = round(float(check.overall_p_value) * (predictions + 1)) - 1
     return (
         f"The family {family} and the rig as assumed do not describe the record: {like or 'none'} of {predictions} "
-        f"records that the posterior predicts {'are' if like > 1 else 'is'} so far off. Worst is {channel}, "
-        f"{_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {float(worst.worst_from):.3g} to "
-        f"{float(worst.worst_to):.3g} rad it reads {float(worst.worst_residual):+.2g}{unit} beside what is predicted. "
+        f"records that the posterior predicts {'are' if like > 1 else 'is'} so far off. The worst channel is "
+        f"{channel}, {_CAUSES[cause]}; in sweep {int(worst.worst_sweep)} from {float(worst.worst_from):.3g} to "
+        f"{float(worst.worst_to):.3g} rad it is off the prediction by {float(worst.worst_residual):+.2g}{unit}. "
         "Do not use this contour. "
         + what_to_try([family], _inferred(posterior), friction=posterior.attrs.get("friction", 0.0))
     )
@@ -223,7 +223,7 @@ def _noise(posterior: xr.DataTree, noisier: float) -> list[str]:
     said = f"The noise is {factor:.3g} times what the load cell states"
     if noisier < 0.5 * factor and factor > _FACTOR:
         alike = f"{noisier:.2g} times as much as stated" if abs(math.log(noisier)) > 0.2 else "as stated"
-        return [f"{said}, but neighbouring samples scatter {alike}: the rest is misfit, no noise."]
+        return [f"{said}, but neighbouring samples scatter {alike}: the rest is misfit, not noise."]
     return [f"{said}, and neighbouring samples scatter alike: state the noise that it has, or are the units right?"]
 
 
@@ -250,8 +250,8 @@ def _dragging(posterior: xr.DataTree, axial_score: float) -> str:
         return ""
     words = f" In tangential contact the force along the rod is too small by {-axial_score:.0f} standard errors, as "
     if is_inferred("friction", _inferred(posterior)):
-        return f"{words}more friction than was found makes it."
-    return f"{words}friction makes it: infer it (--nuisance friction)."
+        return f"{words}with more friction than was inferred."
+    return f"{words}with friction: infer it (--nuisance friction)."
 
 
 def _beyond_prior(posterior: xr.DataTree) -> dict[str, str]:
@@ -273,8 +273,8 @@ def _beyond_message(beyond: Mapping[str, str]) -> list[str]:
     if not beyond:
         return []
     return [
-        f"The record wants what the prior hardly allows: {', '.join(beyond.values())}. Check what is stated of rod and "
-        "drive angle, take a zero off as its column is read (--column 'force_x=NAME+12.5'), or give a wider prior "
+        f"The record contradicts the prior: {', '.join(beyond.values())}. Check the stated rod and drive "
+        "angle, subtract a zero as its column is read (--column 'force_x=NAME+12.5'), or give a wider prior "
         "(priors=)."
     ]
 
@@ -286,7 +286,7 @@ def _prior_dominated(posterior: xr.DataTree, known: Container[str]) -> list[str]
     names = [n for n in names if _width(draws[n].values) > _PRIOR_DOMINATED * _width(prior[n].values) > 0.0]
     if not names:
         return []
-    return [f"The record tells little more than the prior of {', '.join(names)}."]
+    return [f"The record adds little to the prior of {', '.join(names)}."]
 
 
 def _width(values: Floats) -> float:

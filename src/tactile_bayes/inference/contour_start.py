@@ -162,7 +162,7 @@ def _nothing_describes(model: ContourModel, what: str, nearest: str = "") -> Inf
     """Return the error that states what to check, and what to try."""
     return InferenceError(
         f"no {what} was found that describes the record{nearest}: are units, signs, drive angle, rod and base right? "
-        "tactile-bayes inspect may tell. "
+        "tactile-bayes inspect checks them. "
         + what_to_try([model.family.name], model.nuisances.names, friction=model.nuisances.friction)
     )
 

@@ -68,7 +68,7 @@ class Experiment:
         object.__setattr__(self, "events", check_switch("events", self.events))
         check_priors("priors", self.priors)
         object.__setattr__(self, "nuisances", tuple(check_names("nuisances", self.nuisances)))
-        more = ", and of what is not known of the rig moment_gain, friction and so on, which help(infer_contour) names"
+        more = ", and of the rig moment_gain, friction and so on, which help(infer_contour) lists"
         refuse_unknown_priors(self.priors, self.default_priors, more=more)
 
     def __getstate__(self) -> dict[str, Any]:

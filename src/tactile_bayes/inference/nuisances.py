@@ -241,7 +241,7 @@ def nuisances_of(
     if "rigidity_scale" in names and set(every_gain) <= set(names):
         raise ParameterError(
             f"rigidity_scale and {', '.join(every_gain)} cannot all be inferred: a stiffer rod and larger gains "
-            "measure the same; leave one of them"
+            "have the same effect; leave one of them out"
         )
     rod = rod_of(measured)
     elapsed = np.linspace(-0.5, 0.5, measured.sizes["sample"])
@@ -275,9 +275,9 @@ def _bases_off(name: str, measured: xr.Dataset) -> list[str]:
     number, found = len(bases_of(measured)), _BASE.fullmatch(name)
     if number == 1 or (found and found[1] == "1"):
         raise ParameterError(
-            f"{name} cannot be inferred: if pivot and object are shifted together nothing measured changes. "
-            f"Results are relative to the {'first ' if number > 1 else ''}pivot as stated; add to them what is not "
-            "known of its place"
+            f"{name} cannot be inferred: a shift of pivot and object together changes no reading. "
+            f"Results are relative to the {'first ' if number > 1 else ''}pivot as stated; add the "
+            "uncertainty of its position"
         )
     if found and not 2 <= int(found[1]) <= number:
         raise ParameterError(f"there is no {name}: the record has {number} pivots, base_2_x is of the second")

@@ -313,7 +313,7 @@ def _checked(axial: ArrayLike, lateral: ArrayLike, reading: ArrayLike) -> tuple[
     if arrays["reading"].size < 10:
         raise ParameterError(f"{arrays['reading'].size} readings for nine unknowns: give at least 10")
     if np.ptp(arrays["reading"]) == 0.0:
-        raise ParameterError("all readings are the same: the sensor does not answer to the probe")
+        raise ParameterError("all readings are the same: the sensor does not respond to the probe")
     return arrays["axial"], arrays["lateral"], arrays["reading"]
 
 

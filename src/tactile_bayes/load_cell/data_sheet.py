@@ -131,7 +131,7 @@ class DataSheet:
             correction = f"no noise has these coefficients between {between}: give smaller ones"
             raise refused("the load cell's correlation", self.correlation, correction)
         if np.linalg.cond(np.array(self.gain)) > 1e9:
-            correction = "such a cell cannot tell three loads apart: give rows that are independent, like (1, 0, 0)"
+            correction = "such a cell cannot distinguish three loads: give rows that are independent, like (1, 0, 0)"
             raise refused("the load cell's gain", self.gain, correction)
         if self.drift is not None and not isinstance(self.drift, RandomWalk | OrnsteinUhlenbeck):
             raise refused("the load cell's drift", self.drift, "give RandomWalk(...) or OrnsteinUhlenbeck(...)")

@@ -447,7 +447,7 @@ def refuse_inexact(sheet: DataSheet, readings: Floats, present: Index, wanders: 
     if wanders and correlated:
         if sheet.relative_noise:
             raise ParameterError(
-                "drift or an unknown bias, correlated noise and relative_noise together are not offered: leave one out"
+                "drift or an unknown bias, correlated noise and relative_noise exclude each other: leave one out"
             )
         if sheet.drift is not None and any(sheet.bias_uncertainty[i] for i in present):
-            raise ParameterError("drift, an unknown bias and correlated noise together are not offered: leave one out")
+            raise ParameterError("drift, an unknown bias and correlated noise exclude each other: leave one out")

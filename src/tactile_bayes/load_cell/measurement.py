@@ -106,8 +106,8 @@ def _after(sheet: DataSheet, stated: dict[str, Any]) -> DataSheet:
     for one in (before, here):
         if replace(one, force_noise=white.force_noise, moment_noise=white.moment_noise) != white:
             raise ParameterError(
-                "the record has been measured before, and two load cells of which one has more than white normal "
-                "noise make none that can be described: measure the ideal record, or remove its load_cell_ "
+                "the record has been measured before, and two load cells, one of them with more than white normal "
+                "noise, cannot be described as one: measure the ideal record, or remove its load_cell_ "
                 "attributes"
             )
     return white

@@ -212,8 +212,8 @@ def _out_of_reach(question: Question) -> str:
     across = f"x = {left:g}" if left == right else f"x from {left:g} to {right:g}"
     above = f"y = {low:g}" if low == high else f"y from {low:g} to {high:g}"
     return (
-        f"from none of the candidates, at {across}{unit} and {above}{unit}, does the rod, {known.rod.length:g}"
-        f"{unit or ' L'} long, reach an object that may be there: give pivots nearer to it, in that unit"
+        f"the rod, {known.rod.length:g}{unit or ' L'} long, reaches no possible object from any candidate, at "
+        f"{across}{unit} and {above}{unit}: give pivots nearer to it, in that unit"
     )
 
 

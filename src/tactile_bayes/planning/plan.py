@@ -74,8 +74,8 @@ class Plan:
         silent = [name for name in CHANNELS if not 0.0 < deviations[name] < np.inf]
         if silent:
             raise ParameterError(
-                f"the load cell states no finite noise of {', '.join(silent)}: without it nothing can be said of "
-                "errors; give LoadCell(force_noise=..., moment_noise=...), from its data sheet, or from_zero_load"
+                f"the load cell states no finite noise of {', '.join(silent)}: without it errors are "
+                "unknown; give LoadCell(force_noise=..., moment_noise=...), from its data sheet, or from_zero_load"
             )
 
     @property

@@ -89,8 +89,8 @@ def required_noise(
     least, most = band.width(_LEAST), band.width(_MOST)
     if np.any(wanted <= least):
         raise ParameterError(
-            f"a band of {wanted.min():g} cannot be had with any noise: without noise at all it would be {least:.3g} "
-            "wide, by what is not known of the rig; give tighter priors, or leave out nuisances"
+            f"no noise gives a band of {wanted.min():g}: without any it would be {least:.3g} wide, by the unknowns "
+            "of the rig; give tighter priors, or leave out nuisances"
         )
     factors = [
         math.inf

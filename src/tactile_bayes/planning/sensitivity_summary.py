@@ -28,7 +28,7 @@ def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
             of = grown.sel(reconstruction=method)
             ok, weight = of.holds.values, _spacing(of)
             if not ok.any():
-                yield f"No {method} contact point is to be trusted to first order at this noise."
+                yield f"First order holds for no {method} contact point at this noise."
                 continue
             along, across = (
                 _length(_median(of[name].values[ok], weight[ok]), si) for name in ("sd_along", "sd_across")
@@ -57,20 +57,20 @@ def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
             )
     if "information" in tree:
         found = tree["information"].to_dataset()
-        kinds = [("touched", "where it is touched"), ("gap", "in the gap")]
+        kinds = [("touched", "where the contour is touched"), ("gap", "in the gap")]
         parts = [
-            f"{_length(float(found[f'{kind}_width']), si)} wide {part}"
+            f"{_length(float(found[f'{kind}_width']), si)} {part}"
             for kind, part in kinds
             if np.isfinite(float(found[f"{kind}_width"]))
         ]
-        yield f"The {found.attrs['probability']:.0%} band of the contour is to be expected {' and '.join(parts)}."
+        yield f"The expected width of the {found.attrs['probability']:.0%} band is {' and '.join(parts)}."
         lost = found.bound_without_channel.values / found.bound_with_priors.values
         own = [i for i, name in enumerate(found.parameter.values) if str(name) != "noise_scale"]
         worst = np.exp(np.log(lost[:, own]).mean(axis=1))
         channel = str(found.channel.values[int(np.argmax(worst))])
         yield (
-            f"Most is lost without {_NAMES[channel]}: bounds on the parameters would be {worst.max():.1f} times as "
-            "large, on the geometric mean."
+            f"Most information is lost without {_NAMES[channel]}: bounds on the parameters would be {worst.max():.1f} "
+            "times as large, on the geometric mean."
         )
     if "required_noise" in tree:
         needed = tree["required_noise"].to_dataset()
@@ -80,7 +80,7 @@ def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
             if np.isfinite(force):
                 yield f"A mean band of {_length(float(width), si)} needs {_noise(float(force), float(moment), si)}."
             else:
-                yield f"A mean band of {_length(float(width), si)} is what the priors give without any record."
+                yield f"A mean band of {_length(float(width), si)} follows from the priors without any record."
 
 
 def _spacing(grown: xr.Dataset) -> Floats:

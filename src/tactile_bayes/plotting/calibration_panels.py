@@ -172,7 +172,7 @@ def coverage(calibration: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax.locator_params(axis="x", nbins=7, steps=[1, 2, 5, 10])
     ax.xaxis.set_major_formatter(lambda share, _: percent(share))
     ax.set_xlabel("share in which it holds ± 2 standard errors")
-    title = f"How often what is stated with {percent(probability)} probability holds"
+    title = f"Coverage of statements with {percent(probability)} probability"
     ax.set_title(title, loc="left", fontsize="medium")
     if left_out:
         words = f"left out, with fewer than {_FEWEST} replicates: {'; '.join(left_out)}"
@@ -274,7 +274,7 @@ def _heading(calibration: xr.Dataset, drawn: list[_Ranks]) -> str:
     if wrong:
         words = f"Not uniform, over {replicates}: ranks of {', '.join(wrong)}"
     elif tested:
-        words = f"Uniform, as far as {replicates} tell: ranks of {tested} quantities"
+        words = f"Uniform, as far as {replicates} show: ranks of {tested} quantities"
     else:
         words = f"Too few to judge whether ranks are uniform: {replicates}"
     lines = [words, f"Where ranks are uniform, 1 line in {round(1.0 / (1.0 - _BAND))} leaves the shaded band."]

@@ -26,9 +26,9 @@ _HIGHEST, _ROOM = 7.0, 0.1
 """Largest height of a map's figure, and the margin in it [inches]."""
 
 _KINDS = {
-    "band": ("width", "width of the band to be expected", True),
+    "band": ("width", "expected width of the band", True),
     "gap": ("gap", "width that no sweep touches", True),
-    "information": ("information", "information to be expected [nat]", False),
+    "information": ("information", "expected information [nat]", False),
 }
 _MARKS = "osD^vP"
 _BARS: dict[str, Any] = {"markersize": 4.0, "linewidth": 1.2, "elinewidth": 0.8, "capsize": 2.0}
@@ -121,7 +121,7 @@ def _draw_lines(ax: Axes, found: xr.Dataset, pivots: Floats) -> None:
     style: dict[str, Any] = {"color": "0.6", "linestyle": ":", "linewidth": 1.2, "zorder": 0.5}
     for k, place in enumerate(pivots[:, 0] * (1e3 if si else 1.0)):
         ax.axvline(place, label=None if k else "pivot so far", **style)
-    ax.set_xlabel(f"place of the pivot $x$ [{'mm' if si else '$L$'}]")
+    ax.set_xlabel(f"position of the pivot $x$ [{'mm' if si else '$L$'}]")
     ax.set_ylabel(f"{words_of_it} [{'mm' if si else '$L$'}]" if is_length else words_of_it)
     ax.set_ylim(bottom=0.0 if is_length else None)
     ax.spines[["top", "right"]].set_visible(False)
@@ -171,7 +171,7 @@ def _draw_map(ax: Axes, found: xr.Dataset, grid: _Grid, pivots: Floats) -> None:
     power, unit = shown_unit("contact_x", found[name].attrs, grid.values) if is_length else (0, "nat")
     label = f"best: {number(float(best[name]), power, digits=3)} {unit}"
     ax.plot(float(best["base_x"]), float(best["base_y"]), markersize=14.0, zorder=5.5, label=label, **BEST)
-    label_map(ax, found["base_x"].attrs, np.concatenate(edges), "place of the pivot {}")
+    label_map(ax, found["base_x"].attrs, np.concatenate(edges), "position of the pivot {}")
     _draw_scale(ax, mesh, f"{words} [{unit}]" if is_length else words, power)
     title = f"steps of {np.degrees(grid.drive_step):.3g}°" if grid.has_other_steps else None
     legend_above(ax, 3, title=title)

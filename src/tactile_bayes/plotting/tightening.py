@@ -125,7 +125,7 @@ def _refuse_another_record(
         raise ParameterError("implied is no tree of implied_contacts: give what it returned")
     hashes = {tree.attrs["data_sha256"] for tree in (implied, single) if "data_sha256" in tree.attrs}
     if len(hashes) > 1 or tight.sizes["sample"] != loose.sizes["sample"]:
-        raise ParameterError("implied and single contacts are not of one record: ask both of the same one")
+        raise ParameterError("implied and single contacts are not of one record: compute both from the same one")
 
 
 def _certain(moments: xr.Dataset) -> Any:

@@ -44,7 +44,7 @@ def page_of(findings: Findings, name: str) -> dict[str, Any]:
         "dimensionless": attrs["units"] == "dimensionless",
         "contour": contour,
         "band_table": Table(
-            f"The band at some places{contour.unit.bracketed}", ["x", "lower", "median", "upper"], contour.rows, 0
+            f"The band at some positions{contour.unit.bracketed}", ["x", "lower", "median", "upper"], contour.rows, 0
         ),
         "gap": _gap_messages(findings),
         "shapes": _shapes(findings.comparison),
@@ -92,11 +92,11 @@ def _answer(findings: Findings) -> str:
     )
     if findings.is_rejected:
         return (
-            f"{reach} the posterior has a {share} band {widths} That would hold if the contour were of this family and "
-            "the rig as assumed, and the record says that one of the two is not: how far off the band is, is not known."
+            f"{reach} the posterior has a {share} band {widths} It would hold if the contour were of this family and "
+            "the rig as assumed, but the record contradicts one of the two: the error of the band is unknown."
         )
     if not _is_well(findings):
-        return f"{reach} the posterior has a {share} band {widths} What it is worth depends on what is said above."
+        return f"{reach} the posterior has a {share} band {widths} Its validity depends on the messages above."
     return f"{reach} the contour is known to within a {share} band {widths}"
 
 
@@ -125,7 +125,7 @@ def _gap_messages(findings: Findings) -> list[str]:
         if np.isfinite(certificate) and np.isfinite(band):
             fine = shown_as("contact_x", width.attrs, [certificate])
             said.append(
-                f"With its ends as uncertain as they are, convexity alone confines the contour there, with {share}, to "
+                f"Given the uncertainty of its ends, convexity alone confines the contour there, with {share}, to "
                 f"a strip up to {fine.full(certificate, 2)} wide in y; the band is up to {fine.full(band, 2)} wide."
             )
     status = str(edges["status"].values)

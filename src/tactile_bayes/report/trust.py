@@ -50,8 +50,7 @@ def check_messages(findings: Findings) -> list[str]:
         outside.append(f"{count} of {values.size} in {words[name]}")
     expected = percent(round(1.0 - findings.probability, 9))
     said.append(
-        f"Outside of the {percent(findings.probability)} that it predicts are {', '.join(outside)}; "
-        f"{expected} would be usual."
+        f"Outside its {percent(findings.probability)} intervals are {', '.join(outside)}; {expected} would be usual."
     )
     return said
 
@@ -94,25 +93,25 @@ def contacts_messages(findings: Findings) -> list[str]:
     if np.isfinite(probability):
         noise, but = "noise", ""
         if findings.is_rejected:
-            noise = "noise as large as it was found"
-            but = ": in that noise is what the contour does not explain, so that this speaks for nothing"
+            noise = "noise of the inferred scale"
+            but = ": this noise includes what the contour does not explain, so that this is no evidence"
         said.append(
-            f"Four numbers determine three of a contact; what is left over sums to {float(attrs['misfit_sum']):.4g} "
+            f"Four numbers determine three of a contact; the remaining misfit sums to {float(attrs['misfit_sum']):.4g} "
             f"over {int(attrs['misfit_samples'])} samples, which {noise} explains with probability "
             f"{chance(probability)}{but}."
         )
     if np.isfinite(score):
-        known = "found" if "friction" in json.loads(findings.posterior.attrs["nuisances"]) else "stated"
+        known = "inferred" if "friction" in json.loads(findings.posterior.attrs["nuisances"]) else "stated"
         said.append(
             "In tangential contact D = fAx cos φ₀ + fAy sin φ₀ − m₀²/2 is zero, except for the friction that was "
-            f"{known}: its mean is off that by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."
+            f"{known}: its mean deviates by {fixed(score, '+.2f')} standard errors, {_agreement(score)}."
         )
     return said
 
 
 def _agreement(score: float) -> str:
     if score < -AXIAL_ALARM:
-        return "too small, as friction makes it"
+        return "too small, as with friction"
     if score > AXIAL_ALARM:
         return "too large: check the zero of the drive angle, the axes of the forces, and the rod"
     return "so that the force along the rod agrees with the moment"

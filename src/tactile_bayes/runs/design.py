@@ -65,7 +65,7 @@ def design_messages(found: xr.Dataset) -> tuple[str, ...]:
     probability = f"{found.attrs['probability']:.0%}"
     sentences = [
         f"Put the pivot at {place} and step the drive by {np.degrees(float(best.drive_step)):.3g}°: the {probability} "
-        f"band is then to be expected {length(float(best.width))} wide; now it is "
+        f"band is then {length(float(best.width))} wide on the mean; now it is "
         f"{length(float(found.present_width))}."
     ]
     if np.isfinite(float(best.gap)):
@@ -73,7 +73,7 @@ def design_messages(found: xr.Dataset) -> tuple[str, ...]:
     sides = (("base_x", "leftmost", "rightmost"), ("base_y", "lowest", "highest"))
     end = outermost((found[name].values, float(best[name]), least, most) for name, least, most in sides)
     if end:
-        sentences.append(f"It is the {end} of the candidates: beyond there may be a better one, try with more.")
+        sentences.append(f"It is the {end} of the candidates: a better one may lie beyond, try more.")
     worst = found.isel(candidate=int(np.nanargmax(found.width.values)))
     if found.sizes["candidate"] > 1:
         ratio = float(worst.width / best.width)
@@ -82,7 +82,7 @@ def design_messages(found: xr.Dataset) -> tuple[str, ...]:
             f"{length(float(worst.base_y))}), the band would be {ratio:.2g} times as wide."
         )
     if float(best.reached) < 1.0:
-        sentences.append(f"From there the rod reaches {float(best.reached):.0%} of the objects that may be there.")
+        sentences.append(f"From there the rod reaches {float(best.reached):.0%} of the possible objects.")
     if np.isfinite(float(best.nested_width)):
         sentences.append(
             f"Sampled posteriors give {length(float(best.nested_width))} ± {length(float(best.nested_width_error))} "

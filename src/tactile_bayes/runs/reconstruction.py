@@ -151,7 +151,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
         if score < -AXIAL_ALARM:
             against.append(
                 f"In tangential contact the force along the rod is too small by {-score:.0f} standard errors, as "
-                "friction makes it: give --friction, or have infer find it."
+                "with friction: give --friction, or have infer find it."
             )
         elif score > AXIAL_ALARM:
             against.append(

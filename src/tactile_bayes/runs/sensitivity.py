@@ -140,16 +140,16 @@ def rod_message(rods: xr.Dataset) -> str:
     others = ", ".join(f"{number} {what}" for what, number in status.most_common() if what != "ok")
     left_out = f" ({others})" if others else ""
     if not np.isfinite(rods.best_width):
-        return f"None of {count} rods of this material serves{left_out}."
+        return f"None of {count} rods of this material suits the load cell{left_out}."
     long, thick, wide = (f"{1e3 * float(rods[f'best_{name}']):.3g} mm" for name in ("length", "diameter", "width"))
     words = (
-        f"Of {count} rods of this material{left_out} the load cell wants one {long} long and {thick} thick: its mean "
-        f"band is {wide} wide."
+        f"Of {count} rods of this material{left_out} one {long} long and {thick} thick suits the load cell best: its "
+        f"mean band is {wide} wide."
     )
     sides = (("length", "shortest", "longest"), ("diameter", "thinnest", "thickest"))
     end = outermost((rods[name].values, float(rods[f"best_{name}"]), least, most) for name, least, most in sides)
     if end:
-        words += f" It is the {end} that was tried: begin with a rod like it, and look further."
+        words += f" It is the {end} that was tried: a better one may lie beyond, start from this one."
     return words
 
 

@@ -244,8 +244,8 @@ def scan(
     if not any(len(of_sweep["drive_angle"]) for of_sweep in columns):
         snaps = ", ".join(f"{sweep.snap_off.drive_angle:.6g} rad ({sweep.direction})" for sweep in sweeps)
         raise ParameterError(
-            f"drive_angles: all of them are after the snap-off, at {snaps}, from where on nothing is known, since the "
-            "rod does not come free of the object: give angles before it too"
+            f"drive_angles: all of them are after the snap-off, at {snaps}, beyond which the state is unknown, since "
+            "the rod does not come free of the object: give angles before it too"
         )
     record = {name: np.concatenate([of_sweep[name] for of_sweep in columns]) for name in columns[0]}
     return Scan(make_record(record, rod=rod), tuple(sweeps), contour)
@@ -262,21 +262,21 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
     if not sweep.clear:
         warnings.warn(
             f"{where} the rod snaps at {sweep.snap_off.drive_angle:.6g} rad, but straight it would still cut the "
-            "object: it comes to rest in another contact, which no sweep leads to; the samples after that are left out",
+            "object: it comes to rest in another contact, which no sweep reaches; the samples after that are left out",
             ClearanceWarning,
             stacklevel=3,
         )
     if sweep.largest_strain > LARGEST_STRAIN:
         warnings.warn(
             f"{where} the rod is strained by {sweep.largest_strain:.3g}: beyond {LARGEST_STRAIN:g} it is neither "
-            "slender nor linearly elastic, and the loads are not to be trusted; take a thinner or longer rod",
+            "slender nor linearly elastic, and the loads are unreliable; take a thinner or longer rod",
             StrainWarning,
             stacklevel=3,
         )
     if rod.elastic_strain is not None and sweep.largest_strain > rod.elastic_strain:
         warnings.warn(
-            f"{where} the rod is strained by {sweep.largest_strain:.3g}, more than the {rod.elastic_strain:g} that it "
-            "takes elastically: it would stay bent; take a thinner or longer rod, or stop the drive earlier",
+            f"{where} the rod is strained by {sweep.largest_strain:.3g}, beyond its elastic strain of "
+            f"{rod.elastic_strain:g}: it would stay bent; take a thinner or longer rod, or stop the drive earlier",
             StrainWarning,
             stacklevel=3,
         )

@@ -337,8 +337,8 @@ def test_a_drive_that_loses_steps_and_a_sweep_that_is_cut(record):
         "1 step of the drive differs from the others (sample 50): were samples lost, or did the drive slip?",
     )
     assert words(record.isel(sample=slice(30, 140))) == (
-        "Sweep 0 begins in contact: begin before first contact, which tells much of the contour.",
-        "Sweep 0 ends in contact: go on until the rod snaps off, which tells much of the contour.",
+        "Sweep 0 begins in contact: begin before first contact, which is informative on the contour.",
+        "Sweep 0 ends in contact: continue until the rod snaps off, which is informative on the contour.",
     )
 
 

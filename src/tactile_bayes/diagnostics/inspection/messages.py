@@ -211,7 +211,7 @@ def _zeros(
     far = _far_off(record, channels, cell if is_stated else None)
     if far:
         messages.append(
-            f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Take it off as the "
+            f"Without load the cell reads {_and(list(far.values()))}, more than infer expects. Subtract it as the "
             "column is read: --column 'force_x=NAME+12.5' adds 12.5 in the column's unit."
         )
     if not is_stated or _drifts(cell):
@@ -295,14 +295,14 @@ def _unfinished(sweeps: xr.Dataset) -> list[str]:
     contact = sweeps.contact.values
     for name, words, advice in (
         ("onset_drive_angle", "begin", "begin before first contact"),
-        ("snap_off_drive_angle", "end", "go on until the rod snaps off"),
+        ("snap_off_drive_angle", "end", "continue until the rod snaps off"),
     ):
         inside = (
             contact & np.isnan(sweeps[name].sel(side="after").values) & np.isnan(sweeps[name].sel(side="before").values)
         )
         numbers = [int(number) for number in sweeps.sweep.values[inside]]
         if numbers:
-            messages.append(f"{_of_sweeps(numbers, words)} in contact: {advice}, which tells much of the contour.")
+            messages.append(f"{_of_sweeps(numbers, words)} in contact: {advice}, which is informative on the contour.")
     few = contact & (sweeps.samples.values - sweeps.unloaded.values < _FEWEST_IN_CONTACT)
     numbers = [int(number) for number in sweeps.sweep.values[few]]
     if numbers:

@@ -75,8 +75,8 @@ def modes_message(modes: Sequence[Mode]) -> str:
         where = ", ".join(values[:_MAX_NAMED] + more)
         parts.append(f"{which} near {where} (mean log-probability {mode.log_probability:.1f})")
     return (
-        f"ensembles sit in {len(modes)} modes and none of them leaves its own: {'; '.join(parts)}; their shares "
-        "of the probability are unknown and more steps will not tell: use priors that leave one of them"
+        f"ensembles sit in {len(modes)} modes and none moves to another: {'; '.join(parts)}; their "
+        "probabilities are unknown, and more steps will not help: use priors that admit only one of them"
     )
 
 

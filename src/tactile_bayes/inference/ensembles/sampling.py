@@ -231,15 +231,13 @@ def _draws(
     modes = () if converged else modes_of(half.samples, half.values, names)
     message = f"{ending} after {state.steps} steps: {diagnosis.message(names)}"
     if not converged:
-        message += f"; wanted are R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
+        message += f"; criteria: R̂ below {settings.max_r_hat:g} and an effective sample size of {settings.min_ess:.0f}"
     if modes:
         message += f"; {modes_message(modes)}"
     if lost:
-        message += (
-            f"; {lost} of {chains * walkers} walkers are lost where nothing is probable: results are not to be used"
-        )
+        message += f"; {lost} of {chains * walkers} walkers are lost in improbable regions: do not use the results"
     if stuck:
-        message += f"; {stuck} of {chains * walkers} walkers did not move in the steps kept: look where they sit"
+        message += f"; {stuck} of {chains * walkers} walkers did not move in the steps kept: look at their positions"
     return Draws(
         samples=walker_major(half.samples),
         log_probability=walker_major(half.values),
