@@ -1,10 +1,11 @@
-"""Prints what becomes of bands where the rig is not as inference assumes, whether it is noticed, and what cures it.
+"""Prints the coverage of bands if the rig differs from what inference assumes, its detection, and its correction.
 
 Every row is a calibration: parabolas are drawn from the default prior, swept, measured and inferred as `infer` does by
 default, and their bands are compared with the truth. Noise is as stated; what else is not known of the rig is drawn
-from its default prior. An indented row repeats the case above it with other arguments of inference. Where the default
-infers the property that is wrong, everything is taken as stated instead (--as-stated); elsewhere the row names what is
-inferred, or told, to cure it. Replicates are kept in results/misspecification, from which a stopped run resumes.
+from its default prior. An indented row repeats the case above it with other arguments of inference. If the default
+infers the property that is wrong, everything is taken as stated instead (--as-stated); otherwise the row names the
+property that is inferred, or stated, in correction. Replicates are kept in results/misspecification, from which a
+stopped run resumes.
 """
 
 from __future__ import annotations
@@ -29,27 +30,27 @@ TWO_BASES = [(0.0, 0.0), (0.3, 0.0)]
 SETTINGS = tb.SamplerSettings(ensembles=2, walkers=34, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
 """Posteriors that agree with no model may have many modes; those that take longer say that they have not converged."""
 FEWER = 4
-"""So many times fewer replicates are made of shape-free contours, as they cost more."""
+"""Factor by which replicates of shape-free contours are fewer, as they cost more."""
 
 CHANCE, SCORE = 1e-3, 4.0
 """Probability of the misfit, and size of the axial score, that are an alarm."""
 
 
 class Run(NamedTuple):
-    """A world, and what inference is told otherwise than by default."""
+    """A misspecified rig, and arguments of inference other than the defaults."""
 
     world: dict[str, Any]
     asked: Mapping[str, Any] = MappingProxyType({})
 
 
 def _known_to_vary(exactly: dict[str, float], beside: dict[str, Any]) -> dict[str, Run]:
-    """What by default has a prior, one value of it; and the same where everything is taken as stated."""
+    """Return runs with one value of properties that are inferred by default, and with everything taken as stated."""
     priors = {name: stats.norm(value, 1e-9) for name, value in exactly.items()}
     return {"": Run({"priors": priors}), "--as-stated": Run(beside, {"nuisances": ()})}
 
 
 def _untold(world: dict[str, Any], asked: dict[str, Any], **others: dict[str, Any]) -> dict[str, Run]:
-    """What by default nothing is inferred of; and the same where it is inferred, or told."""
+    """Return runs with properties that are not inferred by default, and with these inferred or stated."""
     return {"": Run(world, asked)} | {
         other.replace("_", " "): Run(world, asked | more) for other, more in others.items()
     }
@@ -132,7 +133,7 @@ def row(name: str, found: xr.Dataset) -> str:
 
 
 def _mean(found: xr.Dataset, name: str) -> float:
-    """Of its size; NaN where no sweeps of a world leave a gap."""
+    """Return the mean size; NaN if no sweeps leave a gap."""
     return float(abs(found[name]).mean()) if name in found else np.nan
 
 

@@ -78,7 +78,7 @@ def calibrate(
     replicates. Conversely, ranks that are not uniform prove that sampler, likelihood or prior are wrong. With a
     misspecification (`world`), the rig differs from what inference assumes, and the ranks show the effect on intervals.
 
-    An error in a replicate does not end the run: the replicate is lost and counts as one in which nothing holds;
+    An error in a replicate does not end the run: the replicate is lost, and no claim holds in it;
     `calibration_replicate` repeats it alone. An interrupt ends the run.
 
     Parameters
@@ -137,7 +137,7 @@ def calibrate(
             and simultaneous bands of the contour in the gap and beside it, contact regions, the predicted angle of
             snap-off. A claim holds in no replicate that is lost.
         noticed_below, noticed_above (claim)
-            Coverages below and above the stated one that would have been called a fault with the probability
+            Coverages below and above the stated one that would have been detected as faults with the probability
             ``power``, by the binomial distribution; NaN if there is none.
         pointwise_in_gap and so on, width_, bias_ and off_ (mean width of the band, mean and largest distance of its
         median from the truth [length], in_gap and beside), check_passed, misfit_probability, axial_score, converged,

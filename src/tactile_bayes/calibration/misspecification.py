@@ -43,7 +43,7 @@ _ENDS, _KNOTS = 1.5, 121
 
 @dataclass(frozen=True)
 class Misspecification:
-    """Misspecification: differences between the simulated rig and what inference assumes, by default none.
+    """Differences between the simulated rig and what inference assumes, by default none.
 
     Parameters
     ----------

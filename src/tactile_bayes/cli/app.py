@@ -35,7 +35,7 @@ class _Commands(TyperGroup):
     """Commands whose errors are a line on stderr and an exit code: 2 if refused, 130 if interrupted, else 1."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Keep the words of the call, which a posterior states."""
+        """Store the arguments of the call, which a posterior states."""
         ctx.meta["words"] = ("tactile-bayes", *args)
         return super().parse_args(ctx, args)
 

@@ -118,7 +118,7 @@ def compare_families(
             Logarithm of the evidence, and the error of its computation; NaN where the ensembles did not agree.
         probability_by_width (prior_width, family)
             Probability with priors of sizes, exponents, amplitude and length scale of ½, 1 and 2 times the width: if it
-            depends on the width, the record says little.
+            depends on the width, the record is hardly informative.
         elpd, elpd_error
             Expected log predictive density: the sum of the samples' leave-one-out log-densities, and its Monte-Carlo
             error.
@@ -128,7 +128,7 @@ def compare_families(
         weight
             Weight of the family in the mixture that predicts best (stacking; Yao et al. 2018, doi 10.1214/17-BA1091).
         largest_k (family)
-            Largest Pareto k̂ of the importance sampling; above 0.7 its density cannot be trusted (Vehtari et al. 2024,
+            Largest Pareto k̂ of the importance sampling; above 0.7 its density is unreliable (Vehtari et al. 2024,
             JMLR 25(72)).
         p_value, fits
             Overall p-value of `check_record`, and True if the check passes.

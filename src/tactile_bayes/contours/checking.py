@@ -35,7 +35,7 @@ _SAME = 1e-9
 
 
 def check(contour: Contour) -> None:
-    """Refuse a contour whose formulas are inconsistent, or which is not strictly convex: for a family of one's own.
+    """Refuse a contour whose formulas are inconsistent, or which is not strictly convex; it serves new families.
 
     The check takes 400 points a contour, where it is not steeper than 1.5 rad. It compares the rates of point and slope
     angle with their changes from point to point, and verifies the growth of the slope angle, the height, and the

@@ -44,7 +44,7 @@ class FamilyParameter(NamedTuple):
     prior: DefaultPrior | None = None
     """None for the vertex, which lies anywhere within a rod length of the pivot."""
     bounds: tuple[float, float] = (-np.inf, np.inf)
-    """Least and greatest value; no contour has another one."""
+    """Least and greatest value of a valid contour."""
     unit: str = "1"
     """Unit of a parameter without length."""
 

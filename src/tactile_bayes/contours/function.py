@@ -1,4 +1,4 @@
-"""Contours from a function of one's own."""
+"""Contours from a function."""
 
 from __future__ import annotations
 

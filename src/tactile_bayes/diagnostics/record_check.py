@@ -53,8 +53,8 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
     """Check a record against those that the posterior predicts (posterior predictive check).
 
     The noise that is inferred beside the contour absorbs misfit from any cause, such as a contour outside the family, a
-    wrong rod or a forgotten tare, so that the size of the residuals says nothing. Their pattern does: misfit is smooth
-    in the drive angle and absent from unloaded samples; noise is neither.
+    wrong rod or a forgotten tare, so that the size of the residuals is uninformative. Their pattern is not: misfit is
+    smooth in the drive angle and absent from unloaded samples; noise is neither.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
 
     All except `largest` clip residuals at 4. None depends on the size of the noise. The p-values are those of Gelman,
     Meng and Stern 1996 (Statistica Sinica 6, 733) with residuals about one centre. The posterior is inferred from the
-    same record, so they are conservative: under a true model they are seldom small, and the more seldom the more
+    same record, so they are conservative: under a true model they are rarely small, and the more rarely the more
     parameters there are per sample. A record that passes is not proven right: misfit below the noise over √(samples in
     a stretch) remains undetected.
 

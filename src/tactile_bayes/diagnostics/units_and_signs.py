@@ -41,6 +41,11 @@ def check_units_and_signs(measured: xr.Dataset, load_cell: LoadCell | None = Non
     tuple of str
         A message for each unit or sign that is probably wrong; empty if there is none.
 
+    Raises
+    ------
+    ParameterError
+        If the load cell is in another frame than the record's forces.
+
     Notes
     -----
     The lever arm of the contact force is at most L, so that |m0| ≤ f L with or without friction. In tangential contact

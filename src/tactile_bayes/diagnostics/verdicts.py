@@ -43,7 +43,7 @@ _BEYOND = 0.5
 at its end has nothing beyond it."""
 
 _PRIOR_DOMINATED = 0.7
-"""Width of the posterior over that of the prior above which the record is said to tell little."""
+"""Width of the posterior over that of the prior above which the record is reported as uninformative."""
 
 _CAUSES = {
     "runs": "whose residuals do not scatter about zero but stay on one side",
@@ -62,7 +62,7 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     posterior : xr.DataTree
         From `infer_contour`.
     contacts : xr.Dataset, optional
-        From `reconstruct` by method="constrained", whose misfits tell whether the loads of a sample agree.
+        From `reconstruct` by method="constrained", whose misfits show whether the loads of a sample agree.
 
     Returns
     -------
@@ -70,8 +70,8 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
         One or more sentences. They report: loads that such a rod cannot have (`check_units_and_signs`); a zero that is
         off, or that moved; a record that does not look like what the posterior predicts (`check_record`); ensembles
         that have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
-        nuisance parameters that are nearly impossible under their prior. The last, which is not against the result,
-        names parameters of which the record tells little.
+        nuisance parameters that are nearly impossible under their prior. The last, which is no
+        fault, names parameters that the record hardly determines.
 
     Raises
     ------

@@ -66,7 +66,9 @@ def infer_contour(
     The likelihood includes the unloaded samples: a contour whose first contact or snap-off is earlier or later than
     the record shows is unlikely. Contours that some sweep of the record could not reach are excluded. The walkers start
     around a robust least-squares optimum, whose search begins at the contact points of Step 2, or, if channels are
-    missing, at the best of many draws from the prior.
+    missing, at the best of many draws from the prior. The sampler is emcee (Foreman-Mackey et al. 2013, doi
+    10.1086/670067), with proposals by differential evolution (ter Braak 2006, doi 10.1007/s11222-006-8769-1) and from
+    fitted t distributions.
 
     Parameters
     ----------
@@ -140,24 +142,23 @@ def infer_contour(
 
     Notes
     -----
-    The default priors follow from pivot and rod length L alone, not from measured values. Vertex: within a rod
-    length of the pivot sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r and the
-    ellipse's semi-axes a (sideways) and b: log-normal around L/2, all with standard deviation 1 of the logarithm. The
-    power law is (y − q)/w = (|x − x_c|/w)ⁿ, so that w is where the contour is as high as it is wide: log-normal around
-    L, standard deviation 1 of the logarithm; n − 1: log-normal around 1, standard deviation 0.7 of the logarithm, n
-    from 1.1 to 50. Shape-free contours have a radius of curvature whose logarithm is a random function of the slope
-    angle: r, its geometric mean from −π/2 to π/2, log-normal like a circle's; amplitude, by how much the logarithm goes
-    up and down, log-normal around 0.7, standard deviation 0.6 of the logarithm; length_scale, the angle in which it
-    does so [rad], log-normal around 0.7, standard deviation 0.4 of the logarithm, from 0.15 to 4 (Matérn's covariance,
-    ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at the shortest length
-    scale. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale:
-    log-normal around 1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L
-    and EI/L². Of the nuisances: rigidity_scale log-normal around 1 with 5 %,
-    drive_angle_offset normal with 1°, biases and drifts normal with 0.1 EI/L and EI/L² (a bias of which the load cell
-    states a bias_uncertainty is integrated out instead), lever_x and lever_y normal with 0.5 % of L, backlash normal
-    with 0.2°, gains normal around 1 with 2 %, friction half-normal with scale 0.3, suspension_compliance half-normal
-    with 0.05 rad per EI/L, pivots normal with 1 % of L. In addition, contours out of reach are excluded, and those that
-    the rod would still cut after snap-off.
+    The default priors follow from pivot and rod length L alone, not from measured values. Vertex: within a rod length
+    of the pivot sideways and in height, uniformly. Parabola's a: log-normal around 1/L, circle's r and the ellipse's
+    semi-axes a (sideways) and b: log-normal around L/2, all with standard deviation 1 of the logarithm. The power law
+    is (y − q)/w = (|x − x_c|/w)ⁿ, so that w is where the contour is as high as it is wide: log-normal around L,
+    standard deviation 1 of the logarithm; n − 1: log-normal around 1, standard deviation 0.7 of the logarithm, n from
+    1.1 to 50. Shape-free contours have a radius of curvature whose logarithm is a random function of the slope angle:
+    r, its geometric mean from −π/2 to π/2, log-normal like a circle's; amplitude, the standard deviation of that
+    logarithm, log-normal around 0.7, standard deviation 0.6 of the logarithm; length_scale, the slope angle over which
+    it changes [rad], log-normal around 0.7, standard deviation 0.4 of the logarithm, from 0.15 to 4 (Matérn's
+    covariance, ν = 5/2); z_1, z_2 …, standard normal, in the directions that make 99 % of its variance at the shortest
+    length scale. They are smooth: a sharper corner, or a radius that jumps, is smoothed. noise_scale: log-normal around
+    1, standard deviation 0.5 of the logarithm. Unknown noises: log-uniform from 1e-6 to 10, in EI/L and EI/L². Of the
+    nuisances: rigidity_scale log-normal around 1 with 5 %, drive_angle_offset normal with 1°, biases and drifts normal
+    with 0.1 EI/L and EI/L² (a bias of which the load cell states a bias_uncertainty is integrated out instead), lever_x
+    and lever_y normal with 0.5 % of L, backlash normal with 0.2°, gains normal around 1 with 2 %, friction half-normal
+    with scale 0.3, suspension_compliance half-normal with 0.05 rad per EI/L, pivots normal with 1 % of L. In addition,
+    contours out of reach are excluded, and those that the rod would still cut after snap-off.
 
     Examples
     --------

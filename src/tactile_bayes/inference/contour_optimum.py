@@ -78,7 +78,7 @@ class Brackets(NamedTuple):
     """Distance outside that counts as a residual of one [rad]."""
 
     def at(self, events: Floats) -> Floats:
-        """Return the bracketed of all events, (n, segments, 2), as (n, events); NaN if one does not occur."""
+        """Select the bracketed events from all events, (n, segments, 2), as (n, events); NaN if one does not occur."""
         return np.asarray(events[:, self.segment, self.ends])
 
     def missed(self, events: Floats) -> Floats:

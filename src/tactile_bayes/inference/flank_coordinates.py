@@ -33,7 +33,7 @@ class _AtFlank(NamedTuple):
     log_slope: Floats
     """Logarithm of the slope t."""
     log_shape: Floats
-    """Logarithm of what slope and curvature leave open."""
+    """Logarithm of the shape, which slope and curvature leave free."""
     log_ratio: Floats
     """Logarithm of t/t′ [length]."""
     rise: Floats

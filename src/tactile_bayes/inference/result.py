@@ -207,6 +207,11 @@ def read_result(path: str | os.PathLike[str]) -> xr.DataTree:
     path : path-like
         Path of the file.
 
+    Returns
+    -------
+    xr.DataTree
+        The posterior, as it was written.
+
     Raises
     ------
     InferenceError

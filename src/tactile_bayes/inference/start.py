@@ -188,7 +188,7 @@ class Cloud:
     ends: Ends = ANYTHING
     """Bounds of the points."""
     is_possible: bool = True
-    """Whether any point was found that is possible."""
+    """True if a possible point was found."""
 
     @property
     def narrow_covariance(self) -> Floats:

@@ -80,9 +80,9 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     *Contact.* Take some samples at both ends of a sweep. Without contact the sum of squares about their mean, as a
     share of that of the whole sweep, follows a beta distribution exactly, for any bias and noise. The smallest of its
     probabilities, over ends of 0, 1, 2, 3, 4, 6, 8, 12, ... samples and over channels, times their number (Bonferroni),
-    is `p_value`: the rate of false alarms is bounded for every length, and for correlated channels. Lest outliers make
-    a contact, the same must hold after readings that exceed both neighbours are clipped at three deviations from the
-    median.
+    is `p_value`: the rate of false alarms is bounded for every length, and for correlated channels. So that outliers do
+    not count as contact, the same must hold after readings that exceed both neighbours are clipped at three deviations
+    from the median.
 
     *Bounds of contact.* A sample (with a neighbour on the same side) or a block of 2, 4, 8, ... samples is loaded if
     Student's t against the ends is significant, again by Bonferroni. The first one bounds the onset from above. The
@@ -98,8 +98,8 @@ def zero_load(record: xr.Dataset, *, false_alarm: float = 1e-3) -> xr.Dataset:
     100). Onset is detected 17, 5 and 0.3 samples late at slopes of 0.2, 1 and 20 σ a sample, and 7, 3 and 1 samples
     before it are left out as a margin. A snap-off from 20 σ is exact to the sample in 999 of 1000 sweeps, from 10 σ in
     three of four; otherwise its samples are further apart. Bias over its uncertainty follows Student's t, with a mean
-    below 0.1. But a contact too weak to be found shifts it: by 4 uncertainties for 100 samples that reach 1 σ, between
-    15 unloaded samples on either side.
+    below 0.1. However, a contact too weak to be detected shifts it: by 4 uncertainties for 100 samples that reach 1 σ,
+    between 15 unloaded samples on either side.
 
     *Limits.* A load that is constant throughout a sweep counts as a bias. The warning reports a zero that moves during
     contact (2 σ in 7 of 10 sweeps, 15 samples on either side); but a change by more than about a sixth of the largest

@@ -25,8 +25,8 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False, "no_cfunc_wrapper": True}
-"""The caller in Python owns all arrays: compiled code allocates nothing and does not count references to arrays, which
-would take longer than small functions do."""
+"""Options of numba. The caller in Python owns all arrays: compiled code allocates nothing and does not count references
+to arrays, which would take longer than small functions do."""
 
 
 class _PartLibrary(JITCodeLibrary):

@@ -85,8 +85,20 @@ def tangential_arclength(
 ) -> Floats:
     """Arc length [L] that tangential contact of a forward sweep takes; above 1 only the tip can touch there.
 
-    Parameters and errors are those of `wrench_from_contact`. The result has the broadcast shape; it is NaN where the
-    contour faces away from the pivot.
+    Parameters
+    ----------
+    contact_x, contact_y, slope_angle, friction_angle : array_like
+        As in `wrench_from_contact`.
+
+    Returns
+    -------
+    array
+        Of the broadcast shape; NaN where the contour faces away from the pivot.
+
+    Raises
+    ------
+    ParameterError
+        If a friction angle is not between 0 and 0.7.
 
     Examples
     --------
@@ -235,10 +247,20 @@ def contact_from_wrench(
 
 
 def largest_curvature(wrench: Wrench) -> Floats:
-    """Largest curvature of the rod between pivot and contact [1/L], of the shape of the wrench.
+    """Largest curvature of the rod between pivot and contact [1/L].
 
     It is the largest bending moment in EI/L. Along the rod κ²/2 = f (sin ψ − sin ψ1), which is greatest where ψ = π/2
     if the rod passes that direction, else at the pivot, where it is the holding moment.
+
+    Parameters
+    ----------
+    wrench : Wrench
+        Base wrenches, of any shape.
+
+    Returns
+    -------
+    array
+        Of the shape of the wrenches.
 
     Examples
     --------

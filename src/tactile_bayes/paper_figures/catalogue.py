@@ -130,7 +130,17 @@ def figure(
 
 
 def caption(number: int, **options: Any) -> str:
-    """Return the caption of a figure; options are those of `figure`.
+    """Return the caption of a figure.
+
+    Parameters
+    ----------
+    number, options
+        As in `figure`.
+
+    Returns
+    -------
+    str
+        The caption, with the distances and the seed of the noise.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A plan of sweeps: contour, drive, rod, load cell, and what is unknown of the rig."""
+"""A plan of sweeps: contour, drive, rod, load cell, and the unknowns of the rig."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = ["Plan"]
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A plan of sweeps: contour, drive, rod, load cell, and what is unknown of the rig.
+    """A plan of sweeps: contour, drive, rod, load cell, and the unknowns of the rig.
 
     Parameters
     ----------

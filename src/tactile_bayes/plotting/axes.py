@@ -53,21 +53,21 @@ def check_panels(axes: Any, shape: tuple[int, ...], meaning: str) -> AxesArray:
 
 
 def check_dataset(found: Any, names: set[str], kind: str, source: str, attrs: Sequence[str] = ()) -> None:
-    """Refuse all but a dataset with these variables and attributes; `source` names the function that returns one."""
+    """Refuse objects other than a dataset with these variables and attributes; `source` names the function for it."""
     is_one = isinstance(found, xr.Dataset) and names <= set(found.variables) and set(attrs) <= set(found.attrs)
     if not is_one:
         raise ParameterError(f"this is no {kind}: give what {source} returned")
 
 
 def write_instead(ax: Axes, words: str) -> Axes:
-    """Say why nothing is drawn, in the middle of Axes that are switched off."""
+    """Write why nothing is drawn in the middle of Axes that are switched off."""
     ax.set_axis_off()
     ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center")
     return ax
 
 
 def write_not_measured(ax: Axes, label: str) -> None:
-    """Say that a channel was not measured."""
+    """Write that a channel was not measured."""
     ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", va="center", color=PALETTE["none"])
     ax.set_yticks([])
     ax.set_ylabel(label)

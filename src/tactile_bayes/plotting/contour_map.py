@@ -128,7 +128,7 @@ def band_detail(
     gap: tuple[float, float] | xr.Dataset | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw a band measured from its median, enlarged to fill the Axes; on a map a good band is invisible.
+    """Draw a band measured from its median, enlarged to fill the Axes; on a map a narrow band is invisible.
 
     Parameters
     ----------

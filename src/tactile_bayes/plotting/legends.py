@@ -35,7 +35,7 @@ def legend(ax: Axes, entries: Mapping[str, Any] | None = None, **options: Any) -
 
 
 def legend_above(ax: Axes, columns: int, entries: Mapping[str, Any] | None = None, **options: Any) -> None:
-    """Draw such a legend above the Axes."""
+    """Draw a small legend without a frame above the Axes."""
     legend(ax, entries, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, **options)
 
 

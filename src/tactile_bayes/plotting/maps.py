@@ -58,7 +58,7 @@ def label_map(ax: Axes, attrs: Mapping[Any, Any], limits: Floats, form: str = "{
 
 
 def fit_height(ax: Axes) -> None:
-    """Make a figure that holds nothing but a low map as low as that, with room for labels and legend."""
+    """Reduce the height of a figure with a single low map to that of the map, labels and legend."""
     left, right, bottom, top = limits_of(ax)
     figure: Any = ax.figure
     wide, high = figure.get_size_inches()

@@ -24,7 +24,7 @@ def number_in(cell: Any) -> float | None:
 
 
 def integer_in(cell: Any) -> int | None:
-    """Parse the integer in a cell, None for other content; 2.0 counts as one, since tables often contain it."""
+    """Parse the integer in a cell, None for other content; 2.0 is accepted, since tables often contain it."""
     if isinstance(cell, int):
         integer = cell
     elif isinstance(cell, str) and is_integer_text(cell):

@@ -17,7 +17,7 @@ __all__ = ["background_of"]
 
 
 def background_of(findings: Findings) -> dict[str, Table | None]:
-    """Return all of these tables by their names in the template."""
+    """Return the background tables by their names in the template."""
     return {
         "sweeps": _sweeps(findings),
         "priors": _priors(findings),

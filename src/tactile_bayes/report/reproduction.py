@@ -74,7 +74,7 @@ def python_lines(attrs: Mapping[Any, Any]) -> str:
 
 
 def hindrances(posterior: xr.DataTree, record: xr.Dataset) -> list[str]:
-    """Return reasons why those lines may not give the same draws."""
+    """Return reasons why the lines of Python may not give the same draws."""
     attrs = posterior.attrs
     settings = json.loads(attrs["settings"])
     found = []

@@ -157,6 +157,8 @@ def scan(
 ) -> Scan:
     """Sweep the rod along a contour, and record the loads at its base from before first contact to after snap-off.
 
+    This is Step 1 of Merker et al. 2018, doi 10.1155/2018/1613945, in closed form.
+
     Parameters
     ----------
     contour : Contour

@@ -164,7 +164,7 @@ def _read(file: Path, identity: Mapping[str, str], kind: Kind) -> dict[int, Any]
 
 
 def _storable(value: Any) -> Any:
-    """As JSON holds it: null for what is not finite, and lists for tuples."""
+    """Convert a value to types of JSON: null for numbers that are not finite, and lists for tuples."""
     if isinstance(value, Mapping):
         return {name: _storable(part) for name, part in value.items()}
     if isinstance(value, list | tuple):
