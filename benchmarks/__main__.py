@@ -1,4 +1,4 @@
-"""Prints what SciPy alone costs beside what this package costs, in one process and one thread, and how costs grow."""
+"""Prints times of SciPy alone and of this package, in one process and one thread, and their growth."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def main() -> None:
 
 
 def step_one() -> tuple[list[Row], str]:
-    """A state, at 40 slope angles by hand."""
+    """Time a state; 40 slope angles by hand."""
     slopes = np.linspace(*SLOPES, 40)
     exact = states(slopes)
     first = tuple(exact[0])
@@ -108,7 +108,7 @@ def step_one() -> tuple[list[Row], str]:
 
 
 def step_two() -> tuple[list[Row], str]:
-    """A sample, of 60 by hand."""
+    """Time a sample; 60 by hand."""
     clean = record(MANY)
     some = clean.isel(sample=np.flatnonzero(clean.holding_moment > 0.0)[:: MANY // 120])
     wrenches = [some[name].values for name in ("drive_angle", "holding_moment", "force_x", "force_y")]
@@ -132,7 +132,7 @@ def step_two() -> tuple[list[Row], str]:
 
 
 def constrained() -> tuple[Row, str]:
-    """A sample; by hand, of some that are in tangential contact, whose sheet alone is fitted."""
+    """Time a sample; by hand, some in tangential contact, for which that sheet alone is fitted."""
     measured = CELL.measure(record(MANY), seed=1)
     contacts = tb.reconstruct(measured, method="constrained")
     lying = (contacts.contact_phase.values == "tangential") & (contacts.status.values == "ok")
@@ -154,7 +154,7 @@ def constrained() -> tuple[Row, str]:
 
 
 def posteriors() -> Row:
-    """A contact, of a double sweep at 1°; by emcee, of every fortieth sample."""
+    """Time a contact of a double sweep at 1°; every fortieth sample by emcee."""
     measured = CELL.measure(tb.scan(CONTOUR).record, seed=1)
     some = measured.isel(sample=slice(None, None, 40))
     counts = [int((tb.reconstruct(part).status != "no contact").sum()) for part in (some, measured)]
@@ -164,9 +164,9 @@ def posteriors() -> Row:
 
 
 def contour_posterior() -> tuple[Row, str]:
-    """The demonstration's, start and predictions included; by emcee's own moves what 1000 effective draws take.
+    """Time the demonstration, with start and predictions; by emcee's own moves, 1000 effective draws.
 
-    These are given the start, the very same log-probability, vectorised, and enough steps to forget the start; their
+    These get the start, the same log-probability, vectorised, and enough steps to forget the start; their
     effective draws are those of the second half.
     """
     measured = LOAD_CELL.measure(tb.scan(DEMONSTRATED, rod=ROD).record, seed=1)
@@ -190,7 +190,7 @@ def contour_posterior() -> tuple[Row, str]:
 
 
 def sweeps(by_hand: float) -> list[Row]:
-    """Whole sweeps; by hand they cost as much as their states in contact."""
+    """Time whole sweeps; by hand they take as long as their states in contact."""
     scan = tb.scan(CONTOUR)
     scanned = in_contact(scan.record)
     observed = loads(1_000)
@@ -212,7 +212,7 @@ def sweeps(by_hand: float) -> list[Row]:
 
 
 def data_set() -> tuple[Row, str]:
-    """A record of a data set; by hand, every fourth state of the forward sweeps of its first four."""
+    """Time a record of a data set; by hand, every fourth state of the forward sweeps of the first four."""
     records = SPECIFICATION["records"]
     with TemporaryDirectory() as folder:
         few = tb.datasets.generate({**SPECIFICATION, "records": 4}, mkdtemp(dir=folder), workers=1)
@@ -229,7 +229,7 @@ def data_set() -> tuple[Row, str]:
 
 
 def time_by_hand(sweep: xr.Dataset) -> float:
-    """Of a state, along every fourth sample in contact."""
+    """Return the time of a state, along every fourth sample in contact."""
     some = sweep.isel(sample=np.flatnonzero(sweep.truth_contact_phase.values != 0)[::4])
     contour = Parabola(*(float(some[f"truth_contour_{name}"]) for name in ("a", "q", "x_c")))
     force = np.hypot(some.truth_force_x, some.truth_force_y)
@@ -240,7 +240,7 @@ def time_by_hand(sweep: xr.Dataset) -> float:
 
 
 def states(slopes: np.ndarray) -> np.ndarray:
-    """Drive angle, holding moment, force and arc length of the contact."""
+    """Return drive angle, holding moment, force and arc length of the contact."""
     found = tb.equilibria(CONTOUR, slopes)
     force = np.hypot(found.force_x, found.force_y)
     return np.stack([found.drive_angle, found.holding_moment, force, found.contact_arclength], axis=1)
@@ -251,14 +251,14 @@ def in_contact(scanned: xr.Dataset) -> int:
 
 
 def contours(count: int) -> Parabola:
-    """Contours that differ as those of a broad posterior do."""
+    """Return contours as different as those of a broad posterior."""
     rng = np.random.default_rng(1)
     return Parabola(rng.uniform(0.3, 0.7, count), rng.uniform(0.5, 0.7, count), rng.uniform(-0.1, 0.1, count))
 
 
 @cache
 def double_sweep() -> xr.Dataset:
-    """Of about `MANY` samples, but for some 60 in contact, as a load cell without noise gives them."""
+    """Return about `MANY` samples, all in contact except some 60, from a load cell without noise."""
     events = tb.scan(CONTOUR).events.values()
     angle = sum(abs(sweep.snap_off.drive_angle - sweep.first_contact.drive_angle) for sweep in events)
     scanned = tb.scan(CONTOUR, drive_step=angle / (MANY - 60)).record
@@ -266,7 +266,7 @@ def double_sweep() -> xr.Dataset:
 
 
 def record(count: int) -> xr.Dataset:
-    """About so many samples of the double sweep, or several double sweeps."""
+    """Return about so many samples of the double sweep, or several double sweeps."""
     if count <= MANY:
         return double_sweep().isel(sample=slice(None, None, MANY // count))
     times, one = count // MANY, double_sweep()
@@ -286,7 +286,7 @@ def reconstruct(count: int) -> Callable[[], Any]:
 
 
 def loads(count: int) -> Callable[[], Any]:
-    """As a likelihood asks for them."""
+    """Return loads as a likelihood computes them."""
     zero = np.zeros(count)
     sweep_frame = SweepFrame(contours(count), zero, zero, 1.0, 0.0, zero > 0.0)
     return lambda: trace(sweep_frame, tolerance=np.array([4e-5, 1e-4, 1e-4]), drive_angles=ANGLES, polished=False)

@@ -1,6 +1,6 @@
-"""Prints whether posteriors are calibrated at the defaults of `infer`: coverage, ranks of the truth, and what was lost.
+"""Prints the calibration at the defaults of `infer`: coverage, ranks of the truth, and lost replicates.
 
-Truths are drawn from the default prior of a family and of what is not known of the rig, at the usual noise, a tenth of
+Truths are drawn from the default priors of a family and of the unknowns of the rig, at the usual noise, a tenth of
 it and three times as much; see `tactile_bayes.calibrate`. Results are kept in results/calibration, so that a run that
 was stopped goes on. With the argument "published", the tables are those of the replicates in data/calibration.
 """
@@ -28,13 +28,13 @@ SEED = 2026
 class Family(NamedTuple):
     title: str
     replicates: int
-    """At the usual noise; half as many at others."""
+    """Number at the usual noise; half as many at others."""
 
 
 class Noise(NamedTuple):
     title: str
     factor: float
-    """On standard deviations of 0.05 EI/L² and 0.02 EI/L."""
+    """Factor on standard deviations of 0.05 EI/L² and 0.02 EI/L."""
 
 
 FAMILIES = {

@@ -1,4 +1,4 @@
-"""Prints how far contact points are off, and how often regions of stated probability hold the true contact."""
+"""Prints errors of contact points, and the coverage of their regions."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def main(sweeps: int = 1000) -> None:
 
 
 def print_errors() -> None:
-    """Raw and constrained, along and across the contour, by phase and noise."""
+    """Print errors, raw and constrained, along and across the contour, by phase and noise."""
     print(f"{'noise of force [EI/L²]':<24}{'phase':<12}{'contacts':>9}{'raw: no answer':>16}{'both ok':>9}", end="")
     print(f"{'raw: along':>12}{'across':>9}{'constrained: along':>20}{'across':>9}")
     data = tb.datasets.open(REFERENCE)
@@ -69,7 +69,7 @@ def print_errors() -> None:
 
 
 def errors(contacts: xr.Dataset, record: xr.Dataset) -> tuple[Floats, Floats]:
-    """Along the true contour and across it."""
+    """Return errors along the true contour and across it."""
     x = contacts.contact_x.values - record.truth_contact_x.values
     y = contacts.contact_y.values - record.truth_contact_y.values
     slope = record.truth_slope_angle.values
@@ -80,7 +80,7 @@ def errors(contacts: xr.Dataset, record: xr.Dataset) -> tuple[Floats, Floats]:
 
 
 def print_coverage(sweeps: int, seed: int = 1) -> None:
-    """By phase and place in the sweep; in brackets, where exact regions would be in 95 of 100 such studies."""
+    """Print coverage by phase and part of the sweep; in brackets, that of exact regions in 95 of 100 studies."""
     found = coverage(sweeps, seed)
     print(f"{'':<39}{'contacts':>9}{'status ok':>14}" + "".join(f"{f'{p:.0%}':>23}" for p in PROBABILITIES))
     for name in (*METHODS, "posterior"):
@@ -98,7 +98,7 @@ def print_coverage(sweeps: int, seed: int = 1) -> None:
 
 
 def coverage(sweeps: int, seed: int) -> dict[str, NDArray[np.generic]]:
-    """Of every contact that noise does not hide, the probability of the smallest region that holds the true one."""
+    """Return the probability of the smallest region that holds the true contact, for contacts above the noise."""
     parts: list[dict[str, NDArray[np.generic]]] = []
     for number, truth in enumerate(records(sweeps, seed)):
         measured = CELL.measure(truth, seed=np.random.default_rng([seed, number]))
@@ -124,7 +124,7 @@ def coverage(sweeps: int, seed: int) -> dict[str, NDArray[np.generic]]:
 
 
 def squared_distance(contacts: xr.Dataset, record: xr.Dataset) -> Floats:
-    """Of the true contact point from the estimate, in standard deviations; infinite where there is none."""
+    """Return that of the true contact point from the estimate, in standard deviations; infinite without an estimate."""
     x = (record.truth_contact_x - contacts.contact_x).values / contacts.contact_x_sd.values
     y = (record.truth_contact_y - contacts.contact_y).values / contacts.contact_y_sd.values
     rho = contacts.contact_xy_correlation.values
@@ -134,7 +134,7 @@ def squared_distance(contacts: xr.Dataset, record: xr.Dataset) -> Floats:
 
 
 def records(sweeps: int, seed: int) -> Iterator[xr.Dataset]:
-    """Records of 50 sweeps along as many contours, 20 contacts of each, forward and backward by turns."""
+    """Yield records of 50 sweeps along as many contours, 20 contacts of each, forward and backward in turn."""
     rng = np.random.default_rng([seed, 2**32])
     for begin in range(0, sweeps, 50):
         count = min(50, sweeps - begin)
@@ -155,7 +155,7 @@ def contours(rng: np.random.Generator, number: int, count: int) -> Contour:
 
 
 def record_of(drawn: Contour, direction: str, count: int, rng: np.random.Generator) -> xr.Dataset:
-    """The first `count` contours that can be swept, at drive angles spread over each sweep's places at random."""
+    """Return a record of the first `count` contours that can be swept, at random drive angles of each sweep."""
     events = tb.scan_many(drawn, np.full((drawn.shape[0], 1), np.pi / 2), direction=direction)
     good = np.flatnonzero(events.status.values == "ok")[:count]
     share = np.concatenate([rng.uniform(*PLACES[place], (count, SAMPLES[place])) for place in PLACES], axis=1)

@@ -1,7 +1,7 @@
-"""Prints how much narrower bands are from a second base that was chosen than from one that was not.
+"""Prints widths of bands from a second base that was chosen, and from the obvious one.
 
 Objects are drawn from the prior, and with them a rig; each is swept from the origin, and inferred. Then it is swept
-from another base: beside the first by half the gap (which is what one would do to close it), or where
+from another base: beside the first by half the gap (the obvious choice to close it), or where
 `tactile_bayes.design` says; and inferred from both records together.
 """
 
@@ -31,7 +31,7 @@ PLACES = 25
 
 
 class Outcome(NamedTuple):
-    """Mean widths of bands over what the first base's sweeps span; gap included."""
+    """Mean widths of bands over the span of the first base's sweeps, with the gap."""
 
     first: float
     again: float
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
     naive: float
     chosen: float
     foreseen: float
-    """By `design`, of the base that it chose."""
+    """Prediction by `design` for the chosen base."""
     base: tuple[float, float]
     naive_base: tuple[float, float]
     message: str

@@ -1,4 +1,4 @@
-"""Prints how near posteriors come to Cramér and Rao's bounds, the smaller the noise the nearer.
+"""Prints posterior standard deviations over Cramér and Rao's bounds, at several noises.
 
 Profile II at the distance 0.5, swept forward and backward in steps of 2°, with all that is not known of the rig by
 default: nine parameters. What stands in the table is the standard deviation of each in its posterior, over the bound
@@ -17,7 +17,7 @@ from tactile_bayes.planning.information import information
 from tactile_bayes.tasks import run_tasks
 
 FACTORS = (3.0, 1.0, 0.1, 0.01)
-"""On a noise of 0.05 EI/L² and 0.02 EI/L."""
+"""Factors on a noise of 0.05 EI/L² and 0.02 EI/L."""
 DRAWS = 2500.0
 SETTINGS = tb.SamplerSettings(ensembles=4, walkers=32, max_r_hat=1.01, min_ess=DRAWS, max_steps=4000)
 PLAN = tb.Plan(
@@ -39,7 +39,7 @@ def main(records: int = 8) -> None:
 
 
 def compared(task: tuple[float, int]) -> Floats:
-    """Of every parameter, standard deviation over bound."""
+    """Return standard deviation over bound of every parameter."""
     factor, seed = task
     plan = PLAN.with_noise(factor)
     measured = plan.cell.measure(plan.scan.record, seed=seed)

@@ -1,8 +1,8 @@
 """Prints the coverage of bands if the rig differs from what inference assumes, its detection, and its correction.
 
 Every row is a calibration: parabolas are drawn from the default prior, swept, measured and inferred as `infer` does by
-default, and their bands are compared with the truth. Noise is as stated; what else is not known of the rig is drawn
-from its default prior. An indented row repeats the case above it with other arguments of inference. If the default
+default, and their bands are compared with the truth. Noise is as stated; other unknowns of the rig are drawn
+from their default priors. An indented row repeats the case above it with other arguments of inference. If the default
 infers the property that is wrong, everything is taken as stated instead (--as-stated); otherwise the row names the
 property that is inferred, or stated, in correction. Replicates are kept in results/misspecification, from which a
 stopped run resumes.
@@ -28,12 +28,12 @@ OUT = Path("results/misspecification")
 CELL = tb.LoadCell(force_noise=0.05, moment_noise=0.02)
 TWO_BASES = [(0.0, 0.0), (0.3, 0.0)]
 SETTINGS = tb.SamplerSettings(ensembles=2, walkers=34, block_steps=25, max_r_hat=1.05, min_ess=200.0, max_steps=500)
-"""Posteriors that agree with no model may have many modes; those that take longer say that they have not converged."""
+"""Posteriors of a wrong model may have many modes; those that take longer are reported as unconverged."""
 FEWER = 4
 """Factor by which replicates of shape-free contours are fewer, as they cost more."""
 
 CHANCE, SCORE = 1e-3, 4.0
-"""Probability of the misfit, and size of the axial score, that are an alarm."""
+"""Probability of the misfit, and size of the axial score, that raise an alarm."""
 
 
 class Run(NamedTuple):

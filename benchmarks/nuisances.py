@@ -1,4 +1,4 @@
-"""Prints what it costs not to know each thing of a rig: widths of bands and standard deviations, to first order.
+"""Prints the cost of each unknown of a rig: widths of bands and standard deviations, to first order.
 
 Profile II of the paper at q = 0.5, swept forward and backward in steps of 2°, with the usual load cell. From Fisher's
 information and the priors, as `tb.sensitivity` says them; nothing is drawn.
@@ -23,7 +23,7 @@ PARAMETERS = ("a", "q", "x_c")
 
 
 def sets() -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Nuisances, and what they are called."""
+    """Return sets of nuisances by name."""
     yield "default", STANDARD
     yield from ((f"without {name}", tuple(other for other in STANDARD if other != name)) for name in STANDARD)
     yield from ((f"with {name}", (*STANDARD, name)) for name in FURTHER)
@@ -32,7 +32,7 @@ def sets() -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def row(nuisances: tuple[str, ...]) -> dict[str, float]:
-    """Widths and standard deviations, of which the rod's length is 1000."""
+    """Return widths and standard deviations in thousandths of the rod's length."""
     plan = Plan(CONTOUR, CELL, drive_step=float(np.radians(2.0)), nuisances=nuisances)
     told = information(plan, probability=PROBABILITY)
     deviation = told.bound_with_priors.sel(parameter=list(PARAMETERS)).values

@@ -1,4 +1,4 @@
-"""Prints which shape is taken for which, and whether stated probabilities are right, over objects of known shape.
+"""Prints the confusion of shapes, and the calibration of probabilities, over objects of known shape.
 
 Objects are drawn from the priors by which families are compared, as many of each family, records of them simulated and
 all families compared. If the probabilities are right, of the families that are given a probability of 30 %, three of
@@ -30,7 +30,7 @@ NONE = "edge"
 
 KINDS = (*FAMILIES, NONE)
 NOISES = {"quiet": (0.02, 0.008), "strong": (0.15, 0.06)}
-"""Of forces [EI/L²] and of the moment [EI/L]."""
+"""Noise of forces [EI/L²] and of the moment [EI/L]."""
 
 ANGLES = np.radians(np.arange(0.0, 200.0, 2.0))
 VERTEX = {"q": stats.uniform(0.3, 0.4), "x_c": stats.norm(0.0, 0.1)}
@@ -40,10 +40,10 @@ BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 
 
 class Outcome(NamedTuple):
-    """Of one object."""
+    """Outcome for one object."""
 
     probability: Floats
-    """By family; NaN where there is none."""
+    """Probability by family; NaN if unknown."""
     fits: Flags
     seconds: float
 
@@ -58,7 +58,7 @@ def main(objects: int = 200, workers: int = 2) -> None:
 
 
 def tasks(objects: int) -> list[tuple[str, str, int]]:
-    """Kinds and noises by turns."""
+    """Return tasks, kinds and noises in turn."""
     return [(KINDS[k // 2 % len(KINDS)], list(NOISES)[k % 2], k) for k in range(objects)]
 
 
@@ -138,7 +138,7 @@ def recognised(task: tuple[str, str, int]) -> Outcome:
 
 
 def _drawn(family: str, cell: tb.LoadCell, rng: np.random.Generator) -> Contour:
-    """From the prior, within reach."""
+    """Draw from the prior, within reach."""
     record = tb.scan(tb.contours.Parabola(0.5, 0.5), drive_angles=ANGLES).record
     priors = {**matched_priors(family, 1.0), **VERTEX}
     model = Experiment(record, family, cell, priors, friction=0.0, nuisances=NUISANCES).model

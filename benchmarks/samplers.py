@@ -1,4 +1,4 @@
-"""Prints how many effective draws of one posterior our sampler and its peers make in a second, and of an evaluation.
+"""Prints effective draws of one posterior per second and per evaluation, by this package and other samplers.
 
 The posterior is the demonstration's: a parabola's three parameters and the factor on the load cell's noise. Every
 sampler is given the very same log-probability, the same starts, one processor core, and the same number of
@@ -79,7 +79,7 @@ def main(evaluations: int = 40_000) -> None:
 
 
 def started(walk: Walk) -> Floats:
-    """Where walkers start, as parameters, shape (ensembles, walkers, parameters)."""
+    """Return starting points of walkers, as parameters, shape (ensembles, walkers, parameters)."""
     parameters, _ = walk.coordinates.parameters(walk.start.reshape(-1, walk.start.shape[-1]))
     return parameters.reshape(walk.start.shape)
 
@@ -103,7 +103,7 @@ def installed(package: tuple[str, str]) -> bool:
 
 
 def print_row(name: str, evaluations: int, seconds: float, chains: Floats, reference: Floats) -> None:
-    """The largest distance of means is in standard deviations, and its Monte-Carlo error 1/√ESS of either."""
+    """Print a row; the largest distance of means is in standard deviations, with an error of 1/√ESS of either."""
     every = range(chains.shape[-1])
     ess = min(array_stats.ess(chains[..., i], chain_axis=0, draw_axis=1, method="bulk") for i in every)
     r_hat = max(array_stats.rhat(chains[..., i], chain_axis=0, draw_axis=1, method="rank") for i in every)
@@ -118,7 +118,7 @@ def print_row(name: str, evaluations: int, seconds: float, chains: Floats, refer
 
 
 def samplers(walk: Walk) -> Iterator[tuple[str, tuple[str, str], Sampler]]:
-    """Name, distribution and module, and function."""
+    """Yield name, distribution and module, and function."""
     yield "infer_contour's", ("tactile-bayes", "tactile_bayes"), ours(walk)
     pints = ("pints", "pints")
     yield "DifferentialEvolutionMCMC", pints, population_of_pints("DifferentialEvolutionMCMC")
@@ -128,7 +128,7 @@ def samplers(walk: Walk) -> Iterator[tuple[str, tuple[str, str], Sampler]]:
 
 
 def ours(walk: Walk) -> Sampler:
-    """Until the evaluations are spent, though it would have stopped before."""
+    """Sample until the evaluations are spent, although it would have stopped before."""
 
     def draw(target: Counted, start: Floats, evaluations: int) -> Floats:
         settings = tb.SamplerSettings(ensembles=RUNS, walkers=WALKERS, max_steps=steps_for(evaluations), min_ess=1e9)
@@ -154,7 +154,7 @@ def population_of_pints(name: str) -> Sampler:
 
 
 def haario(target: Counted, start: Floats, evaluations: int) -> Floats:
-    """One walker a run, from the first of the ensemble's; the scatter of the starts is the guess of its covariance."""
+    """Run one walker, from the first of the ensemble; the scatter of the starts is the initial covariance."""
     pints = import_module("pints")
     np.random.seed(1)  # noqa: NPY002
     covariance = np.cov(start.reshape(-1, start.shape[-1]).T)
@@ -163,7 +163,7 @@ def haario(target: Counted, start: Floats, evaluations: int) -> Floats:
 
 
 def asked(target: Counted, methods: list[Any], steps: int) -> Floats:
-    """Steps of methods of PINTS, whose points are computed together; shape (steps, walkers, parameters)."""
+    """Return steps of methods of PINTS, with points evaluated together; shape (steps, walkers, parameters)."""
     draws = []
     quiet = [method for method in methods if method.needs_initial_phase()]
     for method in quiet:
@@ -184,7 +184,7 @@ def asked(target: Counted, methods: list[Any], steps: int) -> Floats:
 
 
 def zeus(target: Counted, start: Floats, evaluations: int) -> Floats:
-    """Slices take as many evaluations as they take: a run ends when its share of them is spent."""
+    """Run zeus; the evaluations of a slice vary, so a run ends when its share of them is spent."""
     sampler_of = import_module("zeus").EnsembleSampler
     np.random.seed(1)  # noqa: NPY002
     runs = []

@@ -1,4 +1,4 @@
-"""Prints how good shape-free contours are: coverage of their bands in the gap and out, and width beside a known family.
+"""Prints the coverage of shape-free bands in the gap and beside it, and their width over that of a known family.
 
 The truths are not drawn from the prior: parabola, circle, ellipse, x⁴, profile IV of Merker et al. 2018, whose radius
 of curvature jumps, a rounded corner whose radius varies a hundredfold, and a contour through points that scatter.
@@ -23,7 +23,7 @@ from tactile_bayes.sweep import Scan
 from tactile_bayes.tasks import run_tasks
 
 NOISES = {"quiet": (0.02, 0.008), "middling": (0.05, 0.02), "strong": (0.15, 0.06)}
-"""Of forces [EI/L²] and of the moment [EI/L]."""
+"""Noise of forces [EI/L²] and of the moment [EI/L]."""
 
 ANGLES = np.radians(np.arange(0.0, 200.0, 1.0))
 PROBABILITY, PLACES = 0.9, 9
@@ -45,7 +45,7 @@ def _measured(q: float, x_c: float) -> Contour:
 
 
 class Truth(NamedTuple):
-    """A contour, and the family that knows what shape it has, if there is one."""
+    """A contour, and its family, if any."""
 
     build: Callable[[float, float], Contour]
     family: str | None
@@ -63,21 +63,21 @@ TRUTHS = {
 
 
 class Outcome(NamedTuple):
-    """Of one record."""
+    """Outcome for one record."""
 
     in_gap: float
-    """Share of the places in the gap at which the band holds the truth."""
+    """Share of the grid points in the gap at which the band holds the truth."""
     out_of_gap: float
     width: float
-    """Mean of the band in the gap."""
+    """Mean width of the band in the gap."""
     error: float
     """Largest distance of the truth from the band's median there."""
     known_width: float
-    """Mean of the band of the family that knows the shape; NaN without one."""
+    """Mean width of the band of the contour's own family; NaN without one."""
     seconds: float
     converged: bool
     passed: bool
-    """Whether the check of the record finds nothing."""
+    """True if the record passes its check."""
 
 
 def main(replicates: int = 4, workers: int = 2, *names: str) -> None:
@@ -122,7 +122,7 @@ def record(task: tuple[str, str, int]) -> Outcome:
 
 
 def gap_and_touched(scan: Scan) -> tuple[Floats, Floats]:
-    """Places in the gap, and beside it as far as first contact."""
+    """Return grid points in the gap, and beside it as far as first contact."""
     forward, backward = scan.events["forward"], scan.events["backward"]
     left, right = sorted([backward.snap_off.contact_x, forward.snap_off.contact_x])
     sides = [
@@ -133,7 +133,7 @@ def gap_and_touched(scan: Scan) -> tuple[Floats, Floats]:
 
 
 def compared(result: xr.DataTree, contour: Contour, x: Floats) -> tuple[float, float, float]:
-    """Share of places at which the band holds the contour, its mean width, and how far off its median is at most."""
+    """Return the share of grid points at which a band holds, its mean width, and its median's largest error."""
     band = tb.contour_band(result, x, PROBABILITY)
     height = contour.height(x)
     inside = (band.lower.values <= height) & (height <= band.upper.values)

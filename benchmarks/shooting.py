@@ -1,4 +1,4 @@
-"""What a user would write from the paper with SciPy alone: integrate the rod, and search for roots.
+"""Code that a user would write from the paper with SciPy alone: integrate the rod, and search for roots.
 
 A state is (drive angle, holding moment, force, arc length of the contact). Along a sweep every state is sought from its
 neighbour. The rod is in Phase B until it would be too short, then in Phase A until its tip would lie below the tangent.
@@ -24,7 +24,7 @@ def _rod(s, state, force, beta):
 
 
 def _sweep(contour, slope_angles: np.ndarray, first: State, solve: Callable) -> np.ndarray:
-    """States at slope angles, in the phase of the one before, or if that will not do in the other."""
+    """Return states at slope angles, in the phase of the one before, or if that fails in the other."""
     state, tip, states = first, first[3] == 1.0, []
     for alpha in slope_angles:
         x, y = contour.point(alpha)
@@ -38,7 +38,7 @@ def _sweep(contour, slope_angles: np.ndarray, first: State, solve: Callable) -> 
 
 
 def sweep_by_shooting(contour, slope_angles: np.ndarray, first: State, rtol: float = 1e-9) -> np.ndarray:
-    """States at slope angles by equations (19) and (20) as they stand: unknown force, drive angle, and arc length."""
+    """Return states at slope angles by equations (19) and (20), with unknown force, drive angle and arc length."""
 
     def solve(x: float, y: float, alpha: float, guess: State, tip: bool) -> tuple[State, bool]:
         arm = x * np.cos(alpha) + y * np.sin(alpha)
@@ -62,7 +62,7 @@ def sweep_by_shooting(contour, slope_angles: np.ndarray, first: State, rtol: flo
 
 
 def sweep_by_collocation(contour, slope_angles: np.ndarray, first: State, tol: float = 1e-9) -> np.ndarray:
-    """The same with solve_bvp, from 200 nodes of the neighbour's solution: fewer, more, or all of them take longer."""
+    """Return them by solve_bvp, from 200 nodes of the neighbour's solution: other numbers take longer."""
     mesh = np.linspace(0.0, 1.0, 200)
     drive_angle, moment, _, length = first
     shape = np.stack([mesh * length * np.cos(drive_angle), mesh * length * np.sin(drive_angle), 0.0 * mesh, 0.0 * mesh])
@@ -94,7 +94,7 @@ def sweep_by_collocation(contour, slope_angles: np.ndarray, first: State, tol: f
 def contact_by_integration(
     drive_angle: float, moment: float, force_x: float, force_y: float, rtol: float = 1e-9
 ) -> tuple[float, float]:
-    """Step 2 as in the paper: integrate from the base until the curvature vanishes."""
+    """Return a contact by Step 2 as in the paper: integrate from the base until the curvature vanishes."""
     force, beta = np.hypot(force_x, force_y), np.arctan2(-force_x, force_y)
 
     def curvature(s, state, *_):

@@ -1,4 +1,4 @@
-"""What starting costs: importing this package, and asking its command for help, beside importing scipy.stats."""
+"""Times of a start: importing this package, and printing the help of its command, beside importing scipy.stats."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["starting"]
 
 
 def starting() -> list[Row]:
-    """In processes of their own, the interpreter's start included."""
+    """Time starts in new processes, the interpreter's start included."""
     reference = _time("import scipy.stats")
     return [
         Row("start: import scipy.stats / import tactile_bayes", reference, _time("import tactile_bayes")),

@@ -1,4 +1,4 @@
-"""Timing, and the tables that are printed of it."""
+"""Timing, and tables of times."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ __all__ = ["Row", "best_time", "print_growth", "print_ratios"]
 
 
 class Row(NamedTuple):
-    """The same result, reached otherwise and here."""
+    """Times of the same result by other code and by this package."""
 
     what: str
     otherwise: float
-    """Time a piece [s]."""
+    """Time of a piece [s]."""
     here: float
 
 
 def best_time(job: Callable[[], Any], repeats: int = 5) -> float:
-    """Shortest of several times [s]: what the job costs when nothing disturbs it."""
+    """Return the shortest of several times [s], that of an undisturbed job."""
     times = []
     for _ in range(repeats):
         began = time.perf_counter()
@@ -36,7 +36,7 @@ def print_ratios(rows: Iterable[Row]) -> None:
 
 
 def print_growth(what: str, counts: Sequence[int], job_of: Callable[[int], Callable[[], Any]]) -> None:
-    """Cost a piece for several numbers of pieces: level where the whole grows linearly."""
+    """Print the time of a piece for several numbers of pieces, which is constant for linear growth."""
     cells = []
     for count in counts:
         seconds = best_time(job_of(count), 3 if count == max(counts) else 10)
