@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 DOCS_READY := $(VENV)/.docs-ready
 DEMO_OUT ?= results/demo
-# Samplers that ours is compared with, and that nothing else needs.
+# Samplers for the comparison, and for nothing else.
 PEERS ?= .peers
 
 export MPLBACKEND ?= Agg
@@ -23,7 +23,7 @@ test: export OPENBLAS_NUM_THREADS = 1
 test: $(READY)
 	$(BIN)/python -m pytest -n auto --nbmake --doctest-modules src notebooks tests
 
-# With the lowest versions of the dependencies; what those say of one another is not the project's affair.
+# With the lowest versions of the dependencies; their warnings about one another are not errors here.
 test-lowest: $(READY)
 	$(PYTHON) -m venv --clear .venv-lowest
 	$(BIN)/python tools/lowest.py > .venv-lowest/lowest.txt

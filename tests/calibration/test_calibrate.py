@@ -463,7 +463,7 @@ def test_bad_arguments_are_told(noted, tmp_path, wrong):
     ("wrong", "named"),
     [
         ({"nuisances": ["bia"]}, ["'bia'", "bias"]),
-        ({"nuisances": ["base"]}, ["base", "shifted together"]),
+        ({"nuisances": ["base"]}, ["base", "changes no reading"]),
         ({"family": "cube", "priors": {}}, ["'cube'", "parabola"]),
         ({"load_cell": LoadCell()}, ["load cell", "noise"]),
         ({"priors": {"b": stats.norm()}}, ["b", "a, q, x_c, noise_scale"]),

@@ -70,7 +70,7 @@ def test_right_posteriors_are_calibrated():
     assert found.attrs["calibrated"] == 1
     verdict = found.attrs["verdict"]
     assert verdict.startswith(
-        "Calibrated, as far as 100 replicates tell: ranks of the truth are uniform (smallest p of 8"
+        "Calibrated, as far as 100 replicates show: ranks of the truth are uniform (smallest p of 8"
     )
     assert "and bands and regions of 90% hold as often as stated. Coverage at 90%: band, in the gap" in verdict
     assert verdict.endswith("The check of the record raises an alarm in 0.0% of 100.")
@@ -182,7 +182,7 @@ def test_a_lost_replicate_holds_nothing():
     rows = replicates(100) | {100: FAILED}
     found = summary(EXPERIMENT, rows)
     assert (found.attrs["calibrated"], found.attrs["replicates"], found.attrs["lost"]) == (1, 101, 1)
-    assert found.attrs["verdict"].startswith("Calibrated, as far as 101 replicates tell")
+    assert found.attrs["verdict"].startswith("Calibrated, as far as 101 replicates show")
     assert int(found["ranks"].sel(replicate=100, quantity="q")) == -1
     assert np.isnan(float(found.converged.sel(replicate=100)))
     assert (str(found.message[100].values), str(found.traceback[100].values)) == (FAILED.message, FAILED.traceback)
@@ -221,7 +221,9 @@ def test_too_many_lost_are_no_calibration():
 def test_a_fault_stands_however_many_are_lost():
     found = summary(EXPERIMENT, replicates(100, q={"shift": 1.0}) | dict.fromkeys(range(100, 160), FAILED))
     assert found.attrs["conclusion"] == "not calibrated"
-    assert found.attrs["verdict"].startswith("Not calibrated, over 160 replicates: q: posteriors lie too low. Of")
+    assert found.attrs["verdict"].startswith(
+        "Not calibrated, over 160 replicates: q: posteriors lie too low. Coverage at"
+    )
 
 
 def test_few_lost_ones_can_tip_the_scales():

@@ -35,7 +35,7 @@ def test_conclusions(tally, has_faults, expected):
 @pytest.mark.parametrize(
     ("concluded", "tally", "said"),
     [
-        ("calibrated", Tally(200, lost=1), "Calibrated, as far as 200 replicates tell: because."),
+        ("calibrated", Tally(200, lost=1), "Calibrated, as far as 200 replicates show: because."),
         ("not calibrated", Tally(200, lost=9), "Not calibrated, over 200 replicates: because."),
         (
             "undecided",

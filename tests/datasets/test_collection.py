@@ -158,7 +158,7 @@ def test_files_that_are_lost_or_damaged_are_named(folder, tmp_path):
     shutil.copytree(folder, some)
     data = tb.datasets.open(some)
     (some / "shard-000001.nc").unlink()
-    with refused(SpecificationError, "shard-000001.nc", "gone"):
+    with refused(SpecificationError, "shard-000001.nc", "missing"):
         data.isel(record=9).load()
     (some / "shard-000002.nc").write_bytes(b"no NetCDF")
     with refused(SpecificationError, "shard-000002.nc", "read"):

@@ -74,10 +74,10 @@ def test_words_are_in_the_units_of_the_record():
 
 def test_words_say_the_numbers():
     told = in_si()["information"]
-    (line,) = [line for line in words(in_si()) if "band of the contour" in line]
+    (line,) = [line for line in words(in_si()) if "expected width" in line]
     touched, gap = (1e3 * float(told[f"{kind}_width"]) for kind in ("touched", "gap"))
     assert f"{touched:.3g} mm where the contour is touched and {gap:.3g} mm in the gap" in line
-    assert line.startswith("The 95% band")
+    assert line.startswith("The expected width of the 95% band")
     needed = in_si()["required_noise"]
     lines = [line for line in words(in_si()) if line.startswith("A mean band")]
     assert len(lines) == 5
@@ -153,7 +153,7 @@ def test_a_contour_out_of_reach_is_refused():
 
 def test_one_sweep_has_no_gap_to_speak_of():
     tree = sensitivity(PROFILE, seed=1, drive_step=STEP, parts=["information"], direction="backward")
-    (line,) = [line for line in words(tree) if "band of the contour" in line]
+    (line,) = [line for line in words(tree) if "expected width" in line]
     assert "gap" not in line
 
 

@@ -91,7 +91,7 @@ def test_each_quantity_has_a_panel_and_uniform_ranks_are_unmarked():
         assert texts(ax) == ["p = 1"]
         assert same_color(curve(ax).get_color(), plotting.PALETTE["median"])
     assert heading(panels) == [
-        "Uniform, as far as 100 replicates tell: ranks of 2 quantities",
+        "Uniform, as far as 100 replicates show: ranks of 2 quantities",
         "Where ranks are uniform, 1 line in 20 leaves the shaded band.",
     ]
 
@@ -142,7 +142,7 @@ def test_replicates_without_ranks_are_left_out():
     panels = plotting.calibration_ranks(calibration_of(a=some, q=some, x_c=np.full(2 * COUNT, -1)))
     np.testing.assert_allclose(curve(panels[0]).get_ydata(), 0.0, atol=1e-12)
     assert texts(panels[2]) == ["no ranks"]
-    assert heading(panels)[0] == "Uniform, as far as 100 of 200 replicates tell: ranks of 2 quantities"
+    assert heading(panels)[0] == "Uniform, as far as 100 of 200 replicates show: ranks of 2 quantities"
 
 
 def test_where_a_quantity_has_fewer_ranks_its_panel_says_so():

@@ -243,7 +243,7 @@ def test_the_force_along_the_rod_is_judged_as_by_reconstruct(findings, score):
     tree = findings.posterior.copy()
     tree.attrs["nuisances"] = '["friction"]'
     found = dataclasses.replace(findings, contacts=contacts, posterior=tree)
-    assert "the friction that was found" in contacts_messages(found)[-1]
+    assert "the friction that was inferred" in contacts_messages(found)[-1]
 
 
 def test_the_verdicts_come_first_and_say_whether_to_trust(page, folder, text):

@@ -75,9 +75,9 @@ HALF = np.linspace(0.1, 0.9, 30)
 @pytest.mark.parametrize(
     ("contour", "base", "direction", "named"),
     [
-        (Circle(0.3, 0.3), (0.6, 0.2), "forward", ["first touch", "right end", "(0.3, 0.6)", "upright"]),
-        (Circle(0.3, 0.3), (-0.6, 0.2), "backward", ["first touch", "left end", "(-0.3, 0.6)", "upright"]),
-        (Ellipse(0.3, 0.2, 0.3), (0.6, 0.2), "forward", ["right end", "(0.3, 0.5)", "upright"]),
+        (Circle(0.3, 0.3), (0.6, 0.2), "forward", ["first touch", "right end", "(0.3, 0.6)", "vertical"]),
+        (Circle(0.3, 0.3), (-0.6, 0.2), "backward", ["first touch", "left end", "(-0.3, 0.6)", "vertical"]),
+        (Ellipse(0.3, 0.2, 0.3), (0.6, 0.2), "forward", ["right end", "(0.3, 0.5)", "vertical"]),
         (
             from_function(lambda x: 0.3 + 0.5 * x**2, (-0.9, 0.5)),
             (0.0, 0.0),
@@ -94,7 +94,7 @@ HALF = np.linspace(0.1, 0.9, 30)
             Joined(Circle(0.4, 0.3), Parabola(0.5, 0.3)),
             (-0.7, 0.25),
             "backward",
-            ["left end", "(-0.4, 0.7)", "upright"],
+            ["left end", "(-0.4, 0.7)", "vertical"],
         ),
     ],
 )

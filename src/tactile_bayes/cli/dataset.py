@@ -51,7 +51,7 @@ def generate(
     work: WorkerOptions,
     output: Output,
 ) -> Answer:
-    """Make a data set, or go on where a run stopped.
+    """Make a data set, or resume a stopped run.
 
     The same specification gives the same numbers, however many workers there are.
     """

@@ -46,7 +46,7 @@ def inspect(
 ) -> Answer:
     """Inspect a record before anything is inferred: what looks wrong, and the contents of the file.
 
-    It takes the options of infer that say how a file is read; the last line is the command to go on with.
+    It takes the options of infer that say how a file is read; the last line is the next command.
     """
     with step_bar(output.is_silent) as show:
         from tactile_bayes.diagnostics.inspection import inspect_record

@@ -54,7 +54,7 @@ class Contour(ABC):
     A family is a frozen dataclass of its parameters, which are scalars or arrays that broadcast: one contour object may
     hold many contours. The contour's own parameter p is any variable of which point and slope angle are continuous
     functions. A family defines the point at p (`locate`) and the ends (`domain`); everything else follows by root
-    search and is overridden where there is a formula. `check` verifies a family of one's own.
+    search and is overridden where there is a formula. `check` verifies a new family.
 
     Contours are equal if they are of one family and all their parameters are equal, including their shapes. A family
     that inherits this is a `dataclass(frozen=True, eq=False)`.
@@ -280,7 +280,7 @@ class Single(Contour):
 class Graph(Contour):
     """A contour given as the graph y = g(x), with the parameter x.
 
-    A family of one's own is a frozen dataclass of its parameters, with a method for g and its first two derivatives.
+    A new family is a frozen dataclass of its parameters, with a method for g and its first two derivatives.
     It overrides `domain` if it has ends; `check` verifies it. Parameters may be arrays, so that formulas must work on
     arrays. A contour without parameters derives from `Graph` and `Single`.
 

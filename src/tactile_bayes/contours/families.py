@@ -30,7 +30,7 @@ from tactile_bayes.errors import ParameterError
 __all__ = ["FAMILIES", "FLANKS", "Flank", "FlankFamily", "family_named", "sides_of"]
 
 _FAR = 1e3
-"""Widths from the vertex beyond which the height of a power law is constant, lest it overflow."""
+"""Widths from the vertex beyond which the height of a power law is constant, to avoid overflow."""
 
 Values = Mapping[str, Any]
 

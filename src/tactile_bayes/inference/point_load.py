@@ -63,7 +63,7 @@ _INFLATION = 2.0
 _LEAST_INFLATION = 1e-3
 
 _DROP = 10.0
-"""Log-probability per parameter by which a start may be below the centre, lest a minor mode captures it."""
+"""Log-probability per parameter by which a start may be below the centre, so that no minor mode captures it."""
 
 _SETTINGS = SamplerSettings(walkers=64)
 """Most of an evaluation does not depend on the number of points, so many walkers are cheap."""
