@@ -29,7 +29,7 @@ def readings(tree):
 def test_of_a_good_result_all_is_well():
     found = verdicts(predicted(), xr.Dataset(attrs={"misfit_probability": 0.3}))
     assert len(found) == 1
-    assert found[0].startswith("All is well: the ensembles agree, and the record looks like what they predict (p = 0.")
+    assert found[0].startswith("All is well: the ensembles agree, and the record agrees with their predictions (p = 0.")
 
 
 def test_a_family_that_does_not_hold_the_contour_is_the_first_thing_said():

@@ -237,7 +237,7 @@ def test_places_without_an_answer_are_hatched(found):
     shares = found["noise_shares"].to_dataset().copy(deep=True)
     shares.share[0, 3] = np.nan
     ax = plotting.noise_shares(shares)
-    assert labels(ax)[-1] == "no answer for some of the noise"
+    assert labels(ax)[-1] == "no result for some of the noise"
     centres = [bar.get_x() + 0.5 * bar.get_width() for bar in ax.containers[-1]]
     assert np.degrees(shares.drive_angle.values[3]) == pytest.approx(centres[-1])
 
@@ -316,7 +316,7 @@ def test_errors_are_solid_and_first_order_is_dashed(study, method):
             assert list(line.get_xdata()) == [0.1, 1.0]
             np.testing.assert_array_equal(line.get_ydata(), of[name].sel(distance=distance).values)
     assert labels(ax) == ["II", "at 0.4 L", "at 0.8 L", "first order"]
-    assert texts(ax) == ["no answer: II at 1.5 L"]
+    assert texts(ax) == ["no result: II at 1.5 L"]
     assert ax.get_xlabel() == "noise factor (1 is 0.05 $EI$/$L^2$ and 0.02 $EI$/$L$)"
     assert is_inside_its_figure(ax)
 
@@ -338,7 +338,7 @@ def test_bands_are_dashed_and_posteriors_are_filled(study):
 
 def test_where_nothing_is_known_the_map_says_so(study):
     nothing = study.sel(distance=[1.5])
-    assert texts(plotting.error_map(nothing)) == ["no cell of this map has an answer"]
+    assert texts(plotting.error_map(nothing)) == ["no cell of this map has a result"]
     assert texts(plotting.error_map(nothing, quantity="gap")) == ["there is no gap"]
 
 

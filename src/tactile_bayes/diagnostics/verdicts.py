@@ -68,10 +68,10 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     -------
     tuple of str
         One or more sentences. They report: loads that such a rod cannot have (`check_units_and_signs`); a zero that is
-        off, or that moved; a record that does not look like what the posterior predicts (`check_record`); ensembles
-        that have not converged; noise twice as large as stated, or half; loads of a sample that contradict one another;
-        nuisance parameters that are nearly impossible under their prior. The last, which is no
-        fault, names parameters that the record hardly determines.
+        off, or that moved; a record unlike the predictions of the posterior (`check_record`); ensembles that have not
+        converged; noise twice as large as stated, or half; loads of a sample that contradict one another; nuisance
+        parameters that are nearly impossible under their prior. The last, which is no fault, names parameters that the
+        record hardly determines.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def verdicts(posterior: xr.DataTree, contacts: xr.Dataset | None = None) -> tupl
     if not against:
         p_value = math.nan if check is None else float(check.overall_p_value)
         against.append(
-            f"All is well: the ensembles agree, and the record looks like what they predict (p = {p_value:.2g})."
+            f"All is well: the ensembles agree, and the record agrees with their predictions (p = {p_value:.2g})."
         )
     return (*against, *_prior_dominated(posterior, known=beyond))
 

@@ -98,7 +98,7 @@ def error_map(
         ax.plot(factor, first, linestyle="--", zorder=2, **style, **hollow)
         ax.plot(factor, there, linestyle="none" if is_band else "-", zorder=3, **style, **mark)
     if not drawn:
-        return write_instead(ax, "there is no gap" if quantity == "gap" else "no cell of this map has an answer")
+        return write_instead(ax, "there is no gap" if quantity == "gap" else "no cell of this map has a result")
     for i in np.flatnonzero(is_there.any(axis=1)):
         legend_entry(ax, str(contours[i]), color=BASES[i % len(BASES)], linewidth=2.5)
     for j in np.flatnonzero(is_there.any(axis=0)):
@@ -113,7 +113,7 @@ def error_map(
     legend_above(ax, entries if entries <= _MOST_IN_LINE else -(-entries // 2), title=title)
     if missing:
         corner: dict[str, Any] = {"transform": ax.transAxes, "ha": "right", "va": "bottom"}
-        ax.text(0.99, 0.02, f"no answer: {', '.join(missing)}", fontsize="small", color="0.35", **corner)
+        ax.text(0.99, 0.02, f"no result: {', '.join(missing)}", fontsize="small", color="0.35", **corner)
     return ax
 
 

@@ -241,7 +241,7 @@ def noise_shares(
         below = below + height
     if not is_answered.all():
         style: dict[str, Any] = {"color": "white", "edgecolor": "0.6", "hatch": "///", "linewidth": 0.6}
-        ax.bar(angle[~is_answered], 1.0, wide, label="no answer for some of the noise", **style)
+        ax.bar(angle[~is_answered], 1.0, wide, label="no result for some of the noise", **style)
     ax.set_xlim(angle.min() - 0.7 * wide, angle.max() + 0.7 * wide)
     ax.set_ylim(0.0, max(1.02, 1.02 * float(below.max(initial=0.0))))
     ax.set_xlabel(f"{DRIVE_ANGLE}, {chosen['direction'].values[0]} sweep")

@@ -47,12 +47,12 @@ def _sweeps(findings: Findings) -> Table:
         rows.append(row)
     heads = ["sweep", "direction", "pivot", "samples", "from φ₀ [°]", "to"]
     heads += ["first contact between", "snap-off between", "unloaded"]
-    return Table("Sweeps, and what the readings alone tell of contact", heads, rows, 3)
+    return Table("Sweeps, with contact as the readings alone bound it", heads, rows, 3)
 
 
 def _between(angles: Any) -> str:
     if not np.isfinite(angles).any():
-        return "not seen"
+        return "not detected"
     return " and ".join(fixed(float(angle), ".1f") + "°" if np.isfinite(angle) else "…" for angle in np.degrees(angles))
 
 
@@ -63,7 +63,7 @@ def _priors(findings: Findings) -> Table:
     rows = [[name, meaning_of(name, family), words] for name, words in stated.items() if not is_direction(name)]
     share = findings.posterior["prior"].attrs.get("share_within_reach")
     reach = "" if share is None else f"; {percent(round(float(share), 3))} of its draws are within the rod's reach"
-    return Table(f"Priors, as scipy.stats has them{reach}", ["parameter", "meaning", "prior"], rows, 3)
+    return Table(f"Priors, as distributions of scipy.stats{reach}", ["parameter", "meaning", "prior"], rows, 3)
 
 
 def _settings(findings: Findings) -> Table:
@@ -82,8 +82,8 @@ def _rig(findings: Findings) -> Table:
     names = [name for name in attrs if str(name).startswith(("rod_", "load_cell_"))]
     rows = [[str(name), _plain(attrs[name])] for name in (*names, "units", "friction")]
     nuisances = json.loads(attrs["nuisances"])
-    rows.append(["inferred beside the contour", ", ".join(nuisances) or "nothing: the rig was taken as stated"])
-    return Table("Rig, as it was taken; numbers in the units of the record", ["entry", "value"], rows, 2)
+    rows.append(["inferred beside the contour", ", ".join(nuisances) or "nothing: the rig is taken as stated"])
+    return Table("Rig, as assumed; numbers in the units of the record", ["entry", "value"], rows, 2)
 
 
 def _columns(findings: Findings) -> Table | None:
@@ -123,7 +123,7 @@ def _hashes(findings: Findings) -> Table:
     attrs = findings.posterior.attrs
     rows = [["posterior.nc", findings.posterior_sha256], ["record, as stored in it", findings.record_sha256]]
     if attrs["data_sha256"] != findings.record_sha256:
-        rows.append(["record, as it was inferred from", str(attrs["data_sha256"])])
+        rows.append(["record, as used in the inference", str(attrs["data_sha256"])])
     if "record_file_sha256" in attrs:
         rows.append([f"file {attrs['record_file']}", str(attrs["record_file_sha256"])])
     return Table("SHA-256", ["of", "digest"], rows, 2)
