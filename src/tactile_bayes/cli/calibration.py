@@ -40,7 +40,7 @@ def calibrate(
         typer.Option(
             help="Misspecification, the rig's difference from what inference assumes: friction=0.3, "
             "rigidity_scale=1.05, drive_angle_offset=0.02, base_shift=0.01,0, bias=0.02,0.05,0.05, drift=0.04,0.1,0.1, "
-            "flat_spot=ANGLE,FACTOR; give it again for another."
+            "flat_spot=ANGLE,FACTOR; may be repeated."
         ),
     ] = None,
     probability: Annotated[float, typer.Option(help="Probability of the bands and regions that are judged.")] = 0.9,

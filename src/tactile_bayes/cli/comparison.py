@@ -33,7 +33,7 @@ def compare(
     family: Annotated[
         list[str] | None,
         typer.Option(
-            help="Shape to be compared, as for infer, or shape-free, any smooth one; give it again for another. By "
+            help="Shape to be compared, as for infer, or shape-free, any smooth one; may be repeated. By "
             "default parabola, circle, ellipse, power-law, power-law/power-law and shape-free."
         ),
     ] = None,

@@ -39,8 +39,8 @@ class ContourOptions:
     parameter: Annotated[
         list[str] | None,
         typer.Option(
-            help="Parameter of the family, by the name and in the unit that infer prints: a=0.7, q=0.5; give it again "
-            "for another. x_c is 0 if it is left out."
+            help="Parameter of the family, by the name and in the unit that infer prints: a=0.7, q=0.5; may be "
+            "repeated. x_c is 0 if it is left out."
         ),
     ] = None
     points: Annotated[

@@ -55,7 +55,7 @@ def design(
     base: Annotated[
         list[str] | None,
         typer.Option(
-            help="A pivot to choose from, X,Y [m, or L]; again for another. By default eleven across at three heights."
+            help="A pivot to choose from, X,Y [m, or L]; may be repeated. By default eleven across at three heights."
         ),
     ] = None,
     drive_step: Annotated[

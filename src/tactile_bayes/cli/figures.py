@@ -30,17 +30,15 @@ def figures(
     *,
     out: Out,
     only: Annotated[
-        list[int] | None, typer.Option(help="Number of a figure, from 2 to 11; again for another. By default all.")
+        list[int] | None, typer.Option(help="Number of a figure, from 2 to 11; may be repeated. By default all.")
     ] = None,
     format: Annotated[
         list[str] | None,
-        typer.Option("--format", help="Format of the files, pdf, svg or png; again for another; default pdf and png."),
+        typer.Option("--format", help="Format of the files, pdf, svg or png; may be repeated; default pdf and png."),
     ] = None,
     distance: Annotated[
         list[float] | None,
-        typer.Option(
-            help="Distance of the profile from the pivot, q [L]; again for another; default the figure's own."
-        ),
+        typer.Option(help="Distance of the profile from the pivot, q [L]; may be repeated; default the figure's own."),
     ] = None,
     drive_step: Annotated[float, typer.Option(help="Step of the drive [degrees].")] = 1.0,
     rods: Annotated[int, typer.Option(help="Number of rods drawn of a sweep in figures 7 to 10.", min=1)] = 15,

@@ -61,7 +61,7 @@ class FlawOptions:
         list[str] | None,
         typer.Option(
             help="Error of the calibration, force_x=1.01, or cross-talk, READING/LOAD as in force_x/force_y=0.02; "
-            "give it again for another."
+            "may be repeated."
         ),
     ] = None
     lever: Annotated[

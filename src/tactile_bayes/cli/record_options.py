@@ -29,7 +29,7 @@ class RecordOptions:
         list[str] | None,
         typer.Option(
             help="Source of a column with another name, unit, sign or zero in the file: force_x=Fx[mN], "
-            "force_y=-Fy[N], drive_angle=90-Angle[deg], base_x=12[mm]; give it again for another."
+            "force_y=-Fy[N], drive_angle=90-Angle[deg], base_x=12[mm]; may be repeated."
         ),
     ] = None
     split_sweeps: Annotated[
@@ -51,7 +51,7 @@ class RecordOptions:
         float | None, typer.Option(help="Standard deviation of the moment [N m, or EI/L]; likewise.")
     ] = None
     missing: Annotated[
-        list[str] | None, typer.Option(help="Channel without a column, like force_x; give it again for another.")
+        list[str] | None, typer.Option(help="Channel without a column, like force_x; may be repeated.")
     ] = None
     load_cell_frame: Annotated[
         Literal["fixed", "turning"] | None,

@@ -68,9 +68,7 @@ class RodOptions:
 class RigOptions(RodOptions):
     """A simulated rod and its pivots."""
 
-    base: Annotated[
-        list[str] | None, typer.Option(help="A pivot, X,Y; give it again for another. By default one at 0,0.")
-    ] = None
+    base: Annotated[list[str] | None, typer.Option(help="A pivot, X,Y; may be repeated. By default one at 0,0.")] = None
 
     @property
     def pivots(self) -> list[tuple[float, ...]]:
@@ -91,7 +89,7 @@ class UnknownOptions:
         typer.Option(
             help="Unknown of the rig to be inferred, in place of rigidity_scale, drive_angle_offset, bias, lever, "
             "backlash and friction: one of these, or drift, gain, suspension_compliance, base (positions of further "
-            "pivots); give it again for another."
+            "pivots); may be repeated."
         ),
     ] = None
     as_stated: Annotated[

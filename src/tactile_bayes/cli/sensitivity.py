@@ -39,15 +39,15 @@ class StudyOptions:
     ] = False
     study_profile: Annotated[
         list[str] | None,
-        typer.Option(help="A profile of the study; give it again for another. By default that of --profile."),
+        typer.Option(help="A profile of the study; may be repeated. By default that of --profile."),
     ] = None
     study_distance: Annotated[
         list[float] | None,
-        typer.Option(help="Height of the vertex above the pivot [rod lengths]; again for another; default --distance."),
+        typer.Option(help="Height of the vertex above the pivot [rod lengths]; may be repeated; default --distance."),
     ] = None
     noise_factor: Annotated[
         list[float] | None,
-        typer.Option(help="Factor on the load cell's noise; again for another. By default 0.1, 0.3, 1 and 3."),
+        typer.Option(help="Factor on the load cell's noise; may be repeated. By default 0.1, 0.3, 1 and 3."),
     ] = None
     replicates: Annotated[int | None, typer.Option(help="Records in each cell of the study; by default 20.", min=1)] = (
         None
@@ -74,7 +74,7 @@ def sensitivity(
     band_width: Annotated[
         list[float] | None,
         typer.Option(
-            help="Mean width of a band for which the noise is sought [m, or L]; give it again for another. "
+            help="Mean width of a band for which the noise is sought [m, or L]; may be repeated. "
             "By default 0.0005 to 0.01 rod lengths."
         ),
     ] = None,
