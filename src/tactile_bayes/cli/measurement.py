@@ -35,7 +35,9 @@ class FlawOptions:
     moment_noise: Annotated[
         float, typer.Option(help="Standard deviation of the moment's noise [N m, or EI/L].", min=0.0)
     ] = 0.0
-    relative_noise: Annotated[float, typer.Option(help="Noise in proportion to the load, over it.", min=0.0)] = 0.0
+    relative_noise: Annotated[
+        float, typer.Option(help="Standard deviation of noise in proportion to the load, over the load.", min=0.0)
+    ] = 0.0
     degrees_of_freedom: Annotated[
         float, typer.Option(help="Degrees of freedom of Student's t noise: 3 to 10 for outliers; inf is normal.")
     ] = math.inf
@@ -55,7 +57,9 @@ class FlawOptions:
     ] = None
     ornstein_uhlenbeck: Annotated[
         str | None,
-        typer.Option(help="Ornstein-Uhlenbeck drift: MOMENT,FORCE,TIME, standard deviations and samples."),
+        typer.Option(
+            help="Ornstein-Uhlenbeck drift: MOMENT,FORCE,TIME, standard deviations, correlation time [samples]."
+        ),
     ] = None
     gain: Annotated[
         list[str] | None,

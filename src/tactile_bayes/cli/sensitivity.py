@@ -93,7 +93,7 @@ def sensitivity(
     seed: Seed = 1,
     output: Output,
 ) -> Answer:
-    """Compute the effect of the sensor's errors on contact points and contour, and how small they have to be.
+    """Compute the effect of the sensor's errors on contact points and contour, and the required noise.
 
     The same command resumes a stopped study.
     """
