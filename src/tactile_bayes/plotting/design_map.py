@@ -66,7 +66,7 @@ def design(found: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> from matplotlib.figure import Figure
     >>> found = design_of("parabola", priors=priors, bases=[(0.0, 0.0), (0.2, 0.0)], draws=2, seed=1)
     >>> design(found, ax=Figure().subplots()).get_xlabel()
-    'place of the pivot $x$ [$L$]'
+    'position of the pivot $x$ [$L$]'
     """
     check_dataset(found, {"base_x", "drive_step", "best", "present_base_x"}, "design", "tactile_bayes.design")
     pivots = np.stack([found["present_base_x"].values, found["present_base_y"].values], axis=-1)
