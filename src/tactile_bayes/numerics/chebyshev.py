@@ -17,9 +17,6 @@ __all__ = [
     "integral",
     "nodes",
     "polynomials",
-    "tabulate",
-    "value_and_slope",
-    "with_slope",
 ]
 
 
@@ -49,11 +46,6 @@ def evaluate(coefficients: Floats, z: Floats) -> Floats:
     return np.asarray((each * at).sum(axis=0))
 
 
-def tabulate(coefficients: Floats, z: Floats) -> Floats:
-    """Values of all interpolants at the same points z, shape (k,), as an array of shape (…, k)."""
-    return np.moveaxis(np.tensordot(polynomials(coefficients.shape[0], z), coefficients, 1), 0, -1)
-
-
 def polynomials(count: int, z: Floats) -> Floats:
     """Values of the first `count` Chebyshev polynomials on [0, 1] at z, along a new last axis."""
     return np.moveaxis(basis(count, z), 0, -1)
@@ -80,19 +72,6 @@ def derivative(coefficients: Floats) -> Floats:
 @functools.cache
 def _slopes(count: int) -> Floats:
     return np.asarray(chebyshev.chebder(np.eye(count), scl=2.0), dtype=float)
-
-
-def with_slope(coefficients: Floats) -> Floats:
-    """Coefficients of interpolants, shape (count, n), and of their derivatives side by side, shape (count, 2, n)."""
-    both = np.zeros((coefficients.shape[0], 2, coefficients.shape[1]))
-    both[:, 0], both[:-1, 1] = coefficients, derivative(coefficients)
-    return both
-
-
-def value_and_slope(both: Floats, z: Floats) -> tuple[Floats, Floats]:
-    """Values and derivatives from the coefficients of `with_slope`, each at its own z, shape (n,)."""
-    value, slope = evaluate(both, z)
-    return value, slope
 
 
 def integral(coefficients: Floats) -> Floats:
