@@ -252,7 +252,7 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
     for tried, optimum in enumerate(optima_of(model, rng, deadline), start=1):
         if not optimum.fits:
             unexplained.append(optimum)
-        elif _is_known(model, optimum, found):
+        elif _is_known(optimum, found):
             repeats += 1
         else:
             found.append(_mode(model, optimum, found, rng, deadline))
@@ -266,7 +266,7 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
     for optimum in sorted(unexplained, key=lambda one: one.cost):
         least = min((mode.optimum.cost for mode in found), default=optimum.cost)
         late = found and deadline.has_passed
-        if optimum.cost < least + _MAX_EXCESS_COST and not late and not _is_known(model, optimum, found):
+        if optimum.cost < least + _MAX_EXCESS_COST and not late and not _is_known(optimum, found):
             found.append(_mode(model, optimum, found, rng, deadline))
     if not found:
         raise InferenceError("no contour was found that the rod can reach: are base, rod and units right?")
@@ -275,7 +275,7 @@ def _modes(model: ContourModel, rng: np.random.Generator, deadline: Deadline) ->
     return [mode for mode in found if mode is found[0] or mode.proposal.log_mass > least_mass]
 
 
-def _is_known(model: ContourModel, optimum: ContourOptimum, found: list[_Mode]) -> bool:
+def _is_known(optimum: ContourOptimum, found: list[_Mode]) -> bool:
     """Return True if an optimum belongs to a mode that was found before."""
     point = optimum.point[None]
     far = _MODE_RADIUS * np.sqrt(point.size)

@@ -18,10 +18,10 @@ _NAMES = {"holding_moment": "the moment", "force_x": "force_x", "force_y": "forc
 def sensitivity_summary(tree: xr.DataTree, plan: Plan) -> tuple[str, ...]:
     """Return sentences on the main results of a sensitivity analysis."""
     si = plan.record.attrs["units"] != "dimensionless"
-    return tuple(_sentences(tree, plan, si))
+    return tuple(_sentences(tree, si))
 
 
-def _sentences(tree: xr.DataTree, plan: Plan, si: bool) -> Iterator[str]:
+def _sentences(tree: xr.DataTree, si: bool) -> Iterator[str]:
     if "amplification" in tree:
         grown = tree["amplification"].to_dataset()
         for method in grown.reconstruction.values:
