@@ -59,7 +59,7 @@ def agree(made, scan, *, rigidity=1.0, zeros=0.0):
     The truths are such that the rod feels some ten of these; where it is pressed harder less can be asked.
     """
     rod = SI if made.measured.attrs["units"] == "SI" else Rod()
-    unit = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    unit = rod.load_units
     expected = rigidity * loads_of(scan.record) + zeros
     np.testing.assert_allclose(loads_of(made.measured) / unit, expected / unit, atol=1e-8, rtol=0.0)
     for name in ("sweep", "base_x", "base_y"):

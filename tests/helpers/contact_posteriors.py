@@ -101,7 +101,7 @@ class Sample:
         rod = rod_of(record)
         self.length, self.radius = rod.length_unit, 0.5 * rod.diameter / rod.length_unit
         self.base = np.array([record.base_x.values[i], record.base_y.values[i]]) / self.length
-        units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+        units = rod.load_units
         self.loads = np.array([record[n].values[i] for n in ("holding_moment", "force_x", "force_y")]) / units
         self.noise = np.array([cell.moment_noise, cell.force_noise, cell.force_noise]) / units
         self.angle, self.angle_noise = float(record.drive_angle.values[i]), cell.drive_angle_noise
@@ -285,7 +285,7 @@ def _summary(parts) -> Summary:
 def density_of(record: xr.Dataset, cell: LoadCell, which, *, prior="flat", friction=0.0) -> ContactDensity:
     """The package's own density of some samples."""
     samples, rod = samples_of(record, cell), rod_of(record)
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     readings = LoneSamples(cell.dimensionless(rod), np.stack([record[name].values for name in CHANNELS], -1) / units)
     base = np.stack([record.base_x.values, record.base_y.values], axis=-1)
     options = {"turning": frame_of(record) == "turning", "delta": float(np.arctan(friction)), "prior": prior}

@@ -93,7 +93,7 @@ def test_against_an_independent_sum(rig):
         values = np.stack([measured[name].values for name in CHANNELS], axis=-1)
         present = ~np.isnan(values[0])
         deviation = np.array([cell.standard_deviations[name] for name in CHANNELS])[present]
-        units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])[present]
+        units = rod.load_units[present]
         for exactly in (False,) if missing else (False, True):
             likelihood = RecordLikelihood(measured, cell, friction, exactly)
             found = likelihood.log_likelihood(stack([true, other]), scale[:, None])
@@ -141,7 +141,7 @@ def test_predictions_are_in_the_frame_of_the_record(rig):
         ],
         axis=-1,
     )
-    largest = np.abs(load / np.array([rod.moment_unit, rod.force_unit, rod.force_unit])).max(axis=0)
+    largest = np.abs(load / rod.load_units).max(axis=0)
     error = SHARE[True] * np.array([largest[0], *[np.sum(largest[1:])] * 2])
     assert np.all(np.abs(predicted[0] - exact) <= error)
     np.testing.assert_array_equal(likelihood.measured[:, 0], measured.holding_moment.values / rod.moment_unit)

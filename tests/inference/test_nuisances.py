@@ -301,7 +301,7 @@ def test_gains_biases_drifts_and_rigidity_change_what_is_sensed_as_they_say(rod)
     cell = LoadCell(**noise, gain=gain, lever=(0.01 * length, 0.02 * length))
     record = scan(Parabola(0.5 / length, 0.5 * length), rod=rod, drive_step=0.1).record
     model = model_of(record, names, cell)
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     values = {"rigidity_scale": 1.1, "moment_gain": 0.9, "force_y_gain": 1.2, "force_y_drift": 0.05 * rod.force_unit}
     values |= {"lever_x": 0.03 * length, "lever_y": -0.05 * length}
     values |= dict(

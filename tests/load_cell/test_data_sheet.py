@@ -192,7 +192,7 @@ def entries_of(sheet):
 def test_the_likelihood_is_the_same_in_all_units_but_for_their_jacobian(sheet, rod, seed):
     loads = np.random.default_rng(seed).normal(size=(4, 6, 3))
     measured = sheet.simulate(loads[0], seed=seed)
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     try:
         si = sheet.log_likelihood(measured, loads, pointwise=True)
     except ParameterError:

@@ -191,7 +191,7 @@ def test_a_rod_in_si_is_a_scaled_one():
     angles = in_the_middle("plain")[0].drive_angles
     si = amplification(Plan(enlarged(PROFILE, 0.2), in_units_of(QUIET, rod), rod, drive_angles=angles))
     plain = in_the_middle("plain")[1]
-    per = rod.length / np.array([rod.moment_unit, rod.force_unit, rod.force_unit, 1.0])
+    per = rod.length / np.array([*rod.load_units, 1.0])
     right = np.stack([plain[name].values * per for name in ("gain_along", "gain_across")])
     found = np.stack([si[name].values for name in ("gain_along", "gain_across")])
     scale = np.abs(right).max(axis=(0, 2), keepdims=True)

@@ -436,7 +436,7 @@ def predicted(tree, rig):
     values = {name: np.array([value]) for name, value in rig.items()}
     likelihood = RecordLikelihood(record, cell, exact=True)
     loads, _ = likelihood.predict(contours_of(best, "parabola"), nuisances.rig(values))
-    return loads[0] * [rod.moment_unit, rod.force_unit, rod.force_unit]
+    return loads[0] * rod.load_units
 
 
 def test_of_a_long_record_some_samples_are_shown_of_every_sweep(posterior):

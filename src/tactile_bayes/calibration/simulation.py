@@ -80,7 +80,7 @@ def simulate(experiment: SimulatedExperiment, rng: np.random.Generator) -> Simul
     rod = likelihood.rod
     measures = cell.dimensionless(rod)
     sensed = model.nuisances.sensed(loads, values, measures)[0]
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     readings = measures.simulate(sensed, seed=rng, noise_scale=model.noise_scale(point)[0]) * units
     course = model.nuisances.elapsed[:, None]
     readings = readings + np.array(world.bias) + np.array(world.drift) * course

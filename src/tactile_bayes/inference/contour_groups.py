@@ -81,7 +81,7 @@ def _predictions(model: ContourModel, draws: Draws, kept: Index, rng: np.random.
     shape = (len(draws.samples), kept.size, samples)
     coords = {"chain": np.arange(shape[0]), "draw": kept}
     predictive = {}
-    for i, (name, unit) in enumerate(zip(CHANNELS, _load_units(model), strict=True)):
+    for i, (name, unit) in enumerate(zip(CHANNELS, model.likelihood.rod.load_units, strict=True)):
         if name in present_channels(model.measured):
             values = (predicted[..., i] * unit).reshape(shape)
             predictive[name] = (_BY_SAMPLE, values, model.measured[name].attrs)
@@ -143,8 +143,3 @@ def unit_of(model: ContourModel, name: str) -> str:
         return "rad"
     powers = {0: "1", 1: "m", -1: "1/m"}
     return {"moment_noise": "N m", "force_noise": "N"}.get(name) or powers[model.family.length_powers.get(name, 0)]
-
-
-def _load_units(model: ContourModel) -> Floats:
-    rod = model.likelihood.rod
-    return np.array([rod.moment_unit, rod.force_unit, rod.force_unit])

@@ -231,8 +231,7 @@ class ContourModel:
         """Return mean and standard deviation of each channel's unloaded samples, shape (3,); NaN if they are few."""
         if int(self.found["unloaded"].sum()) < _FEWEST_UNLOADED:
             return np.full(len(CHANNELS), np.nan), np.full(len(CHANNELS), np.nan)
-        rod = self.likelihood.rod
-        units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+        units = self.likelihood.rod.load_units
         return self.found["bias"].values / units, self.found["noise"].values / units
 
     def _rough_noise(self) -> Floats:

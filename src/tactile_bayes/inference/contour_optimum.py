@@ -292,7 +292,7 @@ def contact_fit(model: ContourModel, found: Mapping[str, float] | None = None) -
     if len(present_channels(model.measured)) < len(CHANNELS):
         return None
     rod = model.likelihood.rod
-    moment, *forces = model.deviation * np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    moment, *forces = model.deviation * rod.load_units
     cell = replace(model.noise.cell, moment_noise=float(moment), force_noise=float(max(forces)))
     rig = rig_with(model.measured, cell, _zeros(model) if found is None else found, model.nuisances.friction)
     contacts = rig.contacts()

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_positive
 from tactile_bayes.errors import ParameterError
 
@@ -134,3 +137,8 @@ class Rod:
     def force_unit(self) -> float:
         """Unit of force, EI/L² [N]."""
         return self.flexural_rigidity / self.length**2
+
+    @property
+    def load_units(self) -> Floats:
+        """Units of the loads (holding_moment, force_x, force_y): EI/L [N m] and twice EI/L² [N]."""
+        return np.array([self.moment_unit, self.force_unit, self.force_unit])

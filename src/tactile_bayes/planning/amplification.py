@@ -108,7 +108,7 @@ def amplification(plan: Plan) -> xr.Dataset:
     both = [_along_and_across(contacts, gain, 0.5 * rod.diameter / rod.length) for gain in gains]
     deviations = [[_deviation(gain, contacts, of_angle) for gain in of_method] for of_method in both]
     # Readings are in the units of the record, not in EI/L or EI/L².
-    per_unit = rod.length / np.array([rod.moment_unit, rod.force_unit, rod.force_unit, 1.0])
+    per_unit = rod.length / np.array([*rod.load_units, 1.0])
     distances = _distances(refined, chosen)
     sweeps = [chosen.sweep.values == k for k in range(len(refined.scan.sweeps))]
     growth = np.array(
@@ -162,7 +162,7 @@ def _refined(plan: Plan) -> Plan:
 def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
     """Return some contacts of a record in the sweep frame."""
     rod, cell = plan.taken_rod, plan.cell.dimensionless(plan.taken_rod)
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     loads = np.stack([record[name].values for name in CHANNELS], axis=-1) / units
     angle = record.drive_angle.values
     turn, leaning = np.broadcast_to(np.eye(3), (angle.size, 3, 3)), np.zeros_like(loads)

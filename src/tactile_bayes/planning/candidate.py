@@ -158,7 +158,7 @@ def measured_of(model: ContourModel, point: Floats, rng: np.random.Generator) ->
     """Return a simulated measurement of the model's record, of one truth, shape (d,)."""
     loads = model.loads(point[None])[0]
     rod = model.likelihood.rod
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     cell = model.likelihood.load_cell
     readings = cell.simulate(loads, seed=rng, noise_scale=model.noise_scale(point[None])[0]) * units
     template = model.measured

@@ -82,7 +82,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
     cut_off: Flags = np.any(cell.cuts_off(readings), axis=-1)
     corrected = cell.corrected(measured)
     side = contact_sides(corrected, cell)
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     angle = corrected.drive_angle.values
     with np.errstate(over="ignore", invalid="ignore"):  # an infinite load has no zero of curvature
         loads = np.stack([corrected[name].values for name in CHANNELS], axis=-1) / units

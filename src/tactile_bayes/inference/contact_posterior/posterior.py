@@ -202,7 +202,7 @@ def _density(measured: xr.Dataset, cell: LoadCell, delta: float, prior: ContactP
         about = samples_of(measured, replace(cell, degrees_of_freedom=np.inf))
         samples = samples._replace(reading=about.reading)
     rod = samples.rod
-    units = np.array([rod.moment_unit, rod.force_unit, rod.force_unit])
+    units = rod.load_units
     readings = LoneSamples(
         cell.dimensionless(rod), np.stack([measured[name].values for name in CHANNELS], axis=-1) / units
     )
