@@ -48,7 +48,7 @@ _HOMES = {
     "inspect_record": "diagnostics.inspection",
     "make_record": "record",
     "normal_band": "uncertainty.normal_band",
-    "predictive_interval": "uncertainty.predictive",
+    "predictive_interval": "uncertainty.predictive_interval",
     "read_record": "record",
     "read_result": "inference.result",
     "reconstruct": "reconstruction",
@@ -115,7 +115,7 @@ if TYPE_CHECKING:
     from tactile_bayes.uncertainty.gap import gap as gap
     from tactile_bayes.uncertainty.implied_contacts import implied_contacts as implied_contacts
     from tactile_bayes.uncertainty.normal_band import normal_band as normal_band
-    from tactile_bayes.uncertainty.predictive import predictive_interval as predictive_interval
+    from tactile_bayes.uncertainty.predictive_interval import predictive_interval as predictive_interval
 
 
 def __getattr__(name: str) -> Any:

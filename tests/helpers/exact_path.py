@@ -1,4 +1,4 @@
-"""The equilibrium path of one contour in forty digits: what `path` is judged against, down to its snap-off.
+"""The equilibrium path of one contour in forty digits: what `continuation` is judged against, down to its snap-off.
 
 Contours are written out again, in mpmath and straight from what defines them, in pieces between which only point and
 slope are continuous. States are roots of the rod's equations (Legendre's form, from `exact_rod`) and of the contour's,

@@ -28,7 +28,7 @@ from tactile_bayes.plotting.maps import set_below
 from tactile_bayes.plotting.tightening import _fit_map, _panels
 from tactile_bayes.record import CHANNELS, in_frame, make_record, turned
 from tactile_bayes.sweep import scan
-from tactile_bayes.uncertainty.predictive import predictive_interval
+from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 
 ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)
 STEP = np.radians(4.0)

@@ -2,8 +2,8 @@
 
 A contact has three degrees of freedom, and a sample has four numbers (drive angle, holding moment, two forces), so that
 the sum of squared residuals has one degree of freedom. Each phase is fitted by the Levenberg–Marquardt method on its
-sheet (`contact_coordinates`), sample by sample (`fits`). An optimum beyond the edge where the two sheets meet does not
-count; where neither sheet has one before it, the most likely contact lies on the edge.
+sheet (`contact_coordinates`), sample by sample (`single_sample`). An optimum beyond the edge where the two sheets meet
+does not count; where neither sheet has one before it, the most likely contact lies on the edge.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class RawFit(NamedTuple):
 
 def raw_contacts(reading: Reading, delta: Floats) -> RawFit:
     """Contacts of n samples by Step 2, with friction angles of shape (n,)."""
-    from tactile_bayes.mechanics.fits import raw_fits  # numba takes a second to load
+    from tactile_bayes.mechanics.single_sample import raw_fits  # numba takes a second to load
 
     count = delta.size
     fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
@@ -222,7 +222,7 @@ class _Descent:
 
     def go(self, who: Index, gain: float, most_steps: int) -> None:
         """Descend with the samples `who` until the gain that the next step promises is small."""
-        from tactile_bayes.mechanics.fits import Workspace, descents  # numba takes a second to load
+        from tactile_bayes.mechanics.single_sample import Workspace, descents  # numba takes a second to load
 
         count, target = len(self._free), self._target
         workspace = Workspace(

@@ -1,7 +1,7 @@
 """Equilibrium paths of a batch of contours, from first contact to snap-off, for arrays.
 
 Quantities are in rod lengths, EI/L and EI/L², and in the sweep frame: `SweepFrame` mirrors backward sweeps to forward
-ones. Compiled code (`path`) follows the paths one after the other.
+ones. Compiled code (`continuation`) follows the paths one after the other.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import cached, compiled
+from tactile_bayes.mechanics.continuation import MOST_CHANGES, PathWorkspace, follow, path_workspace
 from tactile_bayes.mechanics.limits import clear_angle
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
-from tactile_bayes.mechanics.path import MOST_CHANGES, PathWorkspace, follow, path_workspace
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
 from tactile_bayes.mechanics.states import Rig, Scene

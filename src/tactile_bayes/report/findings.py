@@ -20,7 +20,7 @@ from tactile_bayes.record import record_hash
 from tactile_bayes.record.netcdf import read_netcdf
 from tactile_bayes.runs.folder import posterior_in
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.predictive import predictive_interval
+from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
 __all__ = ["FINDING_STEPS", "Findings", "findings_of"]

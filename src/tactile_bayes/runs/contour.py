@@ -32,7 +32,7 @@ from tactile_bayes.record import rod_of, validate, with_rod
 from tactile_bayes.runs.folder import Folder, panels
 from tactile_bayes.sweep import Scan, scan
 from tactile_bayes.uncertainty.band import contour_band
-from tactile_bayes.uncertainty.predictive import predictive_interval
+from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 from tactile_bayes.uncertainty.summary import gap_if_any, reach, summary
 
 __all__ = ["ContourRun", "analyse"]

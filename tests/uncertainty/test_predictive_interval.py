@@ -6,7 +6,7 @@ from helpers.contour_posteriors import posterior
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import CHANNELS
-from tactile_bayes.uncertainty.predictive import predictive_interval
+from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 
 
 def test_quantiles_of_the_draws_and_coverage_of_the_record():
