@@ -7,6 +7,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
@@ -72,19 +73,7 @@ def _root(outline: Outline, what: _Sought, turned: float, positive: float, negat
     settled = last_step * before
     for _ in range(100):
         value, slope = _missing(outline, what, turned, p)
-        if value > 0.0:
-            positive = p
-        else:
-            negative = p
-        new = p - value / slope
-        # Steps that do not shrink by half may cycle, for instance about a kink.
-        if (new - positive) * (new - negative) <= 0.0 and abs(new - p) <= 0.5 * before:
-            before = abs(new - p)
-        elif value == 0.0:
-            break
-        else:
-            new = 0.5 * (positive + negative)
-            before = abs(negative - positive)
+        new, positive, negative, before = newton_step(p, value, slope, positive, negative, before)
         step = abs(new - p)
         p = new
         if not step > settled or value == 0.0:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.numerics import chebyshev
 
 __all__ = [
@@ -130,19 +131,7 @@ def crossing(
     for _ in range(100):
         at_z, rate = value_and_slope(function, slope, z)
         missing = at_z - wanted
-        if missing > 0.0:
-            left = z
-        else:
-            right = z
-        new = z - missing / rate
-        # Steps that do not shrink by half may cycle, for instance about a kink.
-        if (new - left) * (new - right) <= 0.0 and abs(new - z) <= 0.5 * before:
-            before = abs(new - z)
-        elif missing == 0.0:
-            break
-        else:
-            new = 0.5 * (left + right)
-            before = abs(right - left)
+        new, left, right, before = newton_step(z, missing, rate, left, right, before)
         step = abs(new - z)
         z = new
         if not step > settled or missing == 0.0:
