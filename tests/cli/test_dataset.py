@@ -21,7 +21,7 @@ from helpers import commands
 from helpers.commands import assert_refused
 from helpers.tasks import alive, wait_until
 from tactile_bayes.contours.families import FAMILIES, FLANKS
-from tactile_bayes.datasets.specification import left_out
+from tactile_bayes.datasets.specification_text import left_out
 from tactile_bayes.record import LOAD_CELL_UNITS
 
 COMMAND = str(Path(sys.executable).with_name("tactile-bayes"))

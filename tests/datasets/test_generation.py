@@ -18,7 +18,7 @@ from tactile_bayes.contours.shape_free_family import SHAPE_FREE
 from tactile_bayes.datasets import contour_of, read_specification, record
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
-from tactile_bayes.datasets.specification import left_out
+from tactile_bayes.datasets.specification_text import left_out
 from tactile_bayes.errors import ParameterError, SpecificationError, StrainWarning
 from tactile_bayes.record import in_frame
 

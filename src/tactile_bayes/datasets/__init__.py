@@ -3,7 +3,8 @@
 from tactile_bayes.datasets.collection import open_dataset as open
 from tactile_bayes.datasets.production import Production, generate
 from tactile_bayes.datasets.single_record import contour_of, record
-from tactile_bayes.datasets.specification import Specification, read_specification
+from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.specification_reading import read_specification
 from tactile_bayes.datasets.verification import Verification, verify
 
 __all__ = [

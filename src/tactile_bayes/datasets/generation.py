@@ -16,7 +16,8 @@ from tactile_bayes.contours.base import Contour
 from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.datasets.measurement import measure
-from tactile_bayes.datasets.specification import Specification, rule_of
+from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.specification_reading import rule_of
 from tactile_bayes.datasets.streams import CONTOUR, streams
 from tactile_bayes.errors import ContourError, SpecificationError
 from tactile_bayes.mechanics.paths import Paths, trace

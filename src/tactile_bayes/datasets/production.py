@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 from tactile_bayes.datasets.card import CARD, card
 from tactile_bayes.datasets.manifest import MANIFEST, Manifest, read_manifest, versions_here, write_manifest
 from tactile_bayes.datasets.shard import Written, shard_file, write_shard
-from tactile_bayes.datasets.specification import UNNAMED, Specification, meaning, read_specification
-from tactile_bayes.datasets.specification_text import differences
+from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.specification_reading import read_specification
+from tactile_bayes.datasets.specification_text import UNNAMED, differences, meaning
 from tactile_bayes.errors import SpecificationError
 from tactile_bayes.tasks import alone_in, run_tasks, write_atomically
 

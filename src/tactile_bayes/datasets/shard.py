@@ -18,7 +18,8 @@ from tactile_bayes.contours.families import FAMILIES
 from tactile_bayes.contours.family import FamilyParameter
 from tactile_bayes.datasets.generation import Records, generate_records
 from tactile_bayes.datasets.netcdf import netcdf_of
-from tactile_bayes.datasets.specification import Specification, read_text
+from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of

@@ -16,7 +16,8 @@ from tactile_bayes.datasets.collection import opened
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import read_manifest
 from tactile_bayes.datasets.shard import records_as_dataset
-from tactile_bayes.datasets.specification import Specification, read_specification, read_text
+from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.specification_reading import read_specification, read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod

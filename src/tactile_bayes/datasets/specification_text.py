@@ -1,17 +1,55 @@
-"""The text of a specification: TOML from a mapping, and a canonical form."""
+"""The text of a specification: TOML from a mapping, its default values, and a canonical form."""
 
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Mapping
 from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
+from tactile_bayes.contours.families import FAMILIES
+from tactile_bayes.contours.family import Family
 from tactile_bayes.errors import SpecificationError
 
-__all__ = ["canonical", "differences", "toml_of", "without"]
+__all__ = ["DEFAULTS", "SCAN", "UNNAMED", "differences", "left_out", "meaning", "toml_of", "without"]
+
+UNNAMED = "unnamed"
+
+SCAN = {"bases": [[0.0, 0.0]], "directions": ["forward", "backward"], "samples": 180, "margin": 0.1, "friction": 0.0}
+DEFAULTS = {
+    "name": UNNAMED,
+    "description": "",
+    "shard_records": 500,
+    "precision": "double",
+    "each_contour": False,
+    "scan": SCAN,
+    "load_cell": {"frame": "fixed"},
+    "rod": {"diameter": 0.0},
+}
+"""Default values of keys; a specification with an explicit default is the same."""
+
+
+def meaning(text: str) -> dict[str, Any]:
+    """Return the meaning of the text of a specification.
+
+    It does not depend on comments, layout, the notation of numbers (1 or 1.0), or explicit default values."""
+    said = without(DEFAULTS, tomllib.loads(text))
+    said["contours"] = [
+        without({"weight": 1.0, **left_out(FAMILIES[group["family"]])}, group) for group in said["contours"]
+    ]
+    return dict(canonical(said))
+
+
+def left_out(family: Family) -> dict[str, Any]:
+    """Default values of the parameters of a family: x_c = 0, and standard normal weights."""
+    standard = {"normal": [0.0, 1.0]}
+    return {
+        "x_c": 0.0,
+        **{n: standard for n, entry in family.table.items() if entry.prior and entry.prior.distribution == "norm"},
+    }
 
 
 def canonical(value: Any) -> Any:

@@ -15,7 +15,8 @@ from tactile_bayes.datasets.collection import opened_shard
 from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.manifest import Manifest, read_manifest
 from tactile_bayes.datasets.shard import records_as_dataset
-from tactile_bayes.datasets.specification import Specification, read_text
+from tactile_bayes.datasets.specification import Specification
+from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.errors import ParameterError, SpecificationError
 from tactile_bayes.numerics.selection import evenly_spread
 

@@ -1,0 +1,324 @@
+"""The reading of specifications: keys, values, and refusals that name them."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Container, Iterable, Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from tactile_bayes.checks import as_number, check_choice, check_kind, check_number, check_whole_number, refused
+from tactile_bayes.contours.families import FAMILIES, FLANKS, sides_of
+from tactile_bayes.contours.family import Family
+from tactile_bayes.datasets.distributions import Distribution, distribution_of
+from tactile_bayes.datasets.specification import Drive, Group, Specification
+from tactile_bayes.datasets.specification_text import DEFAULTS, SCAN, left_out, toml_of
+from tactile_bayes.errors import ContourError, ParameterError, SpecificationError
+from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
+from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import FRAMES, LOAD_CELL_UNITS, Frame
+
+__all__ = ["read_specification", "read_text", "rule_of"]
+
+_MOST_SHARDS = 1_000_000
+_MOST_NAMED = 8
+"""Largest number of keys that the message about an unknown key lists."""
+
+_LARGEST_SEED = 2**63 - 1
+
+_TABLES: Mapping[str, Iterable[str]] = {
+    "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour"),
+    "rod.": ("length", "flexural_rigidity", "diameter"),
+    "scan.": ("bases", "directions", "samples", "from_degrees", "to_degrees", "margin", "friction"),
+    "load_cell.": ("frame", *LOAD_CELL_UNITS),
+}
+"""Keys of each table."""
+
+_REPLACED = {
+    "power-law": ("a", "w", "the width at which it is as high as wide, a^(1/(1 − n))"),
+    "shape-free": ("radius", "r", "its mean (geometric) over slope angles"),
+}
+"""Parameters of earlier versions by family: the old one, the new one, and its meaning."""
+
+
+def read_specification(source: str | os.PathLike[str] | Mapping[str, Any]) -> Specification:
+    """Read the specification in a TOML file, or in a mapping of the same form.
+
+    Parameters
+    ----------
+    source : path-like or mapping
+        File, or its content as nested mappings.
+
+    Returns
+    -------
+    Specification
+
+    Raises
+    ------
+    SpecificationError
+        If a key is unknown, missing or has an impossible value; the message names it.
+    OSError
+        If there is no such file.
+
+    Examples
+    --------
+    >>> contours = [{"family": "parabola", "a": {"uniform": [0.3, 3.0]}, "q": {"uniform": [0.3, 0.7]}}]
+    >>> spec = read_specification({"records": 100, "seed": 1, "contours": contours})
+    >>> spec.shards, spec.units
+    (1, 'dimensionless')
+    """
+    if isinstance(source, Mapping):
+        text, where = toml_of(source), "specification"
+    else:
+        where = str(source)
+        try:
+            text = Path(source).read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise SpecificationError(f"{where}: not a text in UTF-8: {error.reason} at byte {error.start}") from error
+    try:
+        return read_text(text)
+    except SpecificationError as error:
+        raise SpecificationError(f"{where}: {error}") from error
+
+
+def read_text(text: str) -> Specification:
+    """Read the specification in a TOML text; see `read_specification`."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SpecificationError(f"not TOML: {error}") from error
+    if not table:
+        raise SpecificationError("it is empty: `tactile-bayes dataset example` prints one to start from")
+    try:
+        return _specification(table, text)
+    except ParameterError as error:
+        raise SpecificationError(str(error)) from error
+
+
+def rule_of(error: ContourError) -> str:
+    """Return the rule that an error states, without the values, so that errors can be counted by rule."""
+    message = str(error).partition("; found ")[0]
+    return message.partition(": ")[2] or message
+
+
+def _specification(table: Mapping[str, Any], text: str) -> Specification:
+    _refuse_unknown(table, (*_TABLES[""], "contours", "rod", "scan", "load_cell"), "")
+    said = {**DEFAULTS, **table}
+    check_kind("each_contour", said["each_contour"], bool, "write true or false")
+    for key in ("name", "description"):
+        check_kind(key, said[key], str, "give a text")
+    scan, load_cell = _table(table, "scan"), {"frame": "fixed", **_table(table, "load_cell")}
+    frame = check_choice("load_cell.frame", load_cell.pop("frame"), FRAMES)
+    found = Specification(
+        text=text,
+        name=said["name"],
+        description=said["description"],
+        records=1,
+        shard_records=_whole(said["shard_records"], "shard_records", 1, 100_000),
+        seed=_whole(said.get("seed"), "seed", 0, _LARGEST_SEED),
+        groups=_groups(said),
+        each_group=said["each_contour"],
+        rod=_rod(_table(table, "rod")),
+        bases=_bases((SCAN | scan)["bases"]),
+        directions=_directions((SCAN | scan)["directions"]),
+        drive=_drive(scan),
+        friction=_number((SCAN | scan)["friction"], "scan.friction", 0.0, 0.84),
+        load_cell=_load_cell(load_cell),
+        frame=cast(Frame, frame),
+        single=check_choice("precision", said["precision"], ("double", "single")) == "single",
+    )
+    turns = found.combinations
+    records = table.get("records", turns if found.lists else None)
+    records = _whole(records, "records", 1, _MOST_SHARDS * found.shard_records)
+    if records % turns:
+        raise SpecificationError(
+            f"records is {records}, but the lists of 'each' make {turns} combinations: give a multiple of it"
+        )
+    return replace(found, records=records)
+
+
+def _groups(said: Mapping[str, Any]) -> tuple[Group, ...]:
+    groups = said.get("contours")
+    if isinstance(groups, dict):
+        raise SpecificationError("contours is one table: write [[contours]], in two pairs of brackets, for each family")
+    if not isinstance(groups, list) or not groups or not all(isinstance(group, dict) for group in groups):
+        raise SpecificationError("there are no contours: give at least one table [[contours]], with its family")
+    return tuple(_group(group, f"contours[{k}]", said["each_contour"]) for k, group in enumerate(groups))
+
+
+def _group(group: Mapping[str, Any], key: str, each: bool) -> Group:
+    name = group.get("family")
+    if not isinstance(name, str) or name not in FAMILIES:
+        found_is = f"is {name!r}" if "family" in group else "is missing"
+        raise SpecificationError(
+            f"{key}.family {found_is}: choose from {', '.join(FLANKS)}, shape-free, or two flanks "
+            f"({' or '.join(FLANKS)} on either side, as in 'parabola/circle')"
+        )
+    family = FAMILIES[name]
+    _refuse_replaced(group, name, key)
+    # In the order in which numbers are drawn.
+    names = sorted(family.parameters, key=lambda parameter: (parameter == "x_c", parameter.startswith("right_")))
+    _refuse_unknown(group, ("family", "weight", *names), f"{key}.")
+    values = {"weight": 1.0, **left_out(family), **group}
+    missing = [parameter for parameter in names if parameter not in values]
+    if missing:
+        raise SpecificationError(f"{key} is a {name} and has no {missing[0]}: give a number or a distribution")
+    weight = _number(values["weight"], f"{key}.weight", 0.0, 1e9)
+    if weight == 0.0 or (each and "weight" in group):
+        why = "it must be positive" if not each else "with each_contour every family comes as often"
+        raise SpecificationError(f"{key}.weight is {weight!r}: {why}")
+    distributions = {parameter: distribution_of(values[parameter], f"{key}.{parameter}") for parameter in names}
+    _refuse_no_contour(family, distributions, key)
+    return Group(name, weight, distributions)
+
+
+def _refuse_replaced(group: Mapping[str, Any], name: str, key: str) -> None:
+    """Refuse parameters of earlier versions, and name the new ones."""
+    for side, flank in sides_of(name).items():
+        old, new, correction = _REPLACED.get(flank, ("", "", ""))
+        if not old or side + old not in group:
+            continue
+        a, n = as_number(group[side + old]), as_number(group.get(f"{side}n"))
+        if flank == "power-law" and a is not None and n is not None and a > 0.0 and n > 1.0:
+            correction += f", here {a ** (1.0 / (1.0 - n)):.12g}"
+        raise SpecificationError(
+            f"{key}.{side}{old} was a parameter of the family {flank} in earlier versions: write {side}{new} in its "
+            f"place, {correction}"
+        )
+
+
+def _refuse_no_contour(family: Family, distributions: Mapping[str, Distribution], key: str) -> None:
+    """Refuse parameters that are impossible for any values of the others, by the ends of the distributions; draws from
+    unbounded distributions are tested later."""
+    possible = {name: np.full(1, 2.0 if name.endswith("n") else 1.0) for name in family.parameters}
+    for name, distribution in distributions.items():
+        numbers = distribution.numbers
+        if distribution.kind in ("normal", "log_normal"):
+            numbers = () if distribution.numbers[1] else distribution.numbers[:1]
+        for number in numbers:
+            try:
+                family.contour(possible | {name: np.full(1, number)})
+            except ContourError as error:
+                verb = "is" if distribution.kind == "constant" else "may be"
+                raise SpecificationError(f"{key}.{name} {verb} {number:g}: {rule_of(error)}") from error
+
+
+def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
+    if not rod:
+        return {}
+    if "length" not in rod or "flexural_rigidity" not in rod:
+        raise SpecificationError(
+            "rod needs length [m] and flexural_rigidity [N m²]; without [rod] lengths are in rod lengths"
+        )
+    distributions = {name: distribution_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
+    _refuse_negative(distributions, "rod.", or_zero={"diameter"})
+    try:
+        Rod(*_at_share(distributions, 0.5).values())
+    except ParameterError as error:
+        raise SpecificationError(f"rod: {error}") from error
+    return distributions
+
+
+def _load_cell(table: Mapping[str, Any]) -> dict[str, Distribution]:
+    distributions = {name: distribution_of(value, f"load_cell.{name}") for name, value in table.items()}
+    if any(name.startswith("ornstein_uhlenbeck") for name in distributions):
+        distributions.setdefault("ornstein_uhlenbeck_time", Distribution("constant", (OrnsteinUhlenbeck().time,)))
+    for share in (0.05, 0.5, 0.95):
+        try:
+            LoadCell.from_entries(_at_share(distributions, share))
+        except ParameterError as error:
+            raise SpecificationError(f"load_cell: {error}") from error
+    signed = ("bias_holding", "bias_force", "gain_", "lever_", "correlation_", "drive_angle_o", "drive_angle_b")
+    unsigned = {name: distribution for name, distribution in distributions.items() if not name.startswith(signed)}
+    _refuse_negative(unsigned, "load_cell.", or_zero=set(unsigned))
+    return distributions
+
+
+def _at_share(distributions: Mapping[str, Distribution], share: float) -> dict[str, float]:
+    """Return the quantiles of distributions at a probability."""
+    turn = np.zeros(1, dtype=np.intp)
+    return {name: float(distribution.at(np.full(1, share), turn)[0]) for name, distribution in distributions.items()}
+
+
+def _refuse_negative(distributions: Mapping[str, Distribution], prefix: str, or_zero: Container[str]) -> None:
+    for name, distribution in distributions.items():
+        low = distribution.least
+        if low < 0.0 or (low == 0.0 and name not in or_zero):
+            what = "negative" if low < 0.0 else "0"
+            raise SpecificationError(
+                f"{prefix}{name} may be {what}: choose a distribution of positive numbers, as log_normal"
+            )
+
+
+def _bases(value: Any) -> tuple[tuple[Distribution, Distribution], ...]:
+    if not isinstance(value, list) or not value or not all(isinstance(pair, list) and len(pair) == 2 for pair in value):
+        raise refused("scan.bases", value, "give a list of pivots, each [x, y]")
+    return tuple(
+        (distribution_of(x, f"scan.bases[{i}][0]"), distribution_of(y, f"scan.bases[{i}][1]"))
+        for i, (x, y) in enumerate(value)
+    )
+
+
+def _directions(value: Any) -> tuple[str, ...]:
+    if value not in (["forward"], ["backward"], ["forward", "backward"], ["backward", "forward"]):
+        raise refused("scan.directions", value, "give 'forward', 'backward' or both")
+    return tuple(value)
+
+
+def _drive(scan: Mapping[str, Any]) -> Drive:
+    samples = _whole(scan.get("samples", SCAN["samples"]), "scan.samples", 2, 1_000_000)
+    names = ("from_degrees", "to_degrees")
+    given = [name for name in names if name in scan]
+    if not given:
+        return Drive(samples, None, None, _number(scan.get("margin", SCAN["margin"]), "scan.margin", 0.0, 1.0))
+    for missing in set(names) - set(given):
+        raise SpecificationError(
+            f"scan.{missing} is missing: give it beside {given[0]}, or neither, and sweeps go from contact to snap-off"
+        )
+    if "margin" in scan:
+        raise SpecificationError("scan has from_degrees and to_degrees, and a margin: leave the one or the others out")
+    begin, end = (_number(scan[name], f"scan.{name}", -360.0, 360.0) for name in names)
+    if not begin < end:
+        raise SpecificationError(f"scan.from_degrees is {begin:g}, not below to_degrees, {end:g}")
+    return Drive(samples, math.radians(begin), math.radians(end), 0.0)
+
+
+def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """Return one of the inner tables, and refuse unknown keys."""
+    value = table.get(key, {})
+    check_kind(key, value, dict, f"write it as a table, [{key}]")
+    _refuse_unknown(value, _TABLES[f"{key}."], f"{key}.")
+    return dict(value)
+
+
+def _whole(value: Any, key: str, least: int, most: int) -> int:
+    if value is None:
+        raise SpecificationError(f"{key} is missing: give a whole number")
+    largest = "2^63 - 1" if most == _LARGEST_SEED else most
+    return check_whole_number(key, value, least, f"give a whole number from {least} to {largest}", most=most)
+
+
+def _number(value: Any, key: str, least: float, most: float) -> float:
+    return check_number(key, value, f"give a number from {least:g} to {most:g}", least=least, most=most)
+
+
+def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
+    known = list(known)
+    for key in table:
+        if key in known:
+            continue
+        if elsewhere := [where for where, keys in _TABLES.items() if key in keys]:
+            place = f"the table [{elsewhere[0][:-1]}]" if elsewhere[0] else "the top, above the first table"
+            hint = f"its place is {place}"
+        elif near := get_close_matches(key, known, n=1):
+            hint = f"did you mean {near[0]!r}?"
+        else:
+            more = " and others: `tactile-bayes dataset example` names all" if len(known) > _MOST_NAMED else ""
+            hint = f"there are {', '.join(known[:_MOST_NAMED])}{more}"
+        raise SpecificationError(f"there is no key {prefix + key!r}: {hint}")
