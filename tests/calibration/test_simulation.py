@@ -148,11 +148,7 @@ def test_the_world_has_the_same_on_top():
 
 @pytest.mark.parametrize(
     ("told", "further"),
-    [
-        pytest.param(0.0, 0.3, marks=pytest.mark.slow),
-        (0.1, 0.2),
-        pytest.param(0.3, 0.0, marks=pytest.mark.slow),
-    ],
+    [pytest.param(0.0, 0.3, marks=pytest.mark.slow), (0.1, 0.2), pytest.param(0.3, 0.0, marks=pytest.mark.slow)],
 )
 def test_friction(told, further):
     made = simulated(friction=told, world=Misspecification(friction=further))

@@ -137,10 +137,7 @@ def test_what_a_killed_run_left_behind_is_removed(tmp_path):
 
 def test_one_run_at_a_time(tmp_path):
     pytest.importorskip("fcntl")
-    with (
-        open_results_store(WORDS, tmp_path, REPLICATES),
-        refused(CalibrationError, "another run", tmp_path),
-    ):
+    with open_results_store(WORDS, tmp_path, REPLICATES), refused(CalibrationError, "another run", tmp_path):
         open_results_store(WORDS, tmp_path, REPLICATES).__enter__()
     filled(tmp_path)
 

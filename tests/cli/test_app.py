@@ -288,10 +288,7 @@ def test_numbers_without_units_are_taken_as_dimensionless_and_that_is_said(tmp_p
         (["--column", "force_x=a", "--column", "force_x=b"], "--column force_x= is given twice: keep one of them"),
         (["--column", "force=Fx"], "columns: 'force' is no column of a record: did you mean 'force_"),
         (["--column", "force_x=Fx[mN]"], "there is no column 'Fx', which is given for 'force_x' (columns: sweep, "),
-        (
-            ["--column", "force_x=force_x[mm]"],
-            "column 'force_x' is in [N], but [mm] is given for it",
-        ),
+        (["--column", "force_x=force_x[mm]"], "column 'force_x' is in [N], but [mm] is given for it"),
         (["--split-sweeps"], "column 'sweep' is there already: do without split_sweeps, or remove the column"),
     ],
 )

@@ -111,10 +111,7 @@ def test_a_scan_from_two_pivots_is_drawn(tmp_path):
         (["--points", "{}/words.csv"], "words.csv: '1,b' is no point: give x and y, like 0.1,0.52"),
         (["--figure", "{}/scan.gif"], "scan.gif: a figure is a .png, .pdf or .svg file"),
         (["--out", "{}/r.txt"], "r.txt: a record is a .csv or .nc file"),
-        (
-            ["--out", "{}/words.csv/no/r.csv"],
-            "words.csv is a file, and no folder for r.csv",
-        ),
+        (["--out", "{}/words.csv/no/r.csv"], "words.csv is a file, and no folder for r.csv"),
     ],
 )
 def test_what_cannot_be_scanned_is_refused_in_a_line(tmp_path, options, message):

@@ -125,11 +125,7 @@ def test_json_has_the_words_and_the_numbers(asked, analysed, tmp_path):
         "bound_with_priors": float(told.bound_with_priors.sel(parameter="a")),
         "unit": "1",
     }
-    assert answer["band"] == {
-        "touched": float(told.touched_width),
-        "gap": float(told.gap_width),
-        "probability": 0.95,
-    }
+    assert answer["band"] == {"touched": float(told.touched_width), "gap": float(told.gap_width), "probability": 0.95}
     needed = analysed["required_noise"].to_dataset()
     assert [row["force_noise"] for row in answer["required_noise"]] == list(needed.force_noise.values)
     assert answer["files"]["words"] == str(tmp_path / "words.txt")

@@ -73,11 +73,7 @@ def test_outliers_do_not_rule_a_fit(name):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        *FLANKS,
-        *(pytest.param(name, marks=pytest.mark.slow) for name in CASES if name not in FLANKS),
-    ],
+    "name", [*FLANKS, *(pytest.param(name, marks=pytest.mark.slow) for name in CASES if name not in FLANKS)]
 )
 @given(x=st.floats(-2.0, 2.0), y=st.floats(-2.0, 2.0), length=st.floats(0.01, 10.0), u=st.floats(0.01, 0.99))
 def test_priors_move_with_the_pivot_and_scale_with_the_rod(name, x, y, length, u):

@@ -152,10 +152,7 @@ WRONG = {
         graph(*PARABOLA, domain=property(lambda self: (np.asarray(1.0), np.asarray(-1.0)))),
         "domain",
     ),
-    "another height": (
-        graph(*PARABOLA, height=lambda self, x: self.k * np.asarray(x)),
-        r"height .* at x = ",
-    ),
+    "another height": (graph(*PARABOLA, height=lambda self, x: self.k * np.asarray(x)), r"height .* at x = "),
     "another slope": (
         graph(*PARABOLA, parameter_of_slope=lambda self, slope_angle: np.tan(slope_angle) / self.k),
         r"parameter_of_slope .* at x = ",

@@ -400,13 +400,7 @@ def test_the_reasons_of_a_record_that_is_given_up_are_its_own():
 
 
 def test_wild_shapes_are_drawn_again():
-    wild = {
-        "family": "shape-free",
-        "r": 0.5,
-        "amplitude": 0.5,
-        "length_scale": {"log_normal": [0.15, 2.0]},
-        "q": 0.4,
-    }
+    wild = {"family": "shape-free", "r": 0.5, "amplitude": 0.5, "length_scale": {"log_normal": [0.15, 2.0]}, "q": 0.4}
     records = generate_records(read_specification({**FAR, "records": 10, "contours": [wild]}), 0, 10)
     assert records.redrawn["no contour (length_scale must be from 0.15 to 4 rad)"] > 0
     assert np.all(records.drawn["contours[0].length_scale"] >= 0.15)
@@ -478,8 +472,7 @@ def test_records_depend_on_seed_and_index_alone():
     [
         {"load_cell__relative_noise": 0.0},
         pytest.param(
-            {"load_cell__bias_force_x": {"normal": [0.0, 0.1]}, "load_cell__force_noise": None},
-            marks=pytest.mark.slow,
+            {"load_cell__bias_force_x": {"normal": [0.0, 0.1]}, "load_cell__force_noise": None}, marks=pytest.mark.slow
         ),
         pytest.param({"scan__samples": 5}, marks=pytest.mark.slow),
         {"scan__friction": 0.0, "scan__bases": [[0.0, 0.0], [0.0, 0.0]]},

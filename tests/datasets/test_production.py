@@ -374,10 +374,7 @@ CARDS = {
     ),
     "drift": (
         {"load_cell__ornstein_uhlenbeck_force": 0.01},
-        [
-            "| load cell: ornstein_uhlenbeck_time | 100 |",
-            "drift and the unknown bias of a record are not stored",
-        ],
+        ["| load cell: ornstein_uhlenbeck_time | 100 |", "drift and the unknown bias of a record are not stored"],
         [],
     ),
     "single": (

@@ -132,18 +132,12 @@ REFUSED = [
     (contour(a={"each": [1.0, -2.0]}), ["contours[0].a may be -2"]),
     (contour(a={"normal": [-1.0, 0.0]}), ["contours[0].a may be -1"]),
     ({"contours": [{"family": "circle", "r": -1, "q": 0.5}]}, ["contours[0].r is -1"]),
-    (
-        {"contours": [PARABOLA, {"family": "power-law", "w": 1.0, "n": 1.0, "q": 0.5}]},
-        ["contours[1].n is 1", "1.1"],
-    ),
+    ({"contours": [PARABOLA, {"family": "power-law", "w": 1.0, "n": 1.0, "q": 0.5}]}, ["contours[1].n is 1", "1.1"]),
     (
         {"contours": [{"family": "power-law", "w": 1.0, "n": {"log_uniform": [1.5, 80.0]}, "q": 0.5}]},
         ["contours[0].n may be 80", "50"],
     ),
-    (
-        {"contours": [{"family": "power-law", "w": -1.0, "n": 3.0, "q": 0.5}]},
-        ["contours[0].w is -1"],
-    ),
+    ({"contours": [{"family": "power-law", "w": -1.0, "n": 3.0, "q": 0.5}]}, ["contours[0].w is -1"]),
     (
         {"contours": [{"family": "power-law", "a": {"uniform": [1.0, 2.0]}, "n": 3.0, "q": 0.5}]},
         ["contours[0].a", "power-law", "w"],
@@ -170,19 +164,13 @@ REFUSED = [
     ),
     ({"contours": [{"family": ["circle"]}]}, ["contours[0].family is ['circle']"]),
     ({"contours": [PARABOLA, {"family": "square"}]}, ["contours[1].family is 'square'"]),
-    (
-        {"contours": [{"family": "parabola", "a": 1.0}]},
-        ["contours[0] is a parabola and has no q"],
-    ),
+    ({"contours": [{"family": "parabola", "a": 1.0}]}, ["contours[0] is a parabola and has no q"]),
     (contour(r=1.0), ["there is no key 'contours[0].r'"]),
     (contour(weight=0), ["contours[0].weight is 0.0"]),
     (contour(weight=float("inf")), ["contours[0].weight is inf"]),
     (contour(weight=10**400), ["contours[0].weight is a int"]),
     (contour(weight=-1), ["contours[0].weight is -1"]),
-    (
-        {**contour(weight=1), "each_contour": True},
-        ["contours[0].weight is 1.0", "each_contour"],
-    ),
+    ({**contour(weight=1), "each_contour": True}, ["contours[0].weight is 1.0", "each_contour"]),
     (contour(q="deep"), ["contours[0].q is 'deep'"]),
     (contour(q=float("nan")), ["contours[0].q is nan"]),
     (contour(q=10**400), ["contours[0].q", 10**400]),
@@ -208,10 +196,7 @@ REFUSED = [
     ({"rod": 3}, ["rod is 3"]),
     ({"rod": {"length": 0.1}}, ["rod needs length [m] and flexural_rigidity [N m²]"]),
     ({"rod": {"length": 0.1, "stiffness": 1.0}}, ["there is no key 'rod.stiffness'"]),
-    (
-        {"rod": {"length": {"normal": [0.1, 0.01]}, "flexural_rigidity": 1.0}},
-        ["rod.length may be negative"],
-    ),
+    ({"rod": {"length": {"normal": [0.1, 0.01]}, "flexural_rigidity": 1.0}}, ["rod.length may be negative"]),
     ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, ["rod.flexural_rigidity may be 0"]),
     ({"rod": {"length": 0.1, "flexural_rigidity": 1.0, "diameter": -1.0}}, ["rod.diameter may be negative"]),
     ({"scan": "all"}, ["scan is 'all'"]),
@@ -243,15 +228,9 @@ REFUSED = [
     ({"load_cell__frame": "loose"}, ["load_cell.frame is 'loose'"]),
     ({"load_cell__frame": ["fixed"]}, ["load_cell.frame is ['fixed']"]),
     ({"load_cell__force_noise": -1.0}, ["load_cell", "force_noise is -1.0"]),
-    (
-        {"load_cell__force_noise": {"normal": [0.05, 0.001]}},
-        ["load_cell.force_noise may be negative"],
-    ),
+    ({"load_cell__force_noise": {"normal": [0.05, 0.001]}}, ["load_cell.force_noise may be negative"]),
     ({"load_cell__force_noise": "some"}, ["load_cell.force_noise is 'some'"]),
-    (
-        {"load_cell": {"force_resolution": 2.0, "force_range": 1.0}},
-        ["load_cell", "force_resolution is 2.0"],
-    ),
+    ({"load_cell": {"force_resolution": 2.0, "force_range": 1.0}}, ["load_cell", "force_resolution is 2.0"]),
     (
         {**contour(q={"each": [0.3, 0.4, 0.5]}), "records": 25},
         ["records is 25, but the lists of 'each' make 3 combinations"],

@@ -80,10 +80,7 @@ def _ellipse(half_width: Any, half_height: Any, contour: Circle | Ellipse, low: 
         return upright if abs(x) == mp.inf else mp.asin((x - x_c) / a)
 
     return Piece(
-        locate,
-        end(low, -HALF),
-        end(high, HALF),
-        lambda x, y, alpha: mp.atan2(a * mp.sin(alpha), b * mp.cos(alpha)),
+        locate, end(low, -HALF), end(high, HALF), lambda x, y, alpha: mp.atan2(a * mp.sin(alpha), b * mp.cos(alpha))
     )
 
 

@@ -88,9 +88,7 @@ def ideal(samples=5, missing=(), rod=None, **further):
 _sizes = st.one_of(st.just(0.0), st.floats(1e-3, 1.0))
 _signed = st.floats(-1.0, 1.0)
 _drifts = st.one_of(
-    st.none(),
-    st.builds(RandomWalk, _sizes, _sizes),
-    st.builds(OrnsteinUhlenbeck, _sizes, _sizes, st.floats(0.1, 1e3)),
+    st.none(), st.builds(RandomWalk, _sizes, _sizes), st.builds(OrnsteinUhlenbeck, _sizes, _sizes, st.floats(0.1, 1e3))
 )
 
 

@@ -227,11 +227,7 @@ def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
     assert result["posterior"].force_noise.attrs["units"] == "N"
 
 
-@pytest.mark.parametrize(
-    "missing",
-    [("force_x", "force_y"), ("holding_moment",)],
-    ids=["moment only", "forces only"],
-)
+@pytest.mark.parametrize("missing", [("force_x", "force_y"), ("holding_moment",)], ids=["moment only", "forces only"])
 @pytest.mark.slow
 def test_missing_channels(missing):
     """Within 4 standard deviations of the truth: false alarm 6e-5 a number."""

@@ -122,8 +122,7 @@ def test_batches_of_every_shape_are_one_by_one(name):
 
 
 @pytest.mark.parametrize(
-    "further",
-    [{"drift": WANDER, "bias_uncertainty": UNKNOWN}, {"correlation": SHARED, "drift": WALK}, {"drift": WALK}],
+    "further", [{"drift": WANDER, "bias_uncertainty": UNKNOWN}, {"correlation": SHARED, "drift": WALK}, {"drift": WALK}]
 )
 def test_steps_beside_what_wanders_are_noise(further):
     sheet = cell(force_resolution=0.05, moment_resolution=0.02, **further)

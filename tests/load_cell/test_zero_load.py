@@ -196,11 +196,7 @@ def test_noise_over_its_truth_is_chi_squared():
 
 @pytest.mark.parametrize(
     ("parts", "height"),
-    [
-        ((15, 15, 15), 9.0),
-        ((15, 100, 15), 5.5),
-        pytest.param((100, 500, 100), 2.5, marks=pytest.mark.slow),
-    ],
+    [((15, 15, 15), 9.0), ((15, 100, 15), 5.5), pytest.param((100, 500, 100), 2.5, marks=pytest.mark.slow)],
 )
 def test_a_weak_load_on_one_channel_is_found(parts, height):
     before, loaded, after = parts

@@ -151,11 +151,7 @@ TINY_LOADS = [
 
 @pytest.mark.parametrize(
     ("side", "chosen"),
-    [
-        (1, EVEN),
-        pytest.param(1, EVERY, marks=pytest.mark.slow),
-        pytest.param(-1, EVERY, marks=pytest.mark.slow),
-    ],
+    [(1, EVEN), pytest.param(1, EVERY, marks=pytest.mark.slow), pytest.param(-1, EVERY, marks=pytest.mark.slow)],
 )
 def test_the_contact_is_where_integration_finds_no_curvature(side, chosen):
     for shape in (TANGENTIAL_SHAPES + TIP_SHAPES + TINY_LOADS)[chosen]:

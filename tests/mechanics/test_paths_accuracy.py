@@ -373,10 +373,7 @@ def test_of_two_maxima_the_first_ends_the_sweep(scene):
 
 def test_the_kinds_of_ends():
     """A fold and a corner, each told by its name."""
-    ends = {
-        "fold": Scene(paper_profile("II", 0.3)),
-        "corner": Scene(paper_profile("II", 0.5)),
-    }
+    ends = {"fold": Scene(paper_profile("II", 0.3)), "corner": Scene(paper_profile("II", 0.5))}
     for kind, scene in ends.items():
         paths = scene.paths()
         exact = ExactPath(*scene)

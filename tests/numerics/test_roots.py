@@ -44,10 +44,7 @@ def test_a_kink_about_which_newton_goes_in_circles():
 
     def kinked(_i, x):
         right = x > 0
-        return (
-            -0.1 + np.where(right, 7.22 * x - 11.9 * x * x, 1.065 * x),
-            np.where(right, 7.22 - 23.8 * x, 1.065),
-        )
+        return (-0.1 + np.where(right, 7.22 * x - 11.9 * x * x, 1.065 * x), np.where(right, 7.22 - 23.8 * x, 1.065))
 
     truth = (7.22 - np.sqrt(7.22**2 - 4 * 11.9 * 0.1)) / (2 * 11.9)
     found = falling_root(kinked, np.array([0.3]), np.array([-2.0]), np.array([0.093]))

@@ -17,11 +17,7 @@ from tactile_bayes.inference.nuisances import STANDARD
 from tactile_bayes.load_cell import OrnsteinUhlenbeck, RandomWalk
 from tactile_bayes.planning.information import information
 from tactile_bayes.planning.plan import Plan
-from tactile_bayes.planning.record_information import (
-    prior_precision,
-    reading_slopes,
-    record_information,
-)
+from tactile_bayes.planning.record_information import prior_precision, reading_slopes, record_information
 from tactile_bayes.record import CHANNELS
 
 PROFILE = paper_profile("II", q=0.5)

@@ -49,11 +49,7 @@ def calibration_of(p_values=None, **ranks):
 
 def covering(shares, errors, counts, probability=0.9, claims=None):
     return xr.Dataset(
-        {
-            "coverage": ("claim", shares),
-            "coverage_error": ("claim", errors),
-            "coverage_replicates": ("claim", counts),
-        },
+        {"coverage": ("claim", shares), "coverage_error": ("claim", errors), "coverage_replicates": ("claim", counts)},
         coords={"claim": list(CLAIMS)[: len(shares)] if claims is None else claims},
         attrs={"probability": probability},
     )

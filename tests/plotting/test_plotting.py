@@ -580,14 +580,7 @@ def test_contour_draws_the_contacts_that_are_ok_and_in_range(contacts, band, pla
     np.testing.assert_array_equal(np.sort(drawn), np.sort(expected))
     assert expected.size > 5
     assert [text.get_text() for text in ax.texts] == ["gap"]
-    assert set(labels(ax)) == {
-        "95 % band",
-        "median",
-        "true contour",
-        "tip contact",
-        "tangential contact",
-        "pivot",
-    }
+    assert set(labels(ax)) == {"95 % band", "median", "true contour", "tip contact", "tangential contact", "pivot"}
     assert ax.get_aspect() == 1.0
     low, high = ax.get_xlim()
     assert low == pytest.approx(-0.024)

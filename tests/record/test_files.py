@@ -146,10 +146,7 @@ def test_remarks_of_very_different_length_are_kept_as_objects(tmp_path, monkeypa
             "line 1, attribute 'load_cell_bias_fx' is '0,0125', but a load cell has no entry",
         ),
         ("load_cell_serial: 4711", "needs a name that does not begin with 'load_cell_'"),
-        (
-            "load_cell_force_noise: -1",
-            "line 1, attribute 'load_cell_force_noise' is -1.0",
-        ),
+        ("load_cell_force_noise: -1", "line 1, attribute 'load_cell_force_noise' is -1.0"),
     ],
 )
 def test_a_load_cell_has_no_entries_but_its_own(tmp_path, line, message):
@@ -310,10 +307,7 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         ([HEADER, ROW, ROW.replace("1.25", "1.0")], "from 1.25 rad (line 2) to 1.0 rad (line 3)"),
         ([HEADER, "0,forward,1,25,0,5,0,125"], "line 2: there are 8 cells in 6 columns"),
         ([HEADER.replace(",", ";"), ROW], "line 2: there are 1 cells in 6 columns"),
-        (
-            [HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"],
-            "'0,5' is not a number",
-        ),
+        ([HEADER.replace(",", ";"), "0;forward;1.25;0,5;0;0"], "'0,5' is not a number"),
         (
             [HEADER.replace(",", " "), ROW.replace(",", " ")],
             "there is no column 'sweep' (columns: sweep direction drive_angle",
@@ -323,14 +317,8 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
             "line 2, column 'holding_moment': '1.000,5' is not a",
         ),
         (["," + HEADER, "0," + ROW], "line 1: column 1 has no name: name it, or remove it (in line 2 it has '0')"),
-        (
-            ["Rig 4", HEADER, ROW],
-            "line 1: this line was taken for the column names (Rig 4), but they are in line 2",
-        ),
-        (
-            ["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")],
-            "(Rig 4), but they are in line 3",
-        ),
+        (["Rig 4", HEADER, ROW], "line 1: this line was taken for the column names (Rig 4), but they are in line 2"),
+        (["Rig 4", "Operator;Max", HEADER.replace(",", ";"), ROW.replace(",", ";")], "(Rig 4), but they are in line 3"),
         (
             ["# note", "Rig 4,,,,,", HEADER, ROW],
             "line 2: this line was taken for the column names (Rig 4), but they are",
@@ -364,10 +352,7 @@ def test_a_channel_that_a_file_lacks_can_be_declared_missing(tmp_path, suffix):
         ),
         (["# units: SI"], "there is no line of column names"),
         ([HEADER], "there are no samples"),
-        (
-            [HEADER, ROW.replace("1.25", '"1,25"')],
-            "line 2, column 'drive_angle': '1,25' is not a number",
-        ),
+        ([HEADER, ROW.replace("1.25", '"1,25"')], "line 2, column 'drive_angle': '1,25' is not a number"),
         (
             [HEADER + ",a/b,a|b", ROW + ",1,2"],
             "the name 'a/b' cannot be stored in every file, and as 'a|b' there is another",

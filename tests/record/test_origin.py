@@ -246,11 +246,7 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
         ({}, {"force_y": "Fyy"}, "did you mean 'Fy'?"),
         ({}, {"base_y": "height"}, "(or one value for all samples, like 12[mm])"),
         ({}, {"direction": "up"}, "(or one value for all samples, like forward)"),
-        (
-            {"force_y": np.zeros(6)},
-            {},
-            "line 1, column 'force_y' is in the file, but 'Fy[mN]+12.5' is given for it",
-        ),
+        ({"force_y": np.zeros(6)}, {}, "line 1, column 'force_y' is in the file, but 'Fy[mN]+12.5' is given for it"),
         (
             {},
             {"force_y": "Fy[mm]"},
@@ -262,11 +258,7 @@ def test_axes_may_be_exchanged_and_a_column_used_twice(tmp_path):
             "line 1, column 'holding_moment' ('Moment' in the file) is in [N], but takes N m, N mm, mN m, µN m or mN",
         ),
         ({}, {"base_y": "12[deg]"}, "column 'base_y' is in [deg], but takes m, cm, mm or µm"),
-        (
-            {},
-            {"force_x": "Fx (mN)[N]"},
-            "column 'Fx (mN)' has its unit in its name, but [N] is given for it",
-        ),
+        ({}, {"force_x": "Fx (mN)[N]"}, "column 'Fx (mN)' has its unit in its name, but [N] is given for it"),
         ({"Fy": ["1", "2", "x", "4", "5", "6"]}, {}, "line 4, column 'Fy': 'x' is not a number"),
         (
             {"Fy": ["1", "2", "", "4", "5", "6"]},

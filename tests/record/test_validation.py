@@ -39,10 +39,7 @@ def test_coordinates_stay_coordinates():
             "there is no column 'force_x', but a column 'force_z': did you mean 'force_x'? Rename it, or declare the "
             "channel missing, with an empty column or missing=('force_x',)",
         ),
-        (
-            columns(force_x=None),
-            "add it, or declare the channel missing, with an empty column or missing=('force_x',)",
-        ),
+        (columns(force_x=None), "add it, or declare the channel missing, with an empty column or missing=('force_x',)"),
         (
             columns(base_x=None, Base_X=np.zeros(6)),
             "there is no column 'base_x', but a column 'Base_X': did you mean 'base_x'? Rename it, or add a column "
@@ -50,10 +47,7 @@ def test_coordinates_stay_coordinates():
         ),
         (edited("force_x", 4, "0,3"), "sample 4, column 'force_x': '0,3' is not a number"),
         (edited("force_x", 4, "1_0"), "sample 4, column 'force_x': '1_0' is not a number"),
-        (
-            edited("force_x", 4, np.nan),
-            "sample 4, column 'force_x': the value is missing (nan)",
-        ),
+        (edited("force_x", 4, np.nan), "sample 4, column 'force_x': the value is missing (nan)"),
         (edited("holding_moment", 1, -np.inf), "sample 1, column 'holding_moment': the value is -inf"),
         (edited("drive_angle", 2, np.nan), "sample 2, column 'drive_angle': the value is missing (nan)"),
         (edited("drive_angle", 2, "up"), "sample 2, column 'drive_angle': 'up' is not a number"),
@@ -80,10 +74,7 @@ def test_coordinates_stay_coordinates():
             columns(base_x=[0.0, 0.0, 0.5, 1.0, 1.0, 1.0]),
             "sweep 0 mixes two values of 'base_x', 0.0 (sample 0) and 0.5 (sample 2)",
         ),
-        (
-            {name: [] for name in columns()},
-            "there are no samples",
-        ),
+        ({name: [] for name in columns()}, "there are no samples"),
         (
             columns(holding_moment=[np.nan] * 6, force_x=[np.nan] * 6, force_y=[np.nan] * 6),
             "every load channel is empty: a record needs measurements of at least one of holding_moment, force_x",

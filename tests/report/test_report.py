@@ -106,13 +106,7 @@ def test_the_page_is_well_formed_and_its_headings_are_in_order(page, text):
     assert levels[0] == 1
     assert levels.count(1) == 1
     assert all(after <= before + 1 for before, after in pairwise(levels))
-    assert page.texts["h2"] == [
-        "Results",
-        "Can the results be trusted?",
-        "Readings",
-        "Details",
-        "Reproducing the run",
-    ]
+    assert page.texts["h2"] == ["Results", "Can the results be trusted?", "Readings", "Details", "Reproducing the run"]
 
 
 def test_every_reference_within_the_page_has_its_target(page):

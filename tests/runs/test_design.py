@@ -33,8 +33,7 @@ GRID = [(-0.1, 0.0), (0.0, 0.0), (0.1, 0.0), (-0.1, 0.02), (0.0, 0.02), (0.1, 0.
 
 
 @pytest.mark.parametrize(
-    ("best", "outermost"),
-    [(1, None), (0, "leftmost"), (5, "rightmost and highest"), (6, "lowest")],
+    ("best", "outermost"), [(1, None), (0, "leftmost"), (5, "rightmost and highest"), (6, "lowest")]
 )
 def test_the_outermost_candidate_is_said_to_be_so(best, outermost):
     widths = np.full(len(GRID), 2e-3)

@@ -441,11 +441,7 @@ def test_random_scans():
     for k in range(18):
         a, q, x_c = np.exp(rng.uniform(np.log(0.1), np.log(5))), rng.uniform(-0.3, 0.95), rng.uniform(-0.7, 0.7)
         base = tuple(rng.uniform(-0.2, 0.2, 2))
-        contour = (
-            Parabola(a, q, x_c),
-            Circle(a, q, x_c),
-            Joined(Parabola(a, q, x_c), PowerLaw(a, 4, q, x_c)),
-        )[k % 3]
+        contour = (Parabola(a, q, x_c), Circle(a, q, x_c), Joined(Parabola(a, q, x_c), PowerLaw(a, 4, q, x_c)))[k % 3]
         try:
             result = scan(contour, base=base, drive_step=np.radians(5.0))
         except ContourError:

@@ -135,10 +135,7 @@ def test_a_rod_that_would_be_stopped_again_is_said_so():
 
 def test_a_grid_after_a_snap_off_that_is_not_clear_is_refused():
     contour = PowerLaw(0.06, 1.2, 0.5, 0.8)
-    with (
-        pytest.warns(ClearanceWarning),
-        refused(ParameterError, "drive_angles", "1.29428 rad"),
-    ):
+    with pytest.warns(ClearanceWarning), refused(ParameterError, "drive_angles", "1.29428 rad"):
         scan(contour, direction="forward", drive_angles=[2.0, 3.0])
     with pytest.warns(ClearanceWarning):
         record = scan(contour, direction="forward", drive_angles=[1.0, 2.0, 3.0]).record
