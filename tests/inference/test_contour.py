@@ -314,9 +314,6 @@ def test_priors_of_which_little_is_within_reach(monkeypatch):
 @pytest.mark.parametrize(
     ("given", "kind", "named"),
     [
-        ({"priors": {"b": stats.norm()}}, ParameterError, ["prior of b", "a, q, x_c, noise_scale"]),
-        ({"priors": {"a": 0.5}}, ParameterError, ["prior of a", 0.5]),
-        ({"family": "spline"}, ParameterError, ["'spline'"]),
         ({"priors": {"q": stats.uniform(2.0, 1.0)}}, ReachError, ["base", "rod length"]),
         ({"load_cell": LoadCell(moment_noise=0.02)}, ParameterError, ["force_x", "noise"]),
     ],
@@ -383,24 +380,6 @@ def test_samples_without_load_tell_where_contact_begins_and_ends():
         draws = result["posterior"][name]
         assert abs(draws.mean() - value) < 4.5 * draws.std(), name
         assert draws.std() > 0.8 * whole[name].std()
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"settings": {"min_ess": 3}},
-        {"load_cell": 0.05},
-        {"events": "no"},
-        {"checkpoint": 3},
-        {"checkpoint": ""},
-        {"friction": -0.1},
-        {"seed": -1},
-    ],
-    ids=str,
-)
-def test_what_is_of_another_kind_is_refused(given):
-    with refused(ParameterError, **given):
-        infer_contour(measured(), **{"seed": 1, **given})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from scipy import stats
 from helpers.load_cells import CELL, GAIN, NORMAL, SHARED, UNKNOWN, WALK, cell, ideal
 from helpers.refusals import refused
 from tactile_bayes import scan
-from tactile_bayes.checks import shown
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.load_cell import LoadCell
@@ -130,17 +129,6 @@ def test_noise_is_normal():
     measured = CELL.measure(ideal(5000), seed=21)
     noise = [(measured[name] - measured[f"truth_{name}"]).values / CELL.standard_deviations[name] for name in CHANNELS]
     assert stats.kstest(np.concatenate(noise), "norm").pvalue > 1e-6
-
-
-@pytest.mark.parametrize("seed", [None, -1, 1.5, "1"])
-def test_a_seed_that_is_none_is_refused(seed):
-    with refused(ParameterError, "seed", shown(seed)):
-        CELL.measure(ideal(), seed=seed)
-
-
-def test_what_is_no_record_is_refused():
-    with refused(RecordError, "'drive_angle'"):
-        CELL.measure(ideal().drop_vars("drive_angle"), seed=1)
 
 
 @pytest.mark.parametrize("further", [{"bias": (0.1, 0.0, 0.0)}, {"degrees_of_freedom": 3.0}, {"drift": WALK}])

@@ -9,7 +9,7 @@ from scipy import stats
 
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, paper_profile
-from tactile_bayes.errors import DriftWarning, ParameterError, RecordError
+from tactile_bayes.errors import DriftWarning, RecordError
 from tactile_bayes.load_cell import LoadCell, zero_load
 from tactile_bayes.load_cell.contact_bounds import contact_bounds
 from tactile_bayes.mechanics.rod import Rod
@@ -375,14 +375,3 @@ def test_samples_of_sweeps_may_be_mixed():
     found, mixed = zero_load(measured), zero_load(measured.isel(sample=order))
     np.testing.assert_array_equal(mixed.unloaded, found.unloaded.values[order])
     np.testing.assert_array_equal(order[mixed.snap_off], found.snap_off)
-
-
-@pytest.mark.parametrize("false_alarm", [0.0, -1.0, 0.5, np.nan])
-def test_an_impossible_false_alarm_rate_is_refused(false_alarm):
-    with refused(ParameterError, false_alarm=false_alarm):
-        zero_load(record_of(np.zeros((20, 3))), false_alarm=false_alarm)
-
-
-def test_a_table_that_is_no_record_is_refused():
-    with pytest.raises(RecordError):
-        zero_load(xr.Dataset())

@@ -256,22 +256,6 @@ def test_a_missing_channel_is_refused(swept, name):
         reconstruct(record)
 
 
-def test_an_unknown_method_is_refused(swept):
-    with refused(ParameterError, method="exact"):
-        reconstruct(swept, method="exact")
-
-
-def test_what_is_no_record_is_refused(swept):
-    with refused(RecordError, "'force_y'"):
-        reconstruct(swept.drop_vars("force_y"))
-
-
-@pytest.mark.parametrize("friction", [1.0, -0.1, float("nan")])
-def test_impossible_friction_is_refused(swept, friction):
-    with refused(ParameterError, friction=friction):
-        reconstruct(swept, friction=friction)
-
-
 # --- Another rod --------------------------------------------------------------------------------------------------
 
 

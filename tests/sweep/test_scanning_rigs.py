@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 
 from helpers.refusals import refused
 from tactile_bayes import Rod, reconstruct, scan
-from tactile_bayes.checks import shown
 from tactile_bayes.contours import (
     Circle,
     Ellipse,
@@ -61,12 +60,6 @@ def test_more_bases_close_the_gap_of_one(name, q):
     one, three = widest_hole((0.0, 0.0)), widest_hole([(-0.25, 0.0), (0.0, 0.0), (0.25, 0.0)])
     assert one > 0.04
     assert three < 0.5 * one
-
-
-@pytest.mark.parametrize("base", ["here", (0.0,), [], [(0.0, np.nan)], (0.0, 0.0, 0.0), [(0, 0), (1,)]])
-def test_a_base_that_is_none_is_refused(base):
-    with refused(ParameterError, base=base):
-        scan(Parabola(0.5, 0.5), base=base)
 
 
 HALF = np.linspace(0.1, 0.9, 30)
@@ -210,28 +203,6 @@ def test_rods_are_equal_and_print_alike_if_they_bear_the_same():
     )
     assert repr(Rod(0.2)) == "Rod(length=0.2, flexural_rigidity=1.0, diameter=0.0)"
     assert eval(repr(WIRE)) == WIRE
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"elastic_strain": -0.1},
-        {"elastic_strain": np.inf},
-        {"elastic_strain": True},
-        {"length": "0.1"},
-        {"length": True},
-        {"flexural_rigidity": None},
-        {"diameter": "thin"},
-        {"diameter": False},
-        {"youngs_modulus": "steel"},
-    ],
-    ids=str,
-)
-def test_what_is_no_rod_is_refused(wrong):
-    ((name, value),) = wrong.items()
-    build, right = (Rod, {}) if name != "youngs_modulus" else (Rod.circular, {"length": 0.1, "diameter": 1e-3})
-    with refused(ParameterError, name.replace("elastic_strain", "elastic strain"), shown(value)):
-        build(**right, **wrong)
 
 
 @pytest.mark.slow

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from helpers.contour_posteriors import posterior, tree
-from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.inference.contour import contours_of
 from tactile_bayes.uncertainty import band as band_module
 from tactile_bayes.uncertainty.band import contour_band, contour_heights, contours_drawn
@@ -105,18 +103,6 @@ def test_many_draws_are_thinned_evenly():
     heights = contour_heights(made(), X, most=100)
     assert heights.shape == (100, X.size)
     np.testing.assert_array_equal(heights[[0, -1]], contour_heights(made(), X)[[0, -1]])
-
-
-@pytest.mark.parametrize("probability", [0.0, 1.0, -0.1, np.nan])
-def test_impossible_probabilities_are_refused(probability):
-    with refused(ParameterError, probability=probability):
-        contour_band(made(10), X, probability)
-
-
-@pytest.mark.parametrize("x", [[[0.0, 1.0]], [0.0, np.nan]])
-def test_impossible_places_are_refused(x):
-    with refused(ParameterError, "x"):
-        contour_band(made(10), x)
 
 
 def test_only_contours_that_are_picked_are_built(monkeypatch):

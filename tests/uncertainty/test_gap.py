@@ -9,7 +9,7 @@ import xarray as xr
 from helpers.contour_posteriors import TRUTH, posterior
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola
-from tactile_bayes.errors import InferenceError, ParameterError
+from tactile_bayes.errors import InferenceError
 from tactile_bayes.sweep import scan
 from tactile_bayes.uncertainty.band import contour_band
 from tactile_bayes.uncertainty.gap import gap
@@ -184,11 +184,6 @@ def test_one_direction_leaves_no_gap(there):
     missing = {"forward": "backward", "backward": "forward"}[there]
     with refused(InferenceError, missing):
         gap(tree([[[0.1]]], [there]))
-
-
-def test_an_impossible_probability_is_refused():
-    with refused(ParameterError, probability=95.0):
-        gap(tree([[[-0.1, 0.1]]]), 95.0)
 
 
 def with_events(made, **there):

@@ -3,8 +3,6 @@
 import numpy as np
 
 from helpers.contour_posteriors import posterior
-from helpers.refusals import refused
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 
@@ -22,8 +20,3 @@ def test_quantiles_of_the_draws_and_coverage_of_the_record():
         outside = (observed < interval[f"{name}_lower"]) | (observed > interval[f"{name}_upper"])
         error = np.sqrt(0.05 * 0.95 / outside.size)
         assert abs(float(outside.mean()) - 0.05) < 4 * error
-
-
-def test_an_impossible_probability_is_refused():
-    with refused(ParameterError, probability=1.0):
-        predictive_interval(posterior(), 1.0)

@@ -276,28 +276,10 @@ def test_what_samples_share_is_called_an_approximation():
 # --- What is refused --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("draws", [0, -4, 2, 10, 4.0, True, "4"])
-def test_draws_are_a_multiple_of_four(draws):
-    with refused(ParameterError, draws=draws):
-        infer(draws=draws)
-
-
 def test_few_draws_will_do():
     tree = infer(which=[21, 61], draws=4)
     assert tree["posterior"].sizes["draw"] == 1
     assert tree.attrs["message"] == "2 contacts, 2 by importance sampling, 0 by emcee"
-
-
-def test_unknown_options_are_refused():
-    with refused(ParameterError, method="nuts"):
-        infer(method="nuts")
-    with refused(ParameterError, prior="round"):
-        infer(prior="round")
-    with refused(ParameterError, seed=-1):
-        infer(seed=-1)
-    for friction in (-0.3, 2.0, np.nan):
-        with refused(ParameterError, "friction angle"):
-            infer(friction=friction)
 
 
 def without(*names):

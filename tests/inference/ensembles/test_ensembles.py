@@ -328,27 +328,6 @@ def test_names_have_to_differ():
         sample(standard, normal_start(2, SMALL), names=["a", "a"], seed=1, settings=SMALL)
 
 
-@pytest.mark.parametrize(
-    ("setting", "value", "limit"),
-    [
-        ("ensembles", 1, 2),
-        ("ensembles", 2.0, 2),
-        ("walkers", 7, "even"),
-        ("walkers", 2, 4),
-        ("block_steps", 0, 1),
-        ("max_steps", 0, 1),
-        ("max_r_hat", 1.0, 1.01),
-        ("max_r_hat", np.nan, 1.01),
-        ("min_ess", 0.0, "positive"),
-        ("min_ess", np.inf, "positive"),
-        ("max_seconds", 0.0, "positive"),
-    ],
-)
-def test_bad_settings_are_refused(setting, value, limit):
-    with refused(ParameterError, limit, **{setting: value}):
-        SamplerSettings(**{setting: value})
-
-
 def test_walkers_of_a_target():
     assert SamplerSettings().walkers_for(2) == 48
     assert SamplerSettings().walkers_for(15) == 90
