@@ -1,7 +1,5 @@
 """What several files of tests share: an analysed record, and a quick stand-in for the slow parts of a run."""
 
-from __future__ import annotations
-
 import functools
 import signal
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What a stranger may get wrong, from the file or the contour to the message."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

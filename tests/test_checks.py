@@ -1,7 +1,5 @@
 """Wrong arguments of the names that are used first: each is refused, in words, before anything is computed."""
 
-from __future__ import annotations
-
 import functools
 import math
 import pathlib

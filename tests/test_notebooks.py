@@ -1,7 +1,5 @@
 """Notebooks as they are kept: numbered, without outputs, each cell with a name."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is installed elsewhere: wheel, source distribution, and what the package does without."""
 
-from __future__ import annotations
-
 import email
 import subprocess
 import sys

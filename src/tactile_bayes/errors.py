@@ -1,7 +1,5 @@
 """Errors and warnings; each message says what is wrong, where, and what to do."""
 
-from __future__ import annotations
-
 __all__ = [
     "CalibrationError",
     "ClearanceWarning",

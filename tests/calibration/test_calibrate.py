@@ -1,7 +1,5 @@
 """Calibration from end to end: what it refuses, what it keeps, and that it finds what is wrong."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import json

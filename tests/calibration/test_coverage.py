@@ -1,7 +1,5 @@
 """Coverage: p values and what they notice, against sums of the binomial distribution and simulation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

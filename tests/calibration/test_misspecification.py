@@ -1,7 +1,5 @@
 """Misspecification: refused entries, and its effect on contour and rig."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

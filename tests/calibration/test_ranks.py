@@ -1,7 +1,5 @@
 """Ranks among draws: how unusual they are, against simulation and another implementation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

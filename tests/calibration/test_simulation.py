@@ -1,7 +1,5 @@
 """Simulated records against scans of the same truths, without noise to speak of."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The results store of a calibration: what is written is read, and nothing else is."""
 
-from __future__ import annotations
-
 import json
 import math
 

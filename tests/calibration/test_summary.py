@@ -1,7 +1,5 @@
 """What replicates say together, of replicates made up: right ones, wrong ones, few and failed ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """The verdict: each conclusion where it belongs, and sentences that say one thing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

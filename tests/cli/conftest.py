@@ -1,7 +1,5 @@
 """What several tests of the command line share: the file of a record."""
 
-from __future__ import annotations
-
 import pytest
 
 from tactile_bayes.record import write_record

@@ -1,7 +1,5 @@
 """The command line, inside this process and as a stranger would start it."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

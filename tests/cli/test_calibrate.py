@@ -1,7 +1,5 @@
 """The command `calibrate`, as a user calls it."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import signal

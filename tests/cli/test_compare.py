@@ -1,7 +1,5 @@
 """The command `compare`: what it prints, writes and refuses."""
 
-from __future__ import annotations
-
 import sys
 
 import pandas as pd

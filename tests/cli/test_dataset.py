@@ -1,7 +1,5 @@
 """The commands `dataset ...`, inside this process and as a stranger would start them."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal

@@ -1,7 +1,5 @@
 """The command design, and the figure."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The command figures."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 

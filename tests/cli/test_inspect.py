@@ -1,7 +1,5 @@
 """The commands `inspect` and `reconstruct`, and a laboratory's path from its own file to a contour."""
 
-from __future__ import annotations
-
 import json
 import math
 import shlex

@@ -1,7 +1,5 @@
 """The commands `scan` and `measure`: ideal records, and what a load cell makes of them."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """The command `sensitivity`, as a user calls it."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 

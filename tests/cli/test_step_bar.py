@@ -1,7 +1,5 @@
 """The bar of steps, as a terminal gets it."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

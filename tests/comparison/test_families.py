@@ -1,7 +1,5 @@
 """Families compared: which shape it was, and that none of them is said where none is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

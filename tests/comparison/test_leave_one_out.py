@@ -3,8 +3,6 @@
 A check of estimates against five standard errors alarms falsely once in a million estimates; there are some 500.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import arviz_stats

@@ -1,7 +1,5 @@
 """Samples of a record predicted from the others: by inferring again next to events, else by importance sampling."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.special import logsumexp

@@ -1,7 +1,5 @@
 """Contours: properties of every family drawn, the paper's formulas, ends and edges, and refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings

@@ -1,7 +1,5 @@
 """Families of contours: their priors and their fits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Contours from functions: narrow features, jumps and kinks, and whether the advice of a refusal works."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contours from measured points: accuracy, strict convexity, refusals with their stretch, false alarms and power."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Smooth contours of any shape: against quadrature, against families, and as compiled code sees them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

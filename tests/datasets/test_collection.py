@@ -1,7 +1,5 @@
 """Data sets opened without reading them."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 

@@ -1,7 +1,5 @@
 """The numbers of data sets: truth against scans, readings against the load cell, draws against their distributions."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """Data sets in the making: the same whoever makes them, and whatever befalls those who do."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """One record of a data set, read and made again."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Specifications: what they may say, and how refusals name what is wrong."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every kind of damage to a data set is found, and the file named."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """The check of a record against predictions whose law is known, and against posteriors of right and wrong families."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

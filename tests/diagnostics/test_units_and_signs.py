@@ -1,7 +1,5 @@
 """Wrong units and signs, told from the record alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

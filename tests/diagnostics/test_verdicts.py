@@ -1,7 +1,5 @@
 """Verdicts: the cause comes first, and what is right is said to be."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Calls of the command line, and what a refusal looks like."""
 
-from __future__ import annotations
-
 import re
 
 from typer.testing import CliRunner

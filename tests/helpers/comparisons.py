@@ -1,7 +1,5 @@
 """Comparisons of families as `compare_families` returns them, made up."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Specifications of small data sets."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 

@@ -1,7 +1,5 @@
 """Designs as `tactile_bayes.design` returns them, made up."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Control-C at a moment that is known."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

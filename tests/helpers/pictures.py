@@ -1,7 +1,5 @@
 """Pictures of figures without letters, which look alike in every version of matplotlib, and their comparison."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tables that are records, and tables that are nearly so."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tactile_bayes.mechanics.rod import Rod

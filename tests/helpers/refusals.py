@@ -1,7 +1,5 @@
 """What a refusal is to say: the kind of error, and in its message the names, values and places that matter."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

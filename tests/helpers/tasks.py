@@ -1,7 +1,5 @@
 """Tasks for `run_tasks` to send to other processes: module-level functions, of plain arguments."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """Runs that are stopped and go on."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The evidence of contour families against the mean likelihood over draws from their priors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

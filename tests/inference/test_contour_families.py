@@ -1,7 +1,5 @@
 """Posteriors of families beyond parabola and circle: near the truth, and of contours that the rod is clear of."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

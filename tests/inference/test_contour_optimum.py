@@ -1,7 +1,5 @@
 """Where searches lead, of records that say little."""
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Encoders that are not exact: the likelihood against a fine integral over their errors, and posteriors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Experiments: what is refused when one is made, what its model is made from, and what travels to another process."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import fields, replace
 

@@ -1,7 +1,5 @@
 """Coordinates of a flank: a bijection of the contour's parameters, and its Jacobian determinant."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A rig that was found: Step 2 of a record with known faults, told by a posterior, gives the true contacts."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The likelihood of a whole record, against normal densities summed over exact states."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

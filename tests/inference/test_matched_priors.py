@@ -1,7 +1,5 @@
 """Priors of families that expect the same of a flank."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

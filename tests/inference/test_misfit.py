@@ -1,7 +1,5 @@
 """Misfit: both family and rig are named, and nothing is suggested that was done already."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

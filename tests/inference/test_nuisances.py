@@ -1,7 +1,5 @@
 """What is not as stated about a rig: its loads against scans, what it costs in precision, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """A clamped rod under a point load: closed form against integration, recovery of a made-up rig, and a real whisker."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Densities in closed form against those of SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

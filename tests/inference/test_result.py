@@ -1,7 +1,5 @@
 """What a posterior carries, its file, and its form for ArviZ."""
 
-from __future__ import annotations
-
 import json
 import sys
 import types

@@ -1,7 +1,5 @@
 """Where walkers start: optimum and cloud, for problems whose answer is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,7 +1,5 @@
 """The load cell and records: what it makes of them, what it keeps, and what of it can be taken out again."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,7 +1,5 @@
 """What a load cell does to loads: moments and distributions of every flaw, alone and with others."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,7 +1,5 @@
 """The data sheet of a load cell: what it refuses, its units, and its way through records and files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings

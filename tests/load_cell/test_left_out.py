@@ -1,7 +1,5 @@
 """How likely each sample is given all the others: against dense covariances with and without it."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest

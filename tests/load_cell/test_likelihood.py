@@ -1,7 +1,5 @@
 """How likely readings are where they are normal: against the dense covariance of all of them, written out."""
 
-from __future__ import annotations
-
 import hypothesis.strategies as st
 import numpy as np
 import pytest

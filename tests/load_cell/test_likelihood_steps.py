@@ -1,7 +1,5 @@
 """How likely readings are that jump: outliers, steps of a converter, the ends of a range, against integration."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

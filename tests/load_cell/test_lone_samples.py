@@ -1,7 +1,5 @@
 """Samples looked at by themselves: against the dense covariance, of which a sample keeps its own block."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,7 +1,5 @@
 """The surprise of readings without load: as rare as it says, for every kind of load cell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

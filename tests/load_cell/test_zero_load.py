@@ -1,7 +1,5 @@
 """The zero load of a record: contact without labels, bias, and noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """The shape of the rod: closed form against integration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

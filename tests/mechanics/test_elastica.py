@@ -1,7 +1,5 @@
 """The exact rod against integration, shooting, a hundred-digit judge, and itself."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

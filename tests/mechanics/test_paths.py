@@ -1,7 +1,5 @@
 """The equilibrium path of many contours at once: events, interpolation, and a search for trouble."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

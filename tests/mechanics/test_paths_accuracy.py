@@ -12,8 +12,6 @@ flat one. A drive angle and a snap-off angle that are doubles cannot say more th
 with 8 units for what evaluating the rod's formulas at the fold rounds (3e-15 rad at most in thousands of draws).
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

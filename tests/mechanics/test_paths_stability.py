@@ -5,8 +5,6 @@ With 24 terms of its basis or 60 they are the same to 1e-8; states are exact to 
 by the state are some hundreds: 1e-7 bounds what is not true of them (`EIGENVALUE`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

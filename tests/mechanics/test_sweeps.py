@@ -1,7 +1,5 @@
 """Paths as well as noise asks against exact ones, and contours by tables against contours by formulas."""
 
-from __future__ import annotations
-
 import gc
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Blocks of points that memory can hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Chebyshev interpolation on [0, 1]: exact for polynomials, geometric for analytic functions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial

@@ -1,7 +1,5 @@
 """Slopes by central differences: exact for polynomials of the second degree, zero at a jump."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Newton kept in its bracket, against scipy's brentq."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

@@ -1,7 +1,5 @@
 """Errors of contact points to first order: against differences of `reconstruct`, and against noise that is drawn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

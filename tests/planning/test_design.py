@@ -1,7 +1,5 @@
 """Designs: what is expected of the next record, by two routes, and which is the best."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Maps of errors: the same whoever makes them, resumed where they were left, and first order where noise is small."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 

@@ -1,7 +1,5 @@
 """What a record tells: against the curvature of the likelihood, dense algebra, exact scaling, and a posterior."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Whose noise it is: functions with known indices, first order at small noise, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

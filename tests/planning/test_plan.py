@@ -1,7 +1,5 @@
 """A plan, the family of its contour, and the covariance of errors over a whole record."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

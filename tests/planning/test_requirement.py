@@ -1,7 +1,5 @@
 """How good a load cell must be, and which rod: round trips, proportions, and what cannot be had."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Everything in one answer: its groups are those of the single analyses, its words are true and in the right unit."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The figures of a calibration: what they draw, and what they say."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 import pytest

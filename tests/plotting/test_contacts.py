@@ -1,7 +1,5 @@
 """Figures of single contacts: ellipses and regions."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 import pytest

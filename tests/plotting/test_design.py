@@ -1,7 +1,5 @@
 """The figure of a design: a map of places where they form a grid, lines otherwise."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 import pytest

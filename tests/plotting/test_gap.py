@@ -1,7 +1,5 @@
 """The figure of the gap: what it draws, and what it says."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Figures: what they take, return, draw and leave alone."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The two looks, and pictures of the main figures."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

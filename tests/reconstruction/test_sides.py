@@ -1,7 +1,5 @@
 """Sides of contact: as directions say, unless the moment contradicts them, whatever the zeros."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

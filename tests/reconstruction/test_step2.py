@@ -1,7 +1,5 @@
 """Step 2, sample by sample: what comes back without noise, and what becomes of samples that are no contacts."""
 
-from __future__ import annotations
-
 import hypothesis.strategies as st
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Records made of columns."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

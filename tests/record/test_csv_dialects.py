@@ -1,7 +1,5 @@
 """CSV files as rigs write them: rows of units, Windows-1252, decimal commas below any names."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rows of a CSV file: the fast reader is the careful one, only faster; memory."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

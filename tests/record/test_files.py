@@ -1,7 +1,5 @@
 """The files of a record: CSV and NetCDF."""
 
-from __future__ import annotations
-
 import os
 
 import hypothesis.strategies as st

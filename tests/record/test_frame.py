@@ -1,7 +1,5 @@
 """The frame of the load cell: fixed in the world, or turning with the drive."""
 
-from __future__ import annotations
-
 import hypothesis.strategies as st
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The hash of a record."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """Mutated CSV files: each is refused in words of our own, or is read and can be written again."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from pathlib import Path

@@ -1,7 +1,5 @@
 """NetCDF files with checksums: what is damaged is refused, or read as it was."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

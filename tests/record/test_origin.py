@@ -1,7 +1,5 @@
 """Columns of a rig: names, units, signs and zeros of its own."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

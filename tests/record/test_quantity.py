@@ -1,7 +1,5 @@
 """The units that people measure in."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """The schema of a record."""
 
-from __future__ import annotations
-
 import pytest
 
 from tactile_bayes.mechanics.rod import Rod

@@ -1,7 +1,5 @@
 """Sweeps and directions, found where the drive turns."""
 
-from __future__ import annotations
-
 import hypothesis.strategies as st
 import numpy as np
 import pytest

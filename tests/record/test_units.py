@@ -1,7 +1,5 @@
 """Records with and without dimension."""
 
-from __future__ import annotations
-
 import hypothesis.strategies as st
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """What is refused as a record, and why."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """The report in a browser: its script runs, nothing escapes, and it fits a narrow and a dark screen."""
 
-from __future__ import annotations
-
 import re
 import shutil
 

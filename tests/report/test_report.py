@@ -1,7 +1,5 @@
 """The report of a run: what it says, that its numbers are the posterior's, and that no text of a record escapes."""
 
-from __future__ import annotations
-
 import ast
 import base64
 import contextlib

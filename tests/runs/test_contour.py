@@ -1,7 +1,5 @@
 """A run: every file it names, whatever the record holds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,7 +1,5 @@
 """The demonstration's record: what a stranger's own would look like."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The words of a design."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

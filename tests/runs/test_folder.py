@@ -1,7 +1,5 @@
 """The folder of a run: files are written whole, and listed by what they hold."""
 
-from __future__ import annotations
-
 import pytest
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Scans and equilibria as a user asks for them: against shooting, bisection, a hundred-digit judge, and themselves."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Many contours in one call, against one scan for each."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rigs: several bases, ends of contours, what happens after snap-off, strain, and units."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files written whole."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Tasks in this process, in others, and what becomes of them when processes die."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """Bands of contours, against quantiles of heights."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The triangle that convexity leaves, against hand geometry and convex contours of any shape."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

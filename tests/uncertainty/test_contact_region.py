@@ -1,7 +1,5 @@
 """Regions of contacts: do they hold fresh points as often as they say, whatever their shape?"""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """The gap, against quantiles, hand geometry and exact events."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Bands across contours, against circles about one centre, heights, and geometry."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

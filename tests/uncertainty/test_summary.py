@@ -1,7 +1,5 @@
 """A posterior in numbers, and where the rod touched its contours."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from helpers.refusals import refused

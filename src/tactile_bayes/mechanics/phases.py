@@ -1,7 +1,5 @@
 """Contact phases: codes and names."""
 
-from __future__ import annotations
-
 __all__ = ["NONE", "PHASE_NAMES", "TANGENTIAL", "TIP"]
 
 NONE, TIP, TANGENTIAL = 0, 1, 2

@@ -1,7 +1,5 @@
 """The inspection of a record: nothing is said of a good one, and what is wrong is named."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

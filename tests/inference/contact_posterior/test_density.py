@@ -1,7 +1,5 @@
 """The density of single contacts and its prior, against sums over all contacts that know nothing of sheets."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,7 +1,5 @@
 """Posteriors of all contacts of a record: engines, layout, chances, and what is refused."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Other coordinates than the parameters: what is drawn is the same."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

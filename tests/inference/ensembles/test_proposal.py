@@ -1,7 +1,5 @@
 """The proposal against distributions whose moments are known exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,7 +1,5 @@
 """Steps of a run that are kept: which, whatever blocks they come in."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

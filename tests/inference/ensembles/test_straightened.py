@@ -1,7 +1,5 @@
 """Straightened coordinates against a ridge that is bent by a known parabola."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Contours of any shape: their prior, the coordinates that walkers walk in, and posteriors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
