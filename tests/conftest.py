@@ -1,6 +1,7 @@
 """What several files of tests share: an analysed record, and a quick stand-in for the slow parts of a run."""
 
 import functools
+import os
 import signal
 from dataclasses import replace
 
@@ -11,6 +12,8 @@ from hypothesis import settings
 from helpers.contour_posteriors import QUICK
 from tactile_bayes.runs.demonstration import CONTOUR, LOAD_CELL, ROD
 from tactile_bayes.sweep import scan
+
+os.environ["MPLBACKEND"] = "Agg"  # figures need no screen
 
 settings.register_profile("few", max_examples=15, derandomize=True)
 

@@ -3,14 +3,10 @@
 import json
 from functools import partial
 
-import matplotlib as mpl
 import pytest
 from PIL import Image
 
 from helpers import commands
-
-mpl.use("Agg")
-
 from tactile_bayes.paper_figures import caption
 
 QUICK = ["--only", "3", "--only", "7", "--distance", "0.5", "--drive-step", "5", "--rods", "3"]

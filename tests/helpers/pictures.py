@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import matplotlib as mpl
+from matplotlib.figure import Figure
 from matplotlib.testing.compare import compare_images
 
 BASELINE = Path(__file__).parents[1] / "baseline"
@@ -54,3 +55,21 @@ def differs(figure, name, folder):
     if not (BASELINE / made.name).exists():
         return f"there is no {BASELINE / made.name}"
     return compare_images(BASELINE / made.name, made, tol=TOLERANCE)
+
+
+def own_axes(*shape):
+    """Axes of a figure that pyplot does not know."""
+    return Figure().subplots(*shape)
+
+
+def labels(ax):
+    """What the legend says."""
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts]
+
+
+def row_labels(ax):
+    return [label.get_text() for label in ax.get_yticklabels()]

@@ -6,18 +6,13 @@ import io
 import itertools
 import re
 
-import matplotlib as mpl
 import numpy as np
 import pytest
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 
 from helpers.pictures import difference, differs
+from helpers.refusals import refused
 from tactile_bayes import paper_figures
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError

@@ -1,17 +1,13 @@
 """The figures of a calibration: what they draw, and what they say."""
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 
+from helpers.pictures import row_labels, texts
+from helpers.refusals import refused
 from tactile_bayes import plotting
 from tactile_bayes.calibration.ranks import simultaneous_band, uniformity_p_value
 from tactile_bayes.calibration.replicate import DRAWS
@@ -27,9 +23,6 @@ LOW = (DRAWS * np.linspace(0.0, 1.0, COUNT) ** 2).astype(int)
 
 
 LEVEL = 0.001
-
-
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 def calibration_of(p_values=None, **ranks):
@@ -51,10 +44,6 @@ def covering(shares, errors, counts, probability=0.9, claims=None):
         coords={"claim": list(CLAIMS)[: len(shares)] if claims is None else claims},
         attrs={"probability": probability},
     )
-
-
-def texts(ax):
-    return [text.get_text() for text in ax.texts]
 
 
 def curve(ax):
@@ -215,10 +204,6 @@ def test_without_any_posterior_there_is_nothing_to_draw():
 # --- Coverage -------------------------------------------------------------------------------------------------------
 
 
-def rows(ax):
-    return [label.get_text() for label in ax.get_yticklabels()]
-
-
 def dots(ax):
     return [float(line.get_xdata()[0]) for line in ax.lines if line.get_marker() == "o"]
 
@@ -231,7 +216,7 @@ def bars(ax):
 
 def test_claims_have_rows_in_their_order():
     ax = plotting.coverage(covering([0.88, 0.91, 0.85], [0.02, 0.01, 0.03], [200, 200, 150]))
-    assert rows(ax) == list(CLAIMS.values())[:3]
+    assert row_labels(ax) == list(CLAIMS.values())[:3]
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first claim is on top
     assert dots(ax) == [0.88, 0.91, 0.85]
     assert {"88.0 % of 200", "91.0 % of 200", "85.0 % of 150"} <= set(texts(ax))
@@ -258,7 +243,7 @@ def test_without_a_standard_error_there_is_a_dot_and_no_bar():
 
 def test_claims_of_too_few_replicates_are_named_below():
     ax = plotting.coverage(covering([0.9, 1.0, np.nan, 0.5], [0.02, np.nan, np.nan, 0.5], [200, 1, 0, 2]))
-    assert rows(ax) == ["band, in the gap", "band as a whole, beside it"]
+    assert row_labels(ax) == ["band, in the gap", "band as a whole, beside it"]
     note = ax.texts[-1]
     words = " ".join(note.get_text().split())
     assert words == "left out, with fewer than 2 replicates: band, beside it; band as a whole, in the gap"
@@ -275,7 +260,7 @@ def test_where_no_claim_is_left_the_axes_say_so():
 
 
 def test_a_claim_of_another_name_is_called_by_it():
-    assert rows(plotting.coverage(covering([0.9], [0.02], [20], claims=["friction"]))) == ["friction"]
+    assert row_labels(plotting.coverage(covering([0.9], [0.02], [20], claims=["friction"]))) == ["friction"]
 
 
 def test_coverage_is_drawn_into_axes_given():

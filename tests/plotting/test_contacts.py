@@ -1,18 +1,14 @@
 """Figures of single contacts: ellipses and regions."""
 
-import matplotlib as mpl
 import numpy as np
 import pytest
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib import colors
 from matplotlib import pyplot as plt
 from matplotlib.patches import Ellipse
 
 from helpers.contact_posteriors import CELL, SI_CELL, measured
+from helpers.pictures import labels, own_axes
+from helpers.refusals import refused
 from tactile_bayes import plotting
 from tactile_bayes.contours import paper_profile
 from tactile_bayes.errors import ParameterError
@@ -24,9 +20,6 @@ from tactile_bayes.uncertainty.contact_region import contact_region
 SOME = np.array([2, 22, 24, 30, 45, 61, 120])
 
 
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
-
-
 @pytest.fixture(scope="module")
 def posterior():
     return infer_contacts(measured().isel(sample=SOME), load_cell=CELL, seed=1, draws=400, method="importance")
@@ -35,15 +28,6 @@ def posterior():
 @pytest.fixture(scope="module")
 def contacts():
     return reconstruct(measured(), method="constrained", load_cell=CELL)
-
-
-def labels(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
-def own_axes():
-    """Axes of a figure that pyplot does not know."""
-    return mpl.figure.Figure().subplots()
 
 
 def outlines(ax):

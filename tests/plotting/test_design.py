@@ -3,27 +3,18 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
-
-mpl.use("Agg")
-
 from matplotlib.collections import QuadMesh
 
 from helpers.designs import made_up
-from helpers.pictures import difference
+from helpers.pictures import difference, labels
 from tactile_bayes.plotting import design
 
 XS, YS = (-0.3, -0.1, 0.1, 0.3), (-0.2, -0.1, 0.0)
-
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 def tiles(ax):
     (mesh,) = (part for part in ax.collections if isinstance(part, QuadMesh))
     return mesh
-
-
-def labels(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def test_a_grid_of_three_heights_is_a_map_of_the_criterion():

@@ -1,16 +1,12 @@
 """The figures of families compared, and of what a prior expects: what they draw, and what they say."""
 
-import matplotlib as mpl
 import numpy as np
 import pytest
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib import pyplot as plt
 
 from helpers.comparisons import made_up
+from helpers.pictures import row_labels
+from helpers.refusals import refused
 from tactile_bayes import plotting
 from tactile_bayes.comparison.verdict import NONE_FITS
 from tactile_bayes.contours import Parabola
@@ -22,9 +18,6 @@ from tactile_bayes.runs.demonstration import CONTOUR, ROD
 BRIEF = SamplerSettings(ensembles=2, max_steps=20)
 
 
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
-
-
 @pytest.fixture(scope="module")
 def posterior(measured):
     return infer_contour(measured, family="parabola", nuisances=[], seed=1, settings=BRIEF)
@@ -32,10 +25,6 @@ def posterior(measured):
 
 def title(ax):
     return " ".join(ax.get_title(loc="left").split())
-
-
-def row_labels(ax):
-    return [label.get_text() for label in ax.get_yticklabels()]
 
 
 def line(ax, label):

@@ -1,22 +1,15 @@
 """The figure of the gap: what it draws, and what it says."""
 
-import matplotlib as mpl
 import numpy as np
-import pytest
 import xarray as xr
-
-mpl.use("Agg")
-
 from matplotlib import pyplot as plt
 
+from helpers.pictures import labels
 from tactile_bayes.contours import Parabola
 from tactile_bayes.plotting import gap as draw
 from tactile_bayes.uncertainty.gap import gap
 
 TRUTH = Parabola(5.0, q=0.03)
-
-
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 def posterior(left, right, share=0.01):
@@ -39,22 +32,18 @@ def posterior(left, right, share=0.01):
     return out
 
 
-def texts(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
 def test_widths_are_side_by_side():
     made = posterior(-0.006, 0.01)
     found = gap(made, 0.9, without_events=posterior(-0.006, 0.01, share=0.05))
     ax = draw(found, truth=TRUTH)
-    labels = texts(ax)
+    said = labels(ax)
     width = float(found.triangle_width.sel(bound="median"))
-    assert f"triangle of chord and tangents, {1e6 * width:.3g} µm wide" in labels
+    assert f"triangle of chord and tangents, {1e6 * width:.3g} µm wide" in said
     rim = 1e6 * float((found.triangle_upper - found.triangle_lower).max())
-    assert f"triangle with uncertain ends, 90 %, {rim:.3g} µm wide" in labels
-    assert f"90 % band, {1e6 * float(found.band_width):.3g} µm wide" in labels
-    assert f"90 % band without events, {1e6 * float(found.band_width_without_events):.3g} µm wide" in labels
-    assert {"chord", "end tangents", "end contacts", "median", "true contour"} < set(labels)
+    assert f"triangle with uncertain ends, 90 %, {rim:.3g} µm wide" in said
+    assert f"90 % band, {1e6 * float(found.band_width):.3g} µm wide" in said
+    assert f"90 % band without events, {1e6 * float(found.band_width_without_events):.3g} µm wide" in said
+    assert {"chord", "end tangents", "end contacts", "median", "true contour"} < set(said)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [mm]", "$y$ − chord [µm]")
 
 
@@ -70,7 +59,7 @@ def test_the_triangle_is_measured_from_the_chord():
     np.testing.assert_allclose(corners[1], [found.apex_x, found.apex_y - chord], rtol=1e-12)
     low, high = ax.get_ylim()
     assert low < corners[1, 1] < 0.0 < high
-    assert not any("without events" in label for label in texts(ax))
+    assert not any("without events" in label for label in labels(ax))
 
 
 def test_axes_given_are_those_that_return():

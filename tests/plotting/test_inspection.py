@@ -7,8 +7,6 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
-
 
 @pytest.fixture(scope="module")
 def inspected(measured):

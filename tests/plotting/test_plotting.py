@@ -8,14 +8,11 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib import colors
 from matplotlib import pyplot as plt
 
+from helpers.pictures import labels
+from helpers.refusals import refused
 from tactile_bayes import plotting
 from tactile_bayes.contours import Circle, Joined, Parabola, paper_profile
 from tactile_bayes.errors import ParameterError, RecordError
@@ -31,9 +28,6 @@ from tactile_bayes.uncertainty.predictive_interval import predictive_interval
 ROD = Rod(length=0.1, flexural_rigidity=1.2e-5)
 STEP = np.radians(4.0)
 PHASES = ("tip", "tangential")
-
-
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 @pytest.fixture(scope="module")
@@ -87,10 +81,6 @@ def panels(rows, columns=1):
     """Axes of a figure that pyplot does not know."""
     figure = mpl.figure.Figure()
     return figure.subplots(rows, columns, squeeze=False)
-
-
-def labels(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def lines_of(ax, phase):

@@ -1,24 +1,18 @@
 """The figures of a plan: what they draw, and what they say."""
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 
+from helpers.pictures import labels, texts
+from helpers.refusals import refused
 from tactile_bayes import LoadCell, Rod, error_map, plotting, sensitivity
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting.sweep_plans import METHOD_COLOURS, READING_COLOURS
 
 ROD = Rod(0.1, 1e-5)
-
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 @pytest.fixture(scope="module")
@@ -66,14 +60,6 @@ SOME = rods(
     [["ok", "ok", "bent too far"], ["does not reach", "ok", "cannot be swept"]],
     [[4e-4, 2e-4, 1e-4], [np.nan, 3e-4, np.nan]],
 )
-
-
-def labels(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
-def texts(ax):
-    return [text.get_text() for text in ax.texts]
 
 
 def lines_of(ax, colour, style):

@@ -6,14 +6,10 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib.figure import Figure
 
 from helpers.pictures import difference
+from helpers.refusals import refused
 from tactile_bayes import plotting
 from tactile_bayes.checks import shown
 from tactile_bayes.contours import paper_profile
@@ -21,8 +17,6 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.plotting import style
 from tactile_bayes.plotting.style import STYLES
 from tactile_bayes.sweep import scan
-
-pytestmark = pytest.mark.usefixtures("settings_left_alone")
 
 
 @pytest.fixture(scope="module")

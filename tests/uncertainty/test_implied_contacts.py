@@ -5,19 +5,15 @@ from __future__ import annotations
 import json
 from functools import cache
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-
-from helpers.refusals import refused
-
-mpl.use("Agg")
-
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from helpers.contour_posteriors import CELL, measured, posterior, swept
+from helpers.pictures import own_axes
+from helpers.refusals import refused
 from tactile_bayes import plotting
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import InferenceError, ParameterError
@@ -289,16 +285,12 @@ def test_another_record_is_refused():
 # --- Figure -----------------------------------------------------------------------------------------------------
 
 
-def own_axes(count=5):
-    return Figure().subplots(count)
-
-
 def ratios(ax):
     return [line for line in ax.get_lines() if len(line.get_xdata()) > 2]
 
 
 def test_the_figure_shows_both_and_their_ratio():
-    axes = own_axes()
+    axes = own_axes(5)
     found = plotting.tightening(implied(), single(), probability=0.5, truth=Parabola(0.5, 0.5), axes=axes)
     assert found.tolist() == axes.tolist()
     tight = contact_moments(implied())
@@ -317,25 +309,25 @@ def test_the_figure_shows_both_and_their_ratio():
 
 def test_the_figure_takes_posteriors_of_single_contacts_and_chosen_samples():
     posteriors = infer_contacts(measured(), load_cell=CELL, seed=1, draws=40, method="importance")
-    axes = plotting.tightening(implied(), posteriors, samples=[40, 60, 120], axes=own_axes())
+    axes = plotting.tightening(implied(), posteriors, samples=[40, 60, 120], axes=own_axes(5))
     x = contact_moments(implied()).contact_x.values[[40, 60, 120]]
     assert [text.xy[0] for text in axes[0].texts] == x.tolist()
 
 
 def test_the_figure_refuses_what_does_not_belong_together():
     with refused(ParameterError, "one record"):
-        plotting.tightening(implied(), single().isel(sample=slice(100)), axes=own_axes())
+        plotting.tightening(implied(), single().isel(sample=slice(100)), axes=own_axes(5))
     with refused(ParameterError, "axes", "(2,)"):
         plotting.tightening(implied(), single(), axes=own_axes(2))
     with refused(ParameterError, "samples", [0, 60]):
-        plotting.tightening(implied(), single(), samples=[0, 60], axes=own_axes())
+        plotting.tightening(implied(), single(), samples=[0, 60], axes=own_axes(5))
     with refused(ParameterError, probability=1.0):
-        plotting.tightening(implied(), single(), probability=1.0, axes=own_axes())
+        plotting.tightening(implied(), single(), probability=1.0, axes=own_axes(5))
     with refused(ParameterError, "implied", "tree"):
-        plotting.tightening(implied()["posterior"].to_dataset(), single(), axes=own_axes())
+        plotting.tightening(implied()["posterior"].to_dataset(), single(), axes=own_axes(5))
     with refused(ParameterError, "three contacts"):
         plotting.tightening(
-            implied(), single().assign(status=single().status.where(False, "nonlinear")), axes=own_axes()
+            implied(), single().assign(status=single().status.where(False, "nonlinear")), axes=own_axes(5)
         )
 
 
