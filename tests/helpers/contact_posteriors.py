@@ -302,10 +302,3 @@ def weighed_moments(density: ContactDensity, draws=16000, seed=1):
         used = log_weight > -60.0
         each.append(moments(places[:, used, i].T, np.exp(log_weight[used]), tangential[used, i])[0])
     return np.array(each), weights
-
-
-def drawn_moments(tree: xr.DataTree, i: int):
-    """The ten numbers from the draws of a sample."""
-    draws = tree["posterior"].to_dataset().isel(sample=i)
-    points = np.stack([draws[name].values.ravel() for name in NAMES], axis=-1)
-    return moments(points, np.ones(len(points)), draws["tangential"].values.ravel())[0]

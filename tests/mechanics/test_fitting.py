@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.special import ellipkinc
 
 from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, FORCE, PSI1, contact_states
-from tactile_bayes.mechanics.elastica import contact_from_wrench, tangential_arclength, wrench_from_contact
+from tactile_bayes.mechanics.elastica import tangential_arclength, wrench_from_contact
 from tactile_bayes.mechanics.fitting import ContactFit, Reading, fit_contacts, fit_sheet
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 
@@ -26,10 +26,6 @@ class Case(NamedTuple):
 
     def take(self, where):
         return Case(self.reading.take(where), self.delta[where], self.true[where])
-
-
-def raw_contacts(reading, delta):
-    return contact_from_wrench(reading.drive_angle, *reading.loads.T, delta, side=1.0)
 
 
 def fit(case: Case) -> ContactFit:

@@ -38,7 +38,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::tactile_bayes.errors.ClearanceW
 
 ACCURACY, SNAP_OFF = 1e-9, 1e-14
 ULPS = 8
-ONE = np.zeros(1, dtype=np.intp)
 
 FEW = settings(
     max_examples=10,

@@ -7,9 +7,6 @@ from tactile_bayes.inference.ensembles import Logarithms, Plain, SamplerSettings
 from tactile_bayes.inference.ensembles.block import Block
 from tactile_bayes.inference.ensembles.run_state import RunState
 
-SHAPE = (2, 4, 3)
-"""Chains, walkers, parameters: 24 numbers a step."""
-
 
 def walked(steps):
     """Coordinates of walkers before the first and after each of these steps, some of which do not move them."""
