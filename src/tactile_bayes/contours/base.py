@@ -13,7 +13,7 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import as_numbers, shown
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
-from tactile_bayes.numerics.roots import falling_root
+from tactile_bayes.numerics.roots import bound_ends, falling_root
 
 __all__ = [
     "Contour",
@@ -30,9 +30,6 @@ __all__ = [
 ]
 
 Parameter = float | Floats
-
-_FARTHEST = 2.0**60
-"""Parameter at which the search for a slope or an x on an endless contour ends."""
 
 
 class Locus(NamedTuple):
@@ -228,12 +225,7 @@ class Contour(ABC):
 
         every = np.arange(goal.size)
         lo, hi = (np.broadcast_to(end, shape).ravel().astype(float) for end in self.domain)
-        for end, outward in ((lo, -1.0), (hi, 1.0)):
-            open_ended, way = np.flatnonzero(~np.isfinite(end)), 1.0
-            while open_ended.size and way < _FARTHEST:
-                end[open_ended] = outward * way
-                inside = outward * short_of(open_ended, end[open_ended])[0] > 0.0
-                open_ended, way = open_ended[inside], 2.0 * way
+        bound_ends(short_of, lo, hi, np.zeros(goal.size))
         with np.errstate(invalid="ignore"):
             there = (short_of(every, lo)[0] >= 0.0) & (short_of(every, hi)[0] <= 0.0)
         found = np.full(goal.size, np.nan)

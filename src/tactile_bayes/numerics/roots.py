@@ -8,14 +8,31 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["ROUNDING", "falling_root"]
+__all__ = ["ROUNDING", "bound_ends", "falling_root"]
 
 ROUNDING = 1e-14
 """Step, as a share of the bracket, at the level of rounding."""
 
+_FARTHEST = 2.0**60
+"""Distance beyond which no root is sought."""
+
+Function = Callable[[Index, Floats], tuple[Floats, Floats]]
+"""Maps indices of functions and arguments to values and derivatives, each of shape (k,)."""
+
+
+def bound_ends(function: Function, lo: Floats, hi: Floats, near: Floats) -> None:
+    """Replace infinite ends of brackets of falling functions, in place: go outward from `near`, twice as far each time,
+    until the root is passed."""
+    for end, outward in ((lo, -1.0), (hi, 1.0)):
+        open_ended, way = np.flatnonzero(~np.isfinite(end)), 1.0
+        while open_ended.size and way < _FARTHEST:
+            end[open_ended] = near[open_ended] + outward * way
+            inside = outward * function(open_ended, end[open_ended])[0] > 0.0
+            open_ended, way = open_ended[inside], 2.0 * way
+
 
 def falling_root(
-    function: Callable[[Index, Floats], tuple[Floats, Floats]],
+    function: Function,
     lo: Floats,
     hi: Floats,
     start: Floats | None = None,

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.contours import Contour
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.numerics.roots import falling_root
+from tactile_bayes.numerics.roots import bound_ends, falling_root
 from tactile_bayes.uncertainty.band import contours_drawn, grid_points, length_unit
 from tactile_bayes.uncertainty.quantiles import quantile_band
 
@@ -17,9 +17,6 @@ __all__ = ["normal_band", "normal_offsets"]
 
 _BLOCK = 100_000
 """Number of normals that are searched at once."""
-
-_FARTHEST = 2.0**60
-"""Distance in the contour's parameter at which the search on an endless contour stops."""
 
 _SLOWEST = float(np.finfo(float).tiny)
 """Lower bound of the rate: where the contour's parameter does not move the point, the root stays as it is."""
@@ -154,12 +151,7 @@ def _offsets(many: Contour, x: Floats, y: Floats, slope_angle: Floats) -> Floats
     near = many.parameter_of_x(x)
     near = np.clip(np.where(np.isfinite(near), near, 0.0), lo, hi)
     with np.errstate(over="ignore"):
-        for end, outward in ((lo, -1.0), (hi, 1.0)):
-            open_ended, way = np.flatnonzero(~np.isfinite(end)), 1.0
-            while open_ended.size and way < _FARTHEST:
-                end[open_ended] = near[open_ended] + outward * way
-                inside = outward * short_of(open_ended, end[open_ended])[0] > 0.0
-                open_ended, way = open_ended[inside], 2.0 * way
+        bound_ends(short_of, lo, hi, near)
         root = falling_root(short_of, lo, hi, near)
         missed = np.abs(short_of(every, root)[0])
     locus = many.locate(root)
