@@ -413,12 +413,6 @@ def test_a_file_that_is_no_csv_file_says_what_it_is(tmp_path, content, message):
         read_record(tmp_path / "a.csv")
 
 
-def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
-    path = tmp_path / "excel.csv"
-    path.write_bytes(b"\xef\xbb\xbf" + f"{HEADER}\r\n{ROW}\r\n".encode())
-    assert read_record(path)["force_y"].values.tolist() == [0.25]
-
-
 def test_an_invalid_record_is_not_written(tmp_path):
     with refused(RecordError, "there is no column 'force_x'"):
         write_record(make_record(columns()).drop_vars("force_x"), tmp_path / "a.csv")

@@ -180,11 +180,6 @@ def test_an_impossible_probability_is_refused_before_the_sampling(measured, tmp_
     assert not (tmp_path / "run").exists()
 
 
-def test_an_unknown_family_is_refused(measured, tmp_path):
-    with refused(ParameterError, "'blob'", "parabola"):
-        analyse(measured, tmp_path, family="blob")
-
-
 @pytest.fixture
 def drawn_before(analysed, monkeypatch):
     """Runs that are given the posterior of another."""
