@@ -83,7 +83,7 @@ def test_a_mistake_in_a_file_is_named_with_its_place(table, tmp_path, mistake, n
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick")
-@pytest.mark.parametrize("way", ["an empty column", pytest.param("no column", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("way", ["an empty column", "no column"])
 def test_a_channel_wholly_missing_is_allowed(table, tmp_path, way):
     header, rows = table
     if way == "no column":

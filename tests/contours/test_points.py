@@ -253,7 +253,7 @@ def most(alarms_of, rate):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [10, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [10, 40])
 def test_false_alarms_of_the_bends_where_they_are_most_likely(count):
     """A contour's own curvature speaks against an alarm: the rate is greatest for a line."""
     rng, alarms, draws = np.random.default_rng(11), 0, 2000
@@ -290,7 +290,7 @@ def alarms(count, draws, arc, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("arc", [lambda x: 0.0 * x, lambda x: np.maximum(0.0, x) ** 3], ids=["line", "half a line"])
-@pytest.mark.parametrize("count", [8, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [8, 40])
 def test_false_alarms_with_the_scatter_estimated(count, arc):
     assert alarms(count, 150, arc, seed=13) <= most(150, FALSE_ALARM)
 

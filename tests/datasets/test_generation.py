@@ -469,10 +469,8 @@ def test_records_depend_on_seed_and_index_alone():
     "change",
     [
         {"load_cell__relative_noise": 0.0},
-        pytest.param(
-            {"load_cell__bias_force_x": {"normal": [0.0, 0.1]}, "load_cell__force_noise": None}, marks=pytest.mark.slow
-        ),
-        pytest.param({"scan__samples": 5}, marks=pytest.mark.slow),
+        {"load_cell__bias_force_x": {"normal": [0.0, 0.1]}, "load_cell__force_noise": None},
+        {"scan__samples": 5},
         {"scan__friction": 0.0, "scan__bases": [[0.0, 0.0], [0.0, 0.0]]},
     ],
 )

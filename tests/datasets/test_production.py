@@ -123,10 +123,7 @@ def test_progress_is_told(tmp_path):
 
 @pytest.mark.slow
 @on_linux
-@pytest.mark.parametrize(
-    ("workers", "kills"),
-    [(2, 2), pytest.param(1, 8, marks=pytest.mark.slow), pytest.param(2, 8, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("workers", "kills"), [(2, 2), (1, 8), (2, 8)])
 def test_killed_at_random_moments_it_goes_on(many, tmp_path, workers, kills):
     """From when the folder is there: what the manifest states is whole, and nobody works on."""
     expected, spec = many
@@ -183,7 +180,7 @@ def test_a_killed_worker_is_replaced(many, tmp_path):
 
 @pytest.mark.slow
 @on_linux
-@pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("workers", [2, 1])
 def test_an_interrupt_leaves_what_is_finished(many, tmp_path, workers):
     expected, spec = many
     out = tmp_path / "out"
@@ -287,7 +284,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
 
 @pytest.mark.slow
 @on_linux
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("workers", [1, 2])
 def test_a_disk_that_takes_no_more_is_told_and_leaves_no_half_files(tmp_path, workers):
     """Files can grow to 40 kB only: that stops a shard in its middle, as a full disk would."""
     (tmp_path / "spec.toml").write_text(toml_of(PLAIN), encoding="utf-8")

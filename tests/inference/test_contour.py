@@ -256,7 +256,7 @@ def test_several_pivots():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_no_walker_lives_on_noise(seed):
     """Walkers that start beyond a snap-off can hold out for thousands of steps where the noise is ten times too great.
 
@@ -288,13 +288,14 @@ def test_priors_that_allow_the_impossible_are_cut_off():
     assert float(result["prior"].noise_scale.min()) > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "prior"),
     [
-        pytest.param("q", stats.uniform(0.5005, 0.2), marks=pytest.mark.slow),
-        pytest.param("a", stats.uniform(0.505, 1.0), marks=pytest.mark.slow),
-        pytest.param("noise_scale", stats.uniform(2.0, 1.0), marks=pytest.mark.slow),
-        pytest.param("noise_scale", stats.uniform(0.1, 0.2), marks=pytest.mark.slow),
+        ("q", stats.uniform(0.5005, 0.2)),
+        ("a", stats.uniform(0.505, 1.0)),
+        ("noise_scale", stats.uniform(2.0, 1.0)),
+        ("noise_scale", stats.uniform(0.1, 0.2)),
     ],
 )
 def test_priors_that_exclude_the_truth_are_obeyed(name, prior):

@@ -156,8 +156,8 @@ WIRE = Rod.circular(length=0.2, diameter=0.5e-3, youngs_modulus=206e9, elastic_s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("direction", ["forward", pytest.param("backward", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("q", [0.06, pytest.param(0.1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+@pytest.mark.parametrize("q", [0.06, 0.1])
 def test_the_largest_strain_against_integration(direction, q):
     """Half the diameter times the greatest curvature of any state, found by integrating the rod from its base."""
     contour = Parabola(2.5, q)

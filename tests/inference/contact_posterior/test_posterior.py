@@ -58,9 +58,7 @@ def ess(draws):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("i", "k"), [pytest.param(21, 1, marks=pytest.mark.slow), (61, 2), pytest.param(99, 3, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("i", "k"), [(21, 1), (61, 2), (99, 3)])
 def test_emcee_and_importance_sampling_agree(i, k, walked):
     """Means within 4 standard errors of both: false alarm 6e-5 a number."""
     weighed = infer(draws=4000, method="importance", which=[i])
