@@ -64,6 +64,14 @@ def tree(family: str, *, units: str = "dimensionless", **values: Any) -> xr.Data
     return out
 
 
+def assert_near(result: xr.DataTree, truth: dict[str, float], deviations: float = 4.0) -> None:
+    """The posterior has converged, and its means lie within so many standard deviations of the truth."""
+    assert result.attrs["converged"], result.attrs["message"]
+    for name, value in truth.items():
+        draws = result["posterior"][name]
+        assert abs(draws.mean() - value) < deviations * draws.std(), name
+
+
 @cache
 def measured() -> xr.Dataset:
     """Profile II at q = 0.5, both sweeps in steps of 2°."""

@@ -15,6 +15,7 @@ from helpers.contour_posteriors import (
     DEVIATIONS,
     MODEST,
     TRUTH,
+    assert_near,
     infer_as_stated,
     measured,
     posterior,
@@ -56,10 +57,7 @@ def fisher_covariance():
 def test_it_converges_near_the_truth():
     """Within 4 posterior standard deviations: false alarm 6e-5 a number, if the posterior is right."""
     result = posterior()
-    assert result.attrs["converged"], result.attrs["message"]
-    for name, value in {**TRUTH, "noise_scale": 1.0}.items():
-        draws = result["posterior"][name]
-        assert abs(draws.mean() - value) < 4.0 * draws.std(), name
+    assert_near(result, {**TRUTH, "noise_scale": 1.0})
 
 
 def test_widths_are_those_of_the_fisher_information():
@@ -217,12 +215,9 @@ def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
     record = coarse(Parabola(2.5, 0.1), cell, rod=rod)
     record = without(record, "load_cell_force_noise", "load_cell_moment_noise")
     result = infer_as_stated(record, seed=1, settings=MODEST)
-    assert result.attrs["converged"], result.attrs["message"]
     truth = {"a": 2.5, "q": 0.1, "x_c": 0.0, "moment_noise": 0.25e-3, "force_noise": 3e-3}
     assert list(result["posterior"].data_vars) == list(truth)
-    for name, value in truth.items():
-        draws = result["posterior"][name]
-        assert abs(draws.mean() - value) < 4.0 * draws.std(), name
+    assert_near(result, truth)
     assert result["posterior"].moment_noise.attrs["units"] == "N m"
     assert result["posterior"].force_noise.attrs["units"] == "N"
 
@@ -232,10 +227,7 @@ def test_without_a_load_cell_both_noises_are_inferred_in_its_units():
 def test_missing_channels(missing):
     """Within 4 standard deviations of the truth: false alarm 6e-5 a number."""
     result = infer_as_stated(without(coarse(), *missing), seed=1, settings=MODEST)
-    assert result.attrs["converged"], result.attrs["message"]
-    for name, value in {**TRUTH, "noise_scale": 1.0}.items():
-        draws = result["posterior"][name]
-        assert abs(draws.mean() - value) < 4.0 * draws.std(), name
+    assert_near(result, {**TRUTH, "noise_scale": 1.0})
     assert set(result["posterior_predictive"].data_vars) == set(CHANNELS) - set(missing)
 
 
@@ -273,10 +265,7 @@ def test_very_small_noise():
     """1e-4 of EI/L: within 4 standard deviations of the truth, the noise too; false alarm 6e-5 a number."""
     cell = LoadCell(force_noise=1e-4, moment_noise=1e-4)
     result = infer_as_stated(coarse(Circle(1.0, 0.3), cell), family="circle", seed=1, settings=MODEST)
-    assert result.attrs["converged"], result.attrs["message"]
-    for name, value in {"r": 1.0, "q": 0.3, "x_c": 0.0, "noise_scale": 1.0}.items():
-        draws = result["posterior"][name]
-        assert abs(draws.mean() - value) < 4.0 * draws.std(), name
+    assert_near(result, {"r": 1.0, "q": 0.3, "x_c": 0.0, "noise_scale": 1.0})
 
 
 def test_priors_that_allow_the_impossible_are_cut_off():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from helpers.contour_posteriors import assert_near
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.contours.families import family_named
@@ -237,9 +238,7 @@ def test_a_pivot_that_is_off_is_found():
     stated = true.assign(base_x=true.base_x.round(1) * 0.25 / 0.3, base_y=0.0 * true.base_y)
     result = infer_contour(CELL.measure(stated, seed=1), nuisances=["bias", "base"], seed=1)
     posterior = result["posterior"].to_dataset()
-    assert result.attrs["converged"]
-    for name, value in {"base_2_x": 0.02, "base_2_y": -0.02, **TRUTH}.items():
-        assert abs(posterior[name].mean() - value) < 4.0 * posterior[name].std()
+    assert_near(result, {"base_2_x": 0.02, "base_2_y": -0.02, **TRUTH})
     assert posterior.base_2_x.std() < 1e-3
     assert posterior.base_2_y.std() < 1e-3
 
@@ -365,10 +364,7 @@ def test_a_flaw_that_is_inferred_is_found_and_does_no_harm(name):
     """Within 4.5 posterior standard deviations, contour and flaw; not inferred, some of them would be far off."""
     settings = SamplerSettings(min_ess=300.0, max_r_hat=1.02)
     result = infer_contour(flawed(name, FLAWS[name]), load_cell=CELL, nuisances=[name], seed=1, settings=settings)
-    assert result.attrs["converged"], result.attrs["message"]
-    for parameter, value in {**TRUTH, name: FLAWS[name]}.items():
-        draws = result["posterior"][parameter]
-        assert abs(draws.mean() - value) < 4.5 * draws.std(), parameter
+    assert_near(result, {**TRUTH, name: FLAWS[name]}, 4.5)
     assert result["posterior"][name].std() < 0.5 * result["prior"][name].std()
 
 
@@ -437,10 +433,7 @@ def test_a_lever_and_a_backlash_are_found_beside_all_that_is_standard():
     cell = replace(CELL, lever=(0.0025, 0.0025), drive_angle_backlash=flaws["backlash"])
     settings = SamplerSettings(ensembles=2, walkers=26, min_ess=160.0, max_r_hat=1.06)
     result = infer_contour(cell.measure(scanned(2.0), seed=1), load_cell=CELL, seed=1, settings=settings)
-    assert result.attrs["converged"], result.attrs["message"]
-    draws = result["posterior"].to_dataset()
-    for name, value in {**TRUTH, **flaws}.items():
-        assert abs(draws[name].mean() - value) < 4.5 * draws[name].std(), name
+    assert_near(result, {**TRUTH, **flaws}, 4.5)
 
 
 def test_a_prior_makes_a_nuisance_of_what_was_taken_as_stated():
