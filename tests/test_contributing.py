@@ -1,7 +1,5 @@
 """What CONTRIBUTING.md shows is done to a copy of the source, and the examples run on that."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

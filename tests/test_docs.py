@@ -1,7 +1,5 @@
 """The documentation: its code runs and prints what it says, and it names what there is."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The skeleton of a command: groups of options are taken apart, and an answer is printed in words or as JSON."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from dataclasses import dataclass

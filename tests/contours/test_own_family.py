@@ -1,7 +1,5 @@
 """Families of one's own: what `check` finds, parameters that are lists, and equality."""
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import dataclass

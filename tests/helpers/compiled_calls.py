@@ -1,7 +1,5 @@
 """Compiled functions of numbers, called for arrays: they have no face of their own for Python."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any

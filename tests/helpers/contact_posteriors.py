@@ -6,8 +6,6 @@ are found by coarse sums at first for much larger noise: errors are random, and 
 the edges where the density jumps.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

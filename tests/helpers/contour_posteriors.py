@@ -1,7 +1,5 @@
 """Records of known contours, and posteriors that several tests look at: computed once, and not to be changed."""
 
-from __future__ import annotations
-
 from functools import cache, partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Contours of every family, pivots and senses for hypothesis to draw: from tame to as odd as the library admits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import singledispatch
 from typing import NamedTuple

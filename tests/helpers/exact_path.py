@@ -6,8 +6,6 @@ found by Newton's method from an approximate state; the snap-off is the greatest
 that theory has for it near an approximate one, each again a root.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ the contact in Jacobi's amplitude and uses Carlson's forms, so that formulas and
 derivatives are one-sided differences, exact to some twenty digits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple

@@ -6,8 +6,6 @@ nothing. Everything here is analytic: a fixed number of steps of Dormand's and P
 curvature polished by Newton's method.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

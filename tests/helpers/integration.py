@@ -4,8 +4,6 @@ x' = cos φ, y' = sin φ, φ' = κ, κ' = f cos(φ − β), written with the sup
 equation serves forward and backward contacts. Equations 19, 20 and 27 of Merker et al. 2018, doi 10.1155/2018/1613945.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp

@@ -4,8 +4,6 @@
 of the textbook form are bracketed and bisected.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

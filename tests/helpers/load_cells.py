@@ -1,7 +1,5 @@
 """Load cells of every kind, a record to measure, and what the readings of each should be: mean and covariance."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """Pages of the documentation: their blocks of code, and whether what these print is what the page says."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

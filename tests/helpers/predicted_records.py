@@ -1,7 +1,5 @@
 """Results of an inference that knows the contour: predictions of one record, without any sampling."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Replicates that fail, for processes as well: functions of a module, which patch where they run."""
 
-from __future__ import annotations
-
 import pytest
 
 from tactile_bayes.calibration import replicate as module

@@ -30,8 +30,6 @@ the change of φ(s) from one equilibrium on the path to the next obeys the linea
 those of Q, and the constraint; it is a variation with the drive held just where the drive does not change.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

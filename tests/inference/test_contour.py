@@ -1,7 +1,5 @@
 """The posterior of a contour, against independent computations, and its layout."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

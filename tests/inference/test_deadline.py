@@ -1,7 +1,5 @@
 """Searches that end when their time is up, with the best that they have found."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -6,8 +6,6 @@ are 4 standard errors from any true one between 0.95 and 1.1, and 2 from 0.8: th
 results that are averaged share less of their errors than standard errors count on.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

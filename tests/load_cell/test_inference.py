@@ -1,7 +1,5 @@
 """The contour posterior of records with errors that are known, unknown, and not told."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

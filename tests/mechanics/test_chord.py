@@ -1,7 +1,5 @@
 """Arcs, and the arcs that join given ends, against Legendre's closed form, and bracketed roots of it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numba

@@ -1,7 +1,5 @@
 """The touching rod in its own coordinates, against `elastica`, integration, and derivatives by the complex step."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The most likely contact against a search of its own: both phases and the edge, through `wrench_from_contact`."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

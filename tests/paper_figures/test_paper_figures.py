@@ -1,7 +1,5 @@
 """Figures 2 to 11 of Merker et al. 2018: what they show agrees with what is computed, and looks as it did."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import re

@@ -1,7 +1,5 @@
 """Step 2 with standard deviations: against Monte Carlo, the law of the misfit, and what becomes of doubtful samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Time and memory of a run, as the operating system counts them, on records that no budget was made for."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

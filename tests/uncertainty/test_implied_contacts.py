@@ -1,7 +1,5 @@
 """Contacts that a posterior of the contour implies: against scans of its contours, their layout, and how tight."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 

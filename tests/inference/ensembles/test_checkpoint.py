@@ -1,7 +1,5 @@
 """Runs that are killed, stopped or ended, and go on from what is on disk."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The emcee driver against targets whose answer is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from arviz_stats.base.array import array_stats

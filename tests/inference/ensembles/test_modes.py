@@ -1,7 +1,5 @@
 """Ensembles at rest in different modes, and slow ensembles."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

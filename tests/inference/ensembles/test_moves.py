@@ -1,7 +1,5 @@
 """The moves against targets whose moments are known exactly."""
 
-from __future__ import annotations
-
 import emcee
 import numpy as np
 import pytest
