@@ -70,9 +70,8 @@ def test_the_same_command_makes_nothing_again(done):
 
 def test_another_experiment_is_refused(done):
     out, _ = done
-    result = call("--out", out, "--replicates", 2, "--seed", 2, *QUICK)
-    assert result.exit_code == 2
-    assert "holds replicates of another experiment: seed is 1 there and 2 here" in result.stderr
+    message = "holds replicates of another experiment: seed is 1 there and 2 here"
+    commands.assert_refused(call("--out", out, "--replicates", 2, "--seed", 2, *QUICK), message)
 
 
 def test_a_misspecification_is_passed_on_and_kept(tmp_path, monkeypatch):
@@ -184,8 +183,5 @@ def test_a_termination_that_the_sampler_answers_is_still_one():
     ],
 )
 def test_refusals(tmp_path, options, words):
-    result = call("--out", tmp_path / "out", *options, *QUICK)
-    assert result.exit_code == 2
-    assert words in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    commands.assert_refused(call("--out", tmp_path / "out", *options, *QUICK), words)
     assert not (tmp_path / "out").exists()

@@ -77,8 +77,4 @@ def test_what_is_wrong_is_said_in_a_line(folder, tmp_path):
         ([folder, "--compare", tmp_path], f"{tmp_path} holds no comparison.nc"),
         ([folder, "--out", tmp_path / "no" / "page.html"], f"{tmp_path / 'no'}: No such file or directory"),
     ):
-        result = call(*arguments)
-        assert result.exit_code == 2
-        assert result.stdout == ""
-        assert result.stderr.startswith(f"tactile-bayes: {message}")
-        assert len(result.stderr.splitlines()) == 1
+        commands.assert_refused(call(*arguments), f"tactile-bayes: {message}")

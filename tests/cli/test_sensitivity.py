@@ -223,10 +223,8 @@ def test_control_c_says_how_to_go_on_and_the_same_command_does(asked, monkeypatc
 
 def test_another_study_is_refused(asked, tmp_path):
     assert call("--out", tmp_path, *STUDY).exit_code == 0
-    result = call("--out", tmp_path, *STUDY, "--seed", 2)
-    assert result.exit_code == 2
-    assert "holds cells of another experiment: seed is 1 there and 2 here" in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    message = "holds cells of another experiment: seed is 1 there and 2 here"
+    commands.assert_refused(call("--out", tmp_path, *STUDY, "--seed", 2), message)
 
 
 # --- Refusals -------------------------------------------------------------------------------------------------------
@@ -250,10 +248,7 @@ def test_another_study_is_refused(asked, tmp_path):
 )
 def test_refusals(tmp_path, monkeypatch, options, words):
     monkeypatch.setattr("tactile_bayes.planning.sensitivity.amplification", lambda plan: amplification_at_once(plan))
-    result = call("--out", tmp_path / "out", "--drive-step", 6, *options)
-    assert result.exit_code == 2, result.output
-    assert words in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    commands.assert_refused(call("--out", tmp_path / "out", "--drive-step", 6, *options), words)
     assert not (tmp_path / "out").exists()
 
 
@@ -299,7 +294,5 @@ def test_no_rod_that_serves_is_said():
     ],
 )
 def test_half_a_material_or_no_rig_is_refused_before_any_work(tmp_path, options, message):
-    result = call("--out", tmp_path / "new", *options, *QUICK)
-    assert result.exit_code == 2
-    assert message in result.stderr
+    commands.assert_refused(call("--out", tmp_path / "new", *options, *QUICK), message)
     assert not (tmp_path / "new").exists()
