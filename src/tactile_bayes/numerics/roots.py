@@ -8,10 +8,10 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
 
-__all__ = ["ROUNDING", "bound_ends", "falling_root"]
+__all__ = ["bound_ends", "falling_root"]
 
-ROUNDING = 1e-14
-"""Step, as a share of the bracket, at the level of rounding."""
+_ROUNDING = 1e-14
+"""Step, as a share of the bracket, at the level of rounding, at which the iteration ends."""
 
 _FARTHEST = 2.0**60
 """Distance beyond which no root is sought."""
@@ -31,14 +31,7 @@ def bound_ends(function: Function, lo: Floats, hi: Floats, near: Floats) -> None
             open_ended, way = open_ended[inside], 2.0 * way
 
 
-def falling_root(
-    function: Function,
-    lo: Floats,
-    hi: Floats,
-    start: Floats | None = None,
-    *,
-    last_step: float = ROUNDING,
-) -> Floats:
+def falling_root(function: Function, lo: Floats, hi: Floats, start: Floats | None = None) -> Floats:
     """Roots of functions that are positive at `lo` and not positive at `hi`, by Newton's method within the bracket.
 
     Parameters
@@ -49,8 +42,6 @@ def falling_root(
         Bracket; `lo` may be greater than `hi`.
     start : ndarray, shape (n,), optional
         First guess in the bracket; by default its middle.
-    last_step : float
-        Step, as a share of the bracket, at which the iteration ends. The remaining error is of the order of its square.
 
     Returns
     -------
@@ -58,7 +49,7 @@ def falling_root(
     """
     roots = 0.5 * (lo + hi) if start is None else start.astype(float)
     x, before = roots, np.abs(hi - lo)
-    settled = last_step * before
+    settled = _ROUNDING * before
     active = np.arange(lo.size)
     with np.errstate(divide="ignore", invalid="ignore"):
         for _ in range(100):
