@@ -152,11 +152,7 @@ def _compared(
 
 
 def _ranks(
-    model: ContourModel,
-    samples: Floats,
-    truth: Mapping[str, float],
-    is_of_family: bool,
-    rng: np.random.Generator,
+    model: ContourModel, samples: Floats, truth: Mapping[str, float], is_of_family: bool, rng: np.random.Generator
 ) -> dict[str, int]:
     """Rank the true parameters and their log-likelihood among the draws.
 

@@ -13,15 +13,7 @@ from tactile_bayes.calibration.coverage import coverage_p_value, noticed_coverag
 from tactile_bayes.calibration.ranks import NoticedRanks, noticed_ranks, uniformity_p_value
 from tactile_bayes.calibration.replicate import DRAWS, LOG_LIKELIHOOD, Outcome
 from tactile_bayes.calibration.simulated_experiment import SimulatedExperiment
-from tactile_bayes.calibration.verdict import (
-    FEWEST,
-    POWER,
-    Tally,
-    conclusion,
-    lost_message,
-    power_message,
-    statement,
-)
+from tactile_bayes.calibration.verdict import FEWEST, POWER, Tally, conclusion, lost_message, power_message, statement
 
 __all__ = ["CLAIMS", "FALSE_ALARM", "summary"]
 

@@ -64,11 +64,7 @@ class FunctionContour(Graph, Single):
 
 
 def from_function(
-    g: Function,
-    domain: tuple[float, float],
-    *,
-    slope: Function | None = None,
-    curvature: Function | None = None,
+    g: Function, domain: tuple[float, float], *, slope: Function | None = None, curvature: Function | None = None
 ) -> FunctionContour:
     """Contour y = g(x).
 

@@ -10,14 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.contours.base import (
-    Contour,
-    Locus,
-    Parameter,
-    as_parameter,
-    common_shape,
-    refuse_unless,
-)
+from tactile_bayes.contours.base import Contour, Locus, Parameter, as_parameter, common_shape, refuse_unless
 from tactile_bayes.contours.halves import Halves
 from tactile_bayes.errors import ContourError
 

@@ -158,11 +158,7 @@ def _drawn(
 
 
 def _keep(
-    spec: Specification,
-    records: Records,
-    candidates: _Candidates,
-    tried: Mapping[int, _Tried],
-    is_kept: Flags,
+    spec: Specification, records: Records, candidates: _Candidates, tried: Mapping[int, _Tried], is_kept: Flags
 ) -> None:
     """Write accepted candidates to their records."""
     count, sweeps = records.index.size, len(spec.sweeps)

@@ -32,10 +32,7 @@ class Verification(NamedTuple):
 
 
 def verify(
-    path: str | os.PathLike[str],
-    *,
-    regenerate: int = 0,
-    progress: Callable[[Verification], object] | None = None,
+    path: str | os.PathLike[str], *, regenerate: int = 0, progress: Callable[[Verification], object] | None = None
 ) -> Manifest:
     """Check every byte of a data set against its manifest.
 

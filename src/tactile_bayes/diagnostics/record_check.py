@@ -162,11 +162,7 @@ def check_record(posterior: xr.DataTree, *, false_alarm: float = 1e-3) -> xr.Dat
             "channel": channels,
             "unit": ("channel", [units[name] for name in channels]),
         },
-        attrs={
-            "passed": int(not overall <= false_alarm),
-            "false_alarm": false_alarm,
-            "predictions": predictions,
-        },
+        attrs={"passed": int(not overall <= false_alarm), "false_alarm": false_alarm, "predictions": predictions},
     )
 
 

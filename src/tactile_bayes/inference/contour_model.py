@@ -65,12 +65,7 @@ class ContourModel:
     """
 
     def __init__(
-        self,
-        measured: xr.Dataset,
-        family: Family,
-        nuisances: Nuisances,
-        noise: Noise,
-        priors: Mapping[str, Prior],
+        self, measured: xr.Dataset, family: Family, nuisances: Nuisances, noise: Noise, priors: Mapping[str, Prior]
     ) -> None:
         self.measured = measured
         self.family = family

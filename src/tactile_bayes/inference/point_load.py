@@ -477,17 +477,13 @@ def _tree(model: _Model, draws: Draws, rng: np.random.Generator) -> xr.DataTree:
     groups = {
         "posterior": data(posterior, "chain", "draw").assign_coords(power=np.arange(_POWERS)),
         "posterior_predictive": data(
-            {"reading": (over_points, predicted), "expected_reading": (over_points, mean_reading)},
-            *over_points,
+            {"reading": (over_points, predicted), "expected_reading": (over_points, mean_reading)}, *over_points
         ),
         "log_likelihood": data({"reading": (over_points, log_likelihood)}, *over_points),
         "sample_stats": sample_stats(draws),
         "observed_data": data({"reading": ("point", model.reading)}, "point"),
         "constant_data": data(
-            {
-                "axial": ("point", model.axial, {"units": "mm"}),
-                "lateral": ("point", model.lateral, {"units": "mm"}),
-            },
+            {"axial": ("point", model.axial, {"units": "mm"}), "lateral": ("point", model.lateral, {"units": "mm"})},
             "point",
         ),
     }

@@ -17,12 +17,7 @@ from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell.corruption import corrupted_loads
 from tactile_bayes.load_cell.covariance import covariance, squared_mahalanobis_distance
 from tactile_bayes.load_cell.data_sheet import DataSheet
-from tactile_bayes.load_cell.likelihood import (
-    approximations,
-    checked_noise_scale,
-    log_density_left_out,
-    log_likelihood,
-)
+from tactile_bayes.load_cell.likelihood import approximations, checked_noise_scale, log_density_left_out, log_likelihood
 from tactile_bayes.load_cell.measurement import corrected, measured, stated_entries
 from tactile_bayes.load_cell.zero_load import found_cell
 from tactile_bayes.record import CHANNELS, frame_of, validate

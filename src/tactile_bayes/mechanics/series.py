@@ -12,17 +12,7 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.numerics import chebyshev
 
-__all__ = [
-    "Nodes",
-    "at_all",
-    "change_of",
-    "crossing",
-    "nodes_of",
-    "tail",
-    "value",
-    "value_and_slope",
-    "weighted",
-]
+__all__ = ["Nodes", "at_all", "change_of", "crossing", "nodes_of", "tail", "value", "value_and_slope", "weighted"]
 
 
 class Nodes(NamedTuple):

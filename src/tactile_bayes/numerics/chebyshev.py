@@ -9,15 +9,7 @@ from numpy.polynomial import chebyshev
 
 from tactile_bayes.arrays import Floats
 
-__all__ = [
-    "basis",
-    "coefficients",
-    "derivative",
-    "evaluate",
-    "integral",
-    "nodes",
-    "polynomials",
-]
+__all__ = ["basis", "coefficients", "derivative", "evaluate", "integral", "nodes", "polynomials"]
 
 
 @functools.cache

@@ -147,8 +147,6 @@ class Plan:
     def with_noise(self, factor: float) -> Plan:
         """Return the plan with force_noise and moment_noise of the load cell multiplied by a factor."""
         noisier = replace(
-            self.cell,
-            force_noise=factor * self.cell.force_noise,
-            moment_noise=factor * self.cell.moment_noise,
+            self.cell, force_noise=factor * self.cell.force_noise, moment_noise=factor * self.cell.moment_noise
         )
         return replace(self, load_cell=noisier)

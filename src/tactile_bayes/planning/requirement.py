@@ -106,16 +106,8 @@ def required_noise(
     return xr.Dataset(
         {
             "noise_factor": ("band_width", np.array(factors)),
-            "force_noise": (
-                "band_width",
-                np.array(factors) * cell.force_noise,
-                {"units": "N" if si else "EI/L²"},
-            ),
-            "moment_noise": (
-                "band_width",
-                np.array(factors) * cell.moment_noise,
-                {"units": "N m" if si else "EI/L"},
-            ),
+            "force_noise": ("band_width", np.array(factors) * cell.force_noise, {"units": "N" if si else "EI/L²"}),
+            "moment_noise": ("band_width", np.array(factors) * cell.moment_noise, {"units": "N m" if si else "EI/L"}),
             "present_width": ((), band.width(1.0), unit),
             "prior_width": ((), most, unit),
         },

@@ -53,13 +53,7 @@ STYLES: Mapping[Style, Mapping[str, Any]] = {
         "legend.columnspacing": 1.4,
         "savefig.dpi": 300.0,
     },
-    "screen": {
-        **_COMMON,
-        **_letters(10.0, 9.0),
-        "axes.linewidth": 0.8,
-        "hatch.linewidth": 0.8,
-        "savefig.dpi": 150.0,
-    },
+    "screen": {**_COMMON, **_letters(10.0, 9.0), "axes.linewidth": 0.8, "hatch.linewidth": 0.8, "savefig.dpi": 150.0},
 }
 """Settings of matplotlib by the name of the style."""
 

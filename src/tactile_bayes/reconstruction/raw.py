@@ -7,15 +7,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.fitting import raw_contacts
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
-from tactile_bayes.reconstruction.estimate import (
-    BEYOND_TIP,
-    MOST_BEND,
-    NONLINEAR,
-    OK,
-    Estimate,
-    is_weak,
-    unanswered,
-)
+from tactile_bayes.reconstruction.estimate import BEYOND_TIP, MOST_BEND, NONLINEAR, OK, Estimate, is_weak, unanswered
 from tactile_bayes.reconstruction.samples import Samples
 
 __all__ = ["raw_estimate"]

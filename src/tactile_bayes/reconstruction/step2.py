@@ -282,12 +282,7 @@ def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float
     probability = np.nan if shared or not count else float(chdtrc(count, total))
     lying = np.flatnonzero(clear & (estimate.phase == TANGENTIAL))
     score = np.nan if shared or not lying.size else _axial_score(samples.take(lying).reading, friction)
-    return {
-        "misfit_sum": total,
-        "misfit_samples": count,
-        "misfit_probability": probability,
-        "axial_score": score,
-    }
+    return {"misfit_sum": total, "misfit_samples": count, "misfit_probability": probability, "axial_score": score}
 
 
 def _axial_score(reading: Reading, friction: float) -> float:

@@ -38,11 +38,7 @@ __all__ = [
 
 def rod_attributes(rod: Rod) -> dict[str, float]:
     """Convert a rod to attributes of a record; `stated_rod` is the inverse."""
-    return {
-        "rod_length": rod.length,
-        "rod_flexural_rigidity": rod.flexural_rigidity,
-        "rod_diameter": rod.diameter,
-    }
+    return {"rod_length": rod.length, "rod_flexural_rigidity": rod.flexural_rigidity, "rod_diameter": rod.diameter}
 
 
 def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:

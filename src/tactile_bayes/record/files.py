@@ -9,14 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from tactile_bayes.checks import (
-    check_choice,
-    check_kind,
-    check_mapping,
-    check_optional,
-    check_path,
-    check_switch,
-)
+from tactile_bayes.checks import check_choice, check_kind, check_mapping, check_optional, check_path, check_switch
 from tactile_bayes.errors import RecordError
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record.construction import completed_record

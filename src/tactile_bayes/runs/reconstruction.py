@@ -131,7 +131,7 @@ def reconstruction_messages(contacts: xr.Dataset) -> tuple[str, ...]:
     fates = ", ".join(f"{count} {fate}" for fate, count in counts.most_common())
     found = int(np.count_nonzero(np.isfinite(contacts.contact_x.values)))
     sentences = [
-        f"{found} contact point{'s' * (found != 1)} by the {contacts.attrs['method']} method; samples: {fates}.",
+        f"{found} contact point{'s' * (found != 1)} by the {contacts.attrs['method']} method; samples: {fates}."
     ]
     against = doubtful_sides(contacts.attrs)
     samples = int(contacts.attrs.get("misfit_samples", 0))

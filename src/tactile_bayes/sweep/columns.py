@@ -17,14 +17,7 @@ __all__ = ["EVENT_COLUMNS", "SAMPLE_COLUMNS", "ManyUnits", "phases_of", "sweep_e
 
 LOADS = ("holding_moment", "force_x", "force_y")
 
-SAMPLE_COLUMNS = (
-    *LOADS,
-    "contact_x",
-    "contact_y",
-    "slope_angle",
-    "contact_arclength",
-    "tip_angle",
-)
+SAMPLE_COLUMNS = (*LOADS, "contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 """Columns of samples; loads are 0 out of contact, the others NaN."""
 
 EVENT_COLUMNS = ("drive_angle", "slope_angle", "contact_x", "contact_y")

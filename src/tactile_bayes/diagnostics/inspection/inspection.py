@@ -174,15 +174,7 @@ def inspect_record(
     of_loads = check_units_and_signs(record, _with_zero(cell, found)) if found["contact"].values.any() else ()
     against = inspection_messages(record, table, channels, samples, of_loads, fit, cell, source, false_alarm)
     return Inspection(
-        record,
-        against or ("Nothing looks wrong.",),
-        bool(against),
-        table,
-        channels,
-        samples,
-        statuses,
-        cell,
-        source,
+        record, against or ("Nothing looks wrong.",), bool(against), table, channels, samples, statuses, cell, source
     )
 
 

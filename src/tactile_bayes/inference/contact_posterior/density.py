@@ -60,14 +60,7 @@ class ContactDensity:
     """
 
     def __init__(
-        self,
-        samples: Samples,
-        readings: LoneSamples,
-        base: Floats,
-        *,
-        turning: bool,
-        delta: float,
-        prior: ContactPrior,
+        self, samples: Samples, readings: LoneSamples, base: Floats, *, turning: bool, delta: float, prior: ContactPrior
     ) -> None:
         if not (callable(prior) or (isinstance(prior, str) and prior in ("flat", "polar"))):
             raise ParameterError(

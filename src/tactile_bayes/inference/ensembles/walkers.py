@@ -15,15 +15,7 @@ from tactile_bayes.errors import InferenceError, ParameterError
 from tactile_bayes.inference.ensembles.settings import SamplerSettings, refuse_few_walkers
 from tactile_bayes.inference.ensembles.target import LogProbability
 
-__all__ = [
-    "RandomState",
-    "Seed",
-    "checked_start",
-    "first_random_state",
-    "scatter_walkers",
-    "seed_sequence",
-    "spawn",
-]
+__all__ = ["RandomState", "Seed", "checked_start", "first_random_state", "scatter_walkers", "seed_sequence", "spawn"]
 
 
 Seed = int | np.random.SeedSequence
