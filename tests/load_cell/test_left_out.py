@@ -6,8 +6,6 @@ import pytest
 from scipy import stats
 
 from helpers.load_cells import CELL, NORMAL, SHARED, UNKNOWN, WALK, WANDER, cell, moments
-from helpers.refusals import refused
-from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell, OrnsteinUhlenbeck
 
 N = 7
@@ -90,35 +88,6 @@ def test_a_bias_that_is_hardly_or_not_at_all_known(drift, bias):
     np.testing.assert_allclose(sheet.log_density_left_out(measured, loads), expected, rtol=1e-11)
 
 
-SHAPES = [
-    ((), (3,)),
-    ((), (2, 1)),
-    ((), (4, 3)),
-    ((4,), (4, 1)),
-    ((2, 4), (4, 3)),
-    ((2, 4), (2, 1, 1)),
-    ((2, 1), (4, 3)),
-]
-
-
-@pytest.mark.parametrize("name", NORMAL)
-def test_batches_of_every_shape_are_one_by_one(name):
-    sheet = NORMAL[name]
-    for batch, shape in SHAPES:
-        measured, loads, _ = drawn(5, batch)
-        scale = np.random.default_rng(6).uniform(0.5, 2.0, shape)
-        result = sheet.log_density_left_out(measured, loads, noise_scale=scale)
-        whole = np.broadcast_shapes(batch, shape[:-1])
-        assert result.shape == (*whole, N)
-        every_load = np.broadcast_to(loads, (*whole, N, 3)).reshape(-1, N, 3)
-        every_scale = np.broadcast_to(scale, (*whole, 3)).reshape(-1, 3)
-        expected = [
-            sheet.log_density_left_out(measured, load, noise_scale=factor)
-            for load, factor in zip(every_load, every_scale, strict=True)
-        ]
-        np.testing.assert_allclose(result.reshape(-1, N), expected, rtol=1e-11, atol=1e-12)
-
-
 @pytest.mark.parametrize(
     "further", [{"drift": WANDER, "bias_uncertainty": UNKNOWN}, {"correlation": SHARED, "drift": WALK}, {"drift": WALK}]
 )
@@ -173,45 +142,3 @@ def test_a_drift_that_hardly_forgets_is_a_bias():
         constant.log_density_left_out(measured, loads, noise_scale=scale),
         rtol=1e-9,
     )
-
-
-@pytest.mark.parametrize("sheet", [CELL, NORMAL["random walk"], NORMAL["drift that forgets, unknown bias"]])
-def test_a_prediction_without_a_value_has_none_either(sheet):
-    measured, loads, _ = drawn(11, (2,))
-    loads[1, 2, 0] = np.nan
-    result = sheet.log_density_left_out(measured, loads)
-    assert np.isfinite(result[0]).all()
-    assert np.isnan(result[1, 2])
-
-
-def test_nothing_measured_says_nothing():
-    nothing = np.full((4, 3), np.nan)
-    for sheet in (CELL, NORMAL["random walk"]):
-        assert sheet.log_density_left_out(nothing, np.zeros((2, 4, 3))).tolist() == [[0.0] * 4] * 2
-
-
-@pytest.mark.parametrize(
-    ("further", "named"),
-    [
-        ({"drift": WALK, "degrees_of_freedom": 4.0}, ["degrees_of_freedom"]),
-        ({"drift": WALK, "correlation": SHARED, "relative_noise": 0.1}, ["correlated", "relative_noise"]),
-        ({"drift": WALK, "correlation": SHARED, "bias_uncertainty": UNKNOWN}, ["correlated", "unknown bias"]),
-        ({"bias_uncertainty": UNKNOWN, "moment_range": 0.5}, ["sample 0", "holding_moment"]),
-        ({"moment_range": 0.1}, ["sample 0", "holding_moment", 0.5]),
-    ],
-)
-def test_what_the_likelihood_refuses_is_refused(further, named):
-    for method in ("log_likelihood", "log_density_left_out"):
-        with refused(ParameterError, *named):
-            getattr(cell(**further), method)(np.full((4, 3), 0.5), np.zeros((4, 3)))
-
-
-def test_shapes_and_scales_that_cannot_be_are_refused():
-    with refused(ParameterError, "noise_scale", -1.0):
-        NORMAL["random walk"].log_density_left_out(np.zeros((4, 3)), np.zeros((4, 3)), noise_scale=-1.0)
-    with refused(ParameterError, "measured", "shape"):
-        NORMAL["random walk"].log_density_left_out(np.zeros((4, 3)), np.zeros((5, 3)))
-    holes = np.zeros((4, 3))
-    holes[2, 1] = np.nan
-    with refused(ParameterError, "sample 2", "force_x"):
-        NORMAL["random walk"].log_density_left_out(holes, np.zeros((4, 3)))

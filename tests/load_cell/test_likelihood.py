@@ -1,5 +1,7 @@
 """How likely readings are where they are normal: against the dense covariance of all of them, written out."""
 
+from functools import partial
+
 import hypothesis.strategies as st
 import numpy as np
 import pytest
@@ -12,6 +14,12 @@ from helpers.refusals import refused
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.record import CHANNELS
+
+DENSITIES = {
+    "all": LoadCell.log_likelihood,
+    "each given those before": partial(LoadCell.log_likelihood, pointwise=True),
+    "each given all others": LoadCell.log_density_left_out,
+}
 
 numbers = st.floats(-100, 100)
 factors = st.floats(0.01, 100)
@@ -104,11 +112,14 @@ def test_the_arguments_are_not_changed():
     assert (scales == 2).all()
 
 
-def test_a_prediction_without_a_value_has_none_either():
-    predicted = np.zeros((2, 4, 3))
+@pytest.mark.parametrize("name", ["white", "random walk", "drift that forgets, unknown bias"])
+def test_a_prediction_without_a_value_has_none_either(name):
+    sheet, predicted = NORMAL[name], np.zeros((2, 4, 3))
     predicted[1, 2, 0] = np.nan
-    result = CELL.log_likelihood(np.ones((4, 3)), predicted)
+    result, _, each = (density(sheet, np.ones((4, 3)), predicted) for density in DENSITIES.values())
     assert np.isfinite(result).tolist() == [True, False]
+    assert np.isfinite(each[0]).all()
+    assert np.isnan(each[1, 2])
     pointwise = CELL.log_likelihood(np.ones((4, 3)), predicted, pointwise=True)
     assert np.argwhere(np.isnan(pointwise)).tolist() == [[1, 2]]
 
@@ -119,6 +130,9 @@ def test_nothing_measured_says_nothing():
     pointwise = CELL.log_likelihood(np.full((4, 3), np.nan), np.zeros((2, 4, 3)), noise_scale=[2, 3, 4], pointwise=True)
     assert pointwise.tolist() == [[0] * 4] * 2
     assert LoadCell().log_likelihood(np.empty((0, 3)), np.empty((0, 3)), pointwise=True).shape == (0,)
+    for sheet in (CELL, NORMAL["random walk"]):
+        left_out = sheet.log_density_left_out(np.full((4, 3), np.nan), np.zeros((2, 4, 3)))
+        assert left_out.tolist() == [[0] * 4] * 2
 
 
 # --- Everything that is normal ----------------------------------------------------------------------------------
@@ -172,23 +186,23 @@ SHAPES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("pointwise", [False, True])
+@pytest.mark.parametrize("density", DENSITIES)
 @pytest.mark.parametrize("name", NORMAL)
-def test_batches_of_every_shape_are_one_by_one(name, pointwise):
-    sheet = NORMAL[name]
+def test_batches_of_every_shape_are_one_by_one(name, density):
+    sheet, log_density = NORMAL[name], DENSITIES[density]
     for batch, shape in SHAPES:
         measured, loads, rng = drawn(3, batch)
         scale = rng.uniform(0.5, 2.0, shape)
-        result = sheet.log_likelihood(measured, loads, noise_scale=scale, pointwise=pointwise)
+        result = log_density(sheet, measured, loads, noise_scale=scale)
         whole = np.broadcast_shapes(batch, shape[:-1])
-        assert result.shape == ((*whole, N) if pointwise else whole)
+        assert result.shape == (whole if density == "all" else (*whole, N))
         every_load = np.broadcast_to(loads, (*whole, N, 3)).reshape(-1, N, 3)
         every_scale = np.broadcast_to(scale, (*whole, 3)).reshape(-1, 3)
         expected = [
-            sheet.log_likelihood(measured, load, noise_scale=factor, pointwise=pointwise)
+            log_density(sheet, measured, load, noise_scale=factor)
             for load, factor in zip(every_load, every_scale, strict=True)
         ]
-        np.testing.assert_allclose(result.reshape(np.shape(expected)), expected, rtol=1e-12)
+        np.testing.assert_allclose(result.reshape(np.shape(expected)), expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("bias", [1e-8, 100.0])
@@ -290,10 +304,29 @@ def test_the_approximation_is_as_good_as_stated(step, stated, stated_ratio):
 # --- What is refused --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("further", [{"drift": WALK}, {"drift": WANDER}, {"bias_uncertainty": UNKNOWN}])
-def test_outliers_beside_drift_are_refused(further):
-    with refused(ParameterError, "outliers", "degrees_of_freedom"):
-        cell(degrees_of_freedom=4.0, **further).log_likelihood(np.zeros((4, 3)), np.zeros((4, 3)))
+WANDERING = [{"drift": WALK}, {"drift": WANDER}, {"bias_uncertainty": UNKNOWN}]
+
+
+@pytest.mark.parametrize(
+    ("further", "named"),
+    [
+        *(({"degrees_of_freedom": 4.0, **more}, ["outliers", "degrees_of_freedom"]) for more in WANDERING),
+        *(
+            ({"correlation": SHARED, "relative_noise": 0.1, **more}, ["correlated noise", "relative_noise"])
+            for more in WANDERING
+        ),
+        *(
+            ({"correlation": SHARED, "bias_uncertainty": UNKNOWN, **more}, ["unknown bias", "correlated noise"])
+            for more in WANDERING[:2]
+        ),
+        ({"bias_uncertainty": UNKNOWN, "moment_range": 0.5}, ["sample 0", "holding_moment"]),
+        ({"moment_range": 0.1}, ["sample 0", "holding_moment", 0.5, 0.1]),
+    ],
+)
+@pytest.mark.parametrize("density", DENSITIES)
+def test_what_has_no_closed_form_or_cannot_be_is_refused(further, named, density):
+    with refused(ParameterError, *named):
+        DENSITIES[density](cell(**further), np.full((4, 3), 0.5), np.zeros((4, 3)))
 
 
 @pytest.mark.parametrize(
@@ -308,23 +341,6 @@ def test_a_sample_at_the_end_of_the_range_beside_drift_is_refused(further, what)
     measured[2, 1] = -0.9
     with refused(ParameterError, "sample 2", "force_x", what):
         sheet.log_likelihood(measured, np.zeros((4, 3)))
-
-
-@pytest.mark.parametrize("further", [{"drift": WALK}, {"drift": WANDER}, {"bias_uncertainty": UNKNOWN}])
-def test_three_at_once_are_refused(further):
-    measured = np.zeros((4, 3))
-    with refused(ParameterError, "correlated noise", "relative_noise"):
-        cell(correlation=SHARED, relative_noise=0.1, **further).log_likelihood(measured, measured)
-    if "drift" in further:
-        with refused(ParameterError, "unknown bias", "correlated noise"):
-            cell(correlation=SHARED, bias_uncertainty=UNKNOWN, **further).log_likelihood(measured, measured)
-
-
-def test_a_reading_beyond_the_range_is_refused():
-    measured = np.zeros((4, 3))
-    measured[3, 0] = 1.1
-    with refused(ParameterError, "sample 3", "holding_moment", 1.1, 1.0):
-        cell(moment_range=1.0).log_likelihood(measured, measured)
 
 
 @pytest.mark.parametrize(
@@ -344,19 +360,21 @@ def test_a_channel_without_noise_is_refused_if_it_was_measured(sheet, name, argu
     assert np.isfinite(sheet.log_likelihood(measured, np.zeros((4, 3))))
 
 
-def test_a_channel_with_holes_is_refused():
+@pytest.mark.parametrize("sheet", [CELL, NORMAL["random walk"]])
+@pytest.mark.parametrize("density", DENSITIES)
+def test_a_channel_with_holes_is_refused(sheet, density):
     measured = np.zeros((4, 3))
     measured[2, 1] = np.nan
     with refused(ParameterError, "sample 2", "force_x"):
-        CELL.log_likelihood(measured, np.zeros((4, 3)))
+        DENSITIES[density](sheet, measured, np.zeros((4, 3)))
 
 
+@pytest.mark.parametrize("density", DENSITIES)
 @pytest.mark.parametrize("noise_scale", [0.0, -1.0, np.nan])
-def test_an_impossible_noise_scale_is_refused(noise_scale):
-    with refused(ParameterError, "noise_scale", noise_scale):
-        CELL.log_likelihood(np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=[[1.0], [noise_scale]])
-    with refused(ParameterError, "noise_scale", noise_scale):
-        CELL.log_likelihood(np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=[1.0, noise_scale, 1.0])
+def test_an_impossible_noise_scale_is_refused(noise_scale, density):
+    for scale in ([[1.0], [noise_scale]], [1.0, noise_scale, 1.0], noise_scale):
+        with refused(ParameterError, "noise_scale", noise_scale):
+            DENSITIES[density](CELL, np.zeros((4, 3)), np.zeros((2, 4, 3)), noise_scale=scale)
 
 
 @pytest.mark.parametrize("pointwise", [False, True])
@@ -369,7 +387,8 @@ def test_noise_scales_that_do_not_fit_are_refused(shape, missing, pointwise):
         CELL.log_likelihood(measured, np.zeros((2, 4, 3)), noise_scale=np.ones(shape), pointwise=pointwise)
 
 
+@pytest.mark.parametrize("density", DENSITIES)
 @pytest.mark.parametrize(("measured", "predicted"), [((4, 2), (4, 2)), ((4, 3), (5, 3)), ((3,), (3,))])
-def test_shapes_that_do_not_fit_are_refused(measured, predicted):
+def test_shapes_that_do_not_fit_are_refused(measured, predicted, density):
     with refused(ParameterError, "shape"):
-        CELL.log_likelihood(np.zeros(measured), np.zeros(predicted))
+        DENSITIES[density](CELL, np.zeros(measured), np.zeros(predicted))
