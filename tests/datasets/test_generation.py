@@ -18,9 +18,8 @@ from tactile_bayes.datasets.generation import generate_records
 from tactile_bayes.datasets.shard import records_as_dataset
 from tactile_bayes.datasets.specification_text import left_out
 from tactile_bayes.errors import ParameterError, SpecificationError, StrainWarning
-from tactile_bayes.record import in_frame
+from tactile_bayes.record import CHANNELS, in_frame
 
-LOADS = ("holding_moment", "force_x", "force_y")
 CONTACT = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 FALSE_ALARM = 1e-4
 """Of each statistical test here."""
@@ -103,8 +102,8 @@ def test_the_truth_is_what_a_scan_of_the_contour_says(spec):
             # Whether a sample at the very snap-off is loaded, rounding decides.
             sure = np.abs(angles - events.snap_off.drive_angle) > 1e-9
             sure &= np.abs(angles - events.first_contact.drive_angle) > 1e-9
-            largest = max(np.abs(theirs[name].values).max() for name in LOADS[1:])
-            for name in LOADS:
+            largest = max(np.abs(theirs[name].values).max() for name in CHANNELS[1:])
+            for name in CHANNELS:
                 scale = np.abs(theirs[name].values).max() if name == "holding_moment" else largest
                 np.testing.assert_allclose(
                     one[f"truth_{name}"].values[sure],
@@ -209,8 +208,8 @@ def test_readings_are_those_of_the_load_cell_that_the_record_states(cell, frame)
         stated = tb.LoadCell.from_record(one) or tb.LoadCell()
         assert set(stated.entries()) <= set(cell)
         rng = np.random.default_rng(np.random.SeedSequence(spec["seed"], spawn_key=(i, 1)))
-        truth = np.stack([one[f"truth_{name}"].values for name in LOADS], axis=-1)
-        readings = np.stack([one[name].values for name in LOADS], axis=-1)
+        truth = np.stack([one[f"truth_{name}"].values for name in CHANNELS], axis=-1)
+        readings = np.stack([one[name].values for name in CHANNELS], axis=-1)
         np.testing.assert_array_equal(readings, stated.simulate(truth, seed=rng))
         if "drive_angle_noise" in cell:
             wrong = one.drive_angle.values - one.truth_drive_angle.values - stated.misread(one.direction.values)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from helpers.contour_posteriors import assert_near
+from helpers.contour_posteriors import TRUTH, assert_near
 from helpers.refusals import refused
 from tactile_bayes.contours import Parabola, paper_profile
 from tactile_bayes.contours.families import family_named
@@ -27,7 +27,6 @@ from tactile_bayes.record import CHANNELS, make_record
 from tactile_bayes.sweep import scan
 
 CELL = LoadCell(force_noise=0.05, moment_noise=0.02)
-TRUTH = {"a": 0.5, "q": 0.5, "x_c": 0.0}
 STATED = {
     "rigidity_scale": 1.0,
     "drive_angle_offset": 0.0,

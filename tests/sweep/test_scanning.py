@@ -13,10 +13,10 @@ from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Joined, Parabola, PowerLaw, from_function, paper_profile
 from tactile_bayes.errors import ContourError, ParameterError, ReachError
 from tactile_bayes.mechanics.rod import Rod
+from tactile_bayes.record import CHANNELS
 from tactile_bayes.sweep import equilibria, scan
 
 EPS = np.finfo(float).eps
-LOADS = ("holding_moment", "force_x", "force_y")
 
 
 # --- equilibria ------------------------------------------------------------------------------------------------------
@@ -110,7 +110,7 @@ def test_si_is_the_dimensionless_answer_in_units():
     assert one.force_x.attrs["units"] != "N"
     a, b = scan(unit), scan(big, rod=SI)
     assert a.record.sizes == b.record.sizes
-    for name in LOADS:
+    for name in CHANNELS:
         atol = 1e-9 * float(np.abs(b.record[name]).max())  # rounding of a sample just after a tip's onset
         np.testing.assert_allclose(b.record[name], a.record[name] * scale[name], rtol=1e-9, atol=atol)
     assert b.events["forward"].snap_off.contact_x == pytest.approx(a.events["forward"].snap_off.contact_x * 0.12)
@@ -125,7 +125,7 @@ def test_a_thick_rod_is_a_thin_one_on_the_parallel_curve():
         slopes = alpha if direction == "forward" else [-a for a in alpha]
         one = equilibria(thick, slopes, direction=direction, rod=Rod(diameter=d))
         two = equilibria(thin, slopes, direction=direction)
-        for name in (*LOADS, "drive_angle", "contact_arclength", "tip_angle"):
+        for name in (*CHANNELS, "drive_angle", "contact_arclength", "tip_angle"):
             np.testing.assert_allclose(one[name], two[name], rtol=1e-12, err_msg=name)
         np.testing.assert_array_equal(one.contact_phase, two.contact_phase)
         np.testing.assert_allclose([one.contact_x, one.contact_y], thick.point(slopes), rtol=1e-13)
@@ -305,7 +305,7 @@ def test_the_record(contour, base):
         assert inside.sum() > 20
         assert np.flatnonzero(inside)[0] >= 14
         assert np.flatnonzero(inside[::-1])[0] >= 14
-        for name in LOADS:
+        for name in CHANNELS:
             assert np.all(sweep[name].values[~inside] == 0)
         assert np.all(side * sweep.holding_moment.values[inside] > 0)
         np.testing.assert_array_equal(sweep.truth_contact_phase.values == "none", ~inside)
@@ -324,7 +324,7 @@ def test_the_record(contour, base):
         rates = np.nan_to_num(np.abs(around[1] - around[0]) / (2 * h), nan=1e8)
         off = np.abs(again.drive_angle.values - angle[inside])
         assert np.all(off <= 1e-12 + 8 * EPS * rates)
-        for name in LOADS:
+        for name in CHANNELS:
             bound = 1e-9 * np.abs(sweep[name].values[inside]).max()
             np.testing.assert_allclose(sweep[name].values[inside], again[name], rtol=0, atol=bound)
         x, y = contour.point(slopes)
@@ -336,7 +336,7 @@ def test_moving_pivot_and_contour_together_changes_nothing():
     """But for rounding of the moved numbers, which a tip's onset amplifies."""
     one, two = Parabola(0.5, 0.5, 0.1), Parabola(0.5, 1.25, -0.4)
     a, b = scan(one).record, scan(two, base=(-0.5, 0.75)).record
-    for name in (*LOADS, "drive_angle"):
+    for name in (*CHANNELS, "drive_angle"):
         np.testing.assert_allclose(b[name], a[name], rtol=0, atol=1e-10 * float(np.abs(a[name]).max()))
     np.testing.assert_allclose(b.truth_contact_x + 0.5, a.truth_contact_x, rtol=0, atol=1e-10)
 
@@ -362,7 +362,7 @@ def test_grids_of_ones_own():
     common = np.isin(np.round(np.degrees(fine.drive_angle) * 4), np.round(np.degrees(coarse.drive_angle) * 4))
     shared = np.isin(np.round(np.degrees(coarse.drive_angle) * 4), np.round(np.degrees(fine.drive_angle) * 4))
     assert shared.sum() > 100
-    for name in LOADS:
+    for name in CHANNELS:
         np.testing.assert_allclose(fine[name][common], coarse[name][shared], rtol=0, atol=1e-9)
     empty = scan(contour, direction="forward", drive_angles=[-3.0, -2.9]).record
     assert np.all(empty.force_y == 0)

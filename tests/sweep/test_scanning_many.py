@@ -9,8 +9,8 @@ import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.contours import Circle, Ellipse, Parabola, PowerLaw
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.record import CHANNELS
 
-LOADS = ("holding_moment", "force_x", "force_y")
 TRUTH = ("contact_x", "contact_y", "slope_angle", "contact_arclength", "tip_angle")
 ANGLES = np.linspace(0.4, 3.6, 240)
 
@@ -59,7 +59,7 @@ def test_each_is_what_its_own_scan_says(family, ranges, direction, friction, rod
         mine = many.isel(contour=i)
         near = np.abs(ANGLES - events.snap_off.drive_angle) < 1e-9
         assert bool(mine.clear) == events.clear
-        for name in LOADS:
+        for name in CHANNELS:
             largest = np.abs(record[name].values).max()
             np.testing.assert_allclose(
                 mine[name].values, record[name].values, rtol=0, atol=1e-7 * largest, err_msg=name

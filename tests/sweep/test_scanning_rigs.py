@@ -21,8 +21,7 @@ from tactile_bayes.contours import (
     paper_profile,
 )
 from tactile_bayes.errors import ClearanceWarning, ContourError, ParameterError, StrainWarning
-
-LOADS = ("holding_moment", "force_x", "force_y")
+from tactile_bayes.record import CHANNELS
 
 
 def test_several_bases_are_the_single_ones_in_one_record():
@@ -36,7 +35,7 @@ def test_several_bases_are_the_single_ones_in_one_record():
         for sweep, direction in enumerate(("forward", "backward")):
             ours = several.record.isel(sample=several.record.sweep.values == 2 * number + sweep)
             theirs = alone.record.isel(sample=alone.record.sweep.values == sweep)
-            for name in ("base_x", "base_y", "drive_angle", *LOADS, "truth_contact_x", "truth_contact_phase"):
+            for name in ("base_x", "base_y", "drive_angle", *CHANNELS, "truth_contact_x", "truth_contact_phase"):
                 np.testing.assert_array_equal(ours[name], theirs[name])
             assert several.sweeps[2 * number + sweep] == alone.events[direction] == alone.sweeps[sweep]
     with refused(ParameterError, "'forward'", "scan.sweeps"):
@@ -167,7 +166,7 @@ def test_the_largest_strain_against_integration(direction, q):
     record, greatest = result.record, 0.0
     for i in np.flatnonzero(record.truth_contact_phase.values != "none"):
         moment, fx, fy, angle, length = (
-            float(record[name][i]) for name in (*LOADS, "drive_angle", "truth_contact_arclength")
+            float(record[name][i]) for name in (*CHANNELS, "drive_angle", "truth_contact_arclength")
         )
 
         def bend(_, state, fx=fx, fy=fy):
