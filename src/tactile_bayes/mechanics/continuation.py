@@ -50,7 +50,7 @@ from tactile_bayes.mechanics.readings import (
     write_loads,
     write_states,
 )
-from tactile_bayes.mechanics.series import tail, value
+from tactile_bayes.mechanics.series import copy_rows, tail, value
 from tactile_bayes.mechanics.states import Scene
 from tactile_bayes.mechanics.stretches import BRIEF, Accuracy, Stretch, along, cut
 
@@ -172,7 +172,7 @@ def _follow_stretch(
     steadiness = 0.0
     if not folds:
         steadiness = min(max(value(curves.series[ANGLE + 1], stop) * stop / (at_end - at_begin), 0.0), 1.0)
-    curvature = largest_curvature(stop, scene.rig, curves) if asks_curvature else 0.0
+    curvature = largest_curvature(stop, 0.0, scene.rig, curves) if asks_curvature else 0.0
     fate = _NEVER
     if folds:
         # At a flat vertex the maximum and the zero of the moment coincide, and rounding must not choose between them.
@@ -259,8 +259,8 @@ def follow(
                         workspace.followed[done, c] = row[c]
                     for c in range(4):
                         workspace.followed[done, 6 + c] = end.course[c]
-                    _copy(curves.series, workspace.curves[done])
-                    _copy(curves.values, workspace.curves[done, 6:])
+                    copy_rows(curves.series, workspace.curves[done])
+                    copy_rows(curves.values, workspace.curves[done, 6:])
                     done += 1
         count -= 1
         if fate != _NEVER:  # after a maximum: does the drive angle exceed it again?
@@ -284,8 +284,8 @@ def follow(
         row = workspace.followed[k]
         stretch = _stretch(row)
         curves = workspace.brief if stretch.brief else workspace.full
-        _copy(workspace.curves[k], curves.series)
-        _copy(workspace.curves[k, 6:], curves.values)
+        copy_rows(workspace.curves[k], curves.series)
+        copy_rows(workspace.curves[k, 6:], curves.values)
         course = Course(row[6], row[7], row[8], row[9])
         part = Followed(scene, stretch, accuracy, course, curves, workspace.asked)
         there = find_samples(samples, part)
@@ -301,14 +301,6 @@ def follow(
 @compiled
 def _stretch(row: Floats) -> Stretch:
     return Stretch(row[0], row[1], row[2] > 0.0, row[3] > 0.0, int(row[4]), row[5] > 0.0)
-
-
-@compiled
-def _copy(rows: Floats, out: Floats) -> None:
-    """Copy the common part of two arrays."""
-    for c in range(min(rows.shape[0], out.shape[0])):
-        for k in range(min(rows.shape[1], out.shape[1])):
-            out[c, k] = rows[c, k]
 
 
 @compiled

@@ -241,15 +241,16 @@ def left_of(angle: float, course: Course) -> float:
 
 
 @compiled
-def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
-    """Largest curvature of the rod up to a position on a stretch [1/L], from values at the nodes; see `elastica`."""
+def largest_curvature(stop: float, rest: float, rig: Rig, curves: Curves) -> float:
+    """Largest change of the rod's curvature from its rest curvature up to a position on a stretch [1/L], from values at
+    the nodes."""
     nodes, values, curvature, series = curves.on.nodes, curves.values, curves.bend, curves.series
     (angle, moment), force_x = value_and_slope(series[ANGLE], series[0], stop), value(series[1], stop)
-    at_stop = _curvature(angle - rig.compliance * moment, moment, force_x, value(series[2], stop))
+    at_stop = _bent(rest, angle - rig.compliance * moment, moment, force_x, value(series[2], stop))
     best, count = 0, 0
     while count < nodes.size and nodes[count] < stop:
         driven, moment = values[ANGLE, count], values[0, count]
-        curvature[count] = _curvature(driven - rig.compliance * moment, moment, values[1, count], values[2, count])
+        curvature[count] = _bent(rest, driven - rig.compliance * moment, moment, values[1, count], values[2, count])
         best = count if curvature[count] > curvature[best] else best
         count += 1
     if best == 0 or best >= count - 1:
@@ -263,9 +264,14 @@ def largest_curvature(stop: float, rig: Rig, curves: Curves) -> float:
 
 
 @compiled
-def _curvature(drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
-    """Largest curvature of the rod between pivot and contact in a forward contact [1/L]."""
+def _bent(rest: float, drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
+    """Largest change of curvature between pivot and contact in a forward contact [1/L].
+
+    It is extreme at the pivot, and where the rod lies across the force, if it does so.
+    """
     cos, sin = math.cos(drive_angle), math.sin(drive_angle)
     lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
-    inflated = 2.0 * (math.hypot(force_x, force_y) - lever) if across < 0.0 else 0.0
-    return math.sqrt(moment * moment + inflated)
+    if across >= 0.0:
+        return abs(moment)
+    at_pivot = rest - moment
+    return max(abs(moment), rest + math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever)))

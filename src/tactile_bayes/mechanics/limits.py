@@ -1,4 +1,8 @@
-"""Limits of a path: whether a rod reaches the contour, first contact, and the point where the lever arm vanishes."""
+"""Limits of a path: whether a rod reaches the contour, first contact, and the point where the lever arm vanishes.
+
+At first contact the rod has its rest shape. Where that is a circular arc of curvature κ0, the rod has the angle
+asin(κ0 r/2) to the line from the pivot at the distance r from it.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["Limits", "clear_angle", "limits"]
+__all__ = ["STRAIGHT", "Approach", "Limits", "Rest", "approach", "clear_angle", "limits"]
 
 
 class _Sought(IntEnum):
@@ -20,7 +24,7 @@ class _Sought(IntEnum):
     LEVER = 0
     """Lever arm of a force across the contour."""
     TURNED = 1
-    """Given angle less the angle between the line from the pivot and the contour's direction."""
+    """Given angle less the angle between the unloaded rod and the contour's direction."""
     WITHIN = 2
     """Margin to the rod's reach."""
 
@@ -31,6 +35,35 @@ _CLEARANCE = CLEARANCE
 
 _ROUNDING = 1e-14
 """Distance from the end of the rod's reach [L] that counts as zero."""
+
+
+class Rest(NamedTuple):
+    """Rest shape of a rod."""
+
+    curvature: float
+    """Rest curvature κ0 [1/L]."""
+    reach: float
+    """Distance from pivot to tip [L]."""
+
+
+STRAIGHT = Rest(0.0, 1.0)
+
+
+class Approach(NamedTuple):
+    """First contact with an outline, as a parameter of the contour."""
+
+    reach: int
+    """A `Reachability`."""
+    distance: float
+    """Least distance of contour and pivot [L]."""
+    nearest: float
+    """Nearest point."""
+    begin: float
+    """First contact."""
+    tip_first: bool
+    """True if the tip touches first, and not a point before it."""
+    low: float
+    """Least parameter of the contour."""
 
 
 class Limits(NamedTuple):
@@ -45,34 +78,42 @@ class Limits(NamedTuple):
     end: float
     """Point where the line of force passes through the pivot, the rod is too short again, or the contour ends."""
     tip_first: bool
-    """True if the tip touches first, and not a tangent line from the pivot."""
+    """True if the tip touches first, and not a point before it."""
     runs_out: bool
     """True if the contour ends there."""
 
 
 @compiled
-def _missing(outline: Outline, what: _Sought, turned: float, p: float) -> tuple[float, float]:
+def _missing(outline: Outline, rest: Rest, what: _Sought, turned: float, p: float) -> tuple[float, float]:
     """Function whose root is sought, and its derivative."""
     at = place(outline, p)
     along, facing = frame(at)
     if what == _Sought.LEVER:
         return along, at.speed + facing * at.bend
     if what == _Sought.WITHIN:
-        return 1.0 - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
+        return rest.reach * rest.reach - at.x * at.x - at.y * at.y, -2.0 * along * at.speed
     # The angle between the line from the pivot and the contour's direction grows to the left as long as the contour
     # faces the pivot. It jumps below the pivot, where no contour is.
     bearing = math.atan2(-at.x, at.y) + 0.5 * math.pi
     rate = facing * at.speed / (at.x * at.x + at.y * at.y) + at.bend
+    if rest.curvature != 0.0:
+        distance = math.hypot(at.x, at.y)
+        sine = min(max(0.5 * rest.curvature * distance, -1.0), 1.0)
+        turned -= math.asin(sine)
+        if abs(sine) < 1.0:
+            rate -= 0.5 * rest.curvature * along * at.speed / (distance * math.sqrt((1.0 - sine) * (1.0 + sine)))
     return turned - (bearing - math.atan2(at.sin, at.cos)), rate
 
 
 @compiled
-def _root(outline: Outline, what: _Sought, turned: float, positive: float, negative: float, last_step: float) -> float:
+def _root(
+    outline: Outline, rest: Rest, what: _Sought, turned: float, positive: float, negative: float, last_step: float
+) -> float:
     """Root by Newton's method within a bracket, until a step is a given share of it."""
     p, before = 0.5 * (positive + negative), abs(negative - positive)
     settled = last_step * before
     for _ in range(100):
-        value, slope = _missing(outline, what, turned, p)
+        value, slope = _missing(outline, rest, what, turned, p)
         new, positive, negative, before = newton_step(p, value, slope, positive, negative, before)
         step = abs(new - p)
         p = new
@@ -84,61 +125,66 @@ def _root(outline: Outline, what: _Sought, turned: float, positive: float, negat
 @compiled
 def _nearest(outline: Outline, low: float, high: float, last_step: float) -> tuple[float, bool, bool]:
     """Parameter of the nearest point, and whether it lies beyond the greatest or the least parameter."""
-    beyond_high = _missing(outline, _Sought.LEVER, 0.0, high)[0] <= 0.0
-    beyond_low = _missing(outline, _Sought.LEVER, 0.0, low)[0] >= 0.0
+    beyond_high = _missing(outline, STRAIGHT, _Sought.LEVER, 0.0, high)[0] <= 0.0
+    beyond_low = _missing(outline, STRAIGHT, _Sought.LEVER, 0.0, low)[0] >= 0.0
     if beyond_high:
         return high, beyond_high, beyond_low
     if beyond_low:
         return low, beyond_high, beyond_low
-    return _root(outline, _Sought.LEVER, 0.0, high, low, last_step), beyond_high, beyond_low
+    return _root(outline, STRAIGHT, _Sought.LEVER, 0.0, high, low, last_step), beyond_high, beyond_low
 
 
 @compiled
-def _is_out(outline: Outline, p: float) -> bool:
+def _is_out(outline: Outline, rest: Rest, p: float) -> bool:
     at = place(outline, p)
-    return math.hypot(at.x, at.y) > 1.0
+    return math.hypot(at.x, at.y) > rest.reach
 
 
 @compiled
-def _first(outline: Outline, high: float, nearest: float, last_step: float) -> tuple[float, bool]:
+def _first(outline: Outline, rest: Rest, high: float, nearest: float, last_step: float) -> tuple[float, bool]:
     """Parameter of first contact, and whether the tip touches first."""
-    tangent = _root(outline, _Sought.TURNED, 0.0, high, nearest, last_step)
-    if _is_out(outline, tangent):
-        return _root(outline, _Sought.WITHIN, 0.0, nearest, tangent, last_step), True
+    tangent = _root(outline, rest, _Sought.TURNED, 0.0, high, nearest, last_step)
+    if _is_out(outline, rest, tangent):
+        return _root(outline, rest, _Sought.WITHIN, 0.0, nearest, tangent, last_step), True
     return tangent, False
 
 
 @compiled
-def limits(outline: Outline, delta: float, last_step: float) -> Limits:
-    """Limits of the path for a friction angle δ [rad]; roots are found to a share of their brackets."""
+def approach(outline: Outline, rest: Rest, last_step: float) -> Approach:
+    """First contact of a rod; roots are found to a share of their brackets."""
     low, high = ends(outline)
     nearest, beyond_high, beyond_low = _nearest(outline, low, high, last_step)
     at = place(outline, nearest)
     distance, below = math.hypot(at.x, at.y), frame(at)[1] > 0.0
-    begin, tip_first = _first(outline, high, nearest, last_step)
-
-    # With friction the line of force passes through the pivot only beyond the nearest point, if within reach.
-    end = nearest
-    if delta > 0.0:
-        largest = 0.5 * math.pi + delta
-        if _missing(outline, _Sought.TURNED, largest, low)[0] >= 0.0:
-            end = low
-        else:
-            end = _root(outline, _Sought.TURNED, largest, nearest, low, last_step)
-        if _is_out(outline, end):
-            end = _root(outline, _Sought.WITHIN, 0.0, nearest, end, last_step)
-
+    begin, tip_first = _first(outline, rest, high, nearest, last_step)
     at_high = place(outline, high)
-    open_end = frame(at_high)[1] > 0.0 and math.hypot(at_high.x, at_high.y) <= 1.0
+    open_end = frame(at_high)[1] > 0.0 and math.hypot(at_high.x, at_high.y) <= rest.reach
     reach = _TOUCHES
     if not below:
         reach = _RUNS_OUT if beyond_low and not beyond_high else _CUTS_PIVOT
     elif distance < _CLEARANCE:
         reach = _TOO_CLOSE
-    elif distance >= 1.0 - _ROUNDING:
+    elif distance >= rest.reach - _ROUNDING:
         reach = _TOO_FAR
     elif beyond_high or open_end:
         reach = _ENDS
+    return Approach(reach, distance, nearest, begin, tip_first, low)
+
+
+@compiled
+def limits(outline: Outline, delta: float, last_step: float) -> Limits:
+    """Limits of the path of a straight rod for a friction angle δ [rad]; see `approach`."""
+    reach, distance, nearest, begin, tip_first, low = approach(outline, STRAIGHT, last_step)
+    # With friction the line of force passes through the pivot only beyond the nearest point, if within reach.
+    end = nearest
+    if delta > 0.0:
+        largest = 0.5 * math.pi + delta
+        if _missing(outline, STRAIGHT, _Sought.TURNED, largest, low)[0] >= 0.0:
+            end = low
+        else:
+            end = _root(outline, STRAIGHT, _Sought.TURNED, largest, nearest, low, last_step)
+        if _is_out(outline, STRAIGHT, end):
+            end = _root(outline, STRAIGHT, _Sought.WITHIN, 0.0, nearest, end, last_step)
     return Limits(reach, distance, begin, end, tip_first, end == low)
 
 
@@ -147,6 +193,6 @@ def clear_angle(outline: Outline, last_step: float) -> float:
     """Drive angle beyond which a straight rod has passed the contour: first contact of the opposite sweep [rad]."""
     opposite = mirrored(outline)
     low, high = ends(opposite)
-    begin, _ = _first(opposite, high, _nearest(opposite, low, high, last_step)[0], last_step)
+    begin, _ = _first(opposite, STRAIGHT, high, _nearest(opposite, low, high, last_step)[0], last_step)
     at = place(opposite, begin)
     return math.pi - math.atan2(at.y, at.x)

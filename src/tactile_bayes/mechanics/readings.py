@@ -24,6 +24,7 @@ __all__ = [
     "Samples",
     "asked",
     "find_samples",
+    "look_for",
     "polish_states",
     "write_loads",
     "write_states",
@@ -124,7 +125,7 @@ def _before(angles: Floats, angle: float) -> int:
 
 
 @compiled
-def _look_for(part: Followed, count: int) -> None:
+def look_for(part: Followed, count: int) -> None:
     """Convert the stretched drive angles of samples to positions z on the stretch, as 4z − 2.
 
     Newton's method starts between the nodes of the series, for all samples together; samples for which it does not
@@ -165,7 +166,7 @@ def _look_for(part: Followed, count: int) -> None:
 def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
     """Write the loads of the samples on a stretch, from the series."""
     count, rig, curves, workspace = samples.rows.size, part.scene.rig, part.curves, part.workspace
-    _look_for(part, count)
+    look_for(part, count)
     sideward = rig.sign * rig.rigidity
     at_all(curves.series[:REST], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
@@ -193,7 +194,7 @@ def write_states(samples: Samples, part: Followed, out: Found) -> None:
     off = value(curves.series[ANGLE], course.stop) - course.end
     for j in range(count):
         workspace.wanted[j] += off
-    _look_for(part, count)
+    look_for(part, count)
     at_all(curves.series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
         row = samples.rows[j]

@@ -12,7 +12,18 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.numerics import chebyshev
 
-__all__ = ["Nodes", "at_all", "change_of", "crossing", "nodes_of", "tail", "value", "value_and_slope", "weighted"]
+__all__ = [
+    "Nodes",
+    "at_all",
+    "change_of",
+    "copy_rows",
+    "crossing",
+    "nodes_of",
+    "tail",
+    "value",
+    "value_and_slope",
+    "weighted",
+]
 
 
 class Nodes(NamedTuple):
@@ -127,3 +138,11 @@ def crossing(
         if not step > settled or missing == 0.0:
             break
     return z
+
+
+@compiled
+def copy_rows(rows: Floats, out: Floats) -> None:
+    """Copy the common part of two arrays."""
+    for c in range(min(rows.shape[0], out.shape[0])):
+        for k in range(min(rows.shape[1], out.shape[1])):
+            out[c, k] = rows[c, k]

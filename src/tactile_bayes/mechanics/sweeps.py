@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
+from tactile_bayes.mechanics.branch import BranchScene, BranchWorkspace, branch_workspace, follow_branch
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.continuation import MOST_CHANGES, PathWorkspace, follow, path_workspace
-from tactile_bayes.mechanics.limits import clear_angle
+from tactile_bayes.mechanics.continuation import MOST_CHANGES
+from tactile_bayes.mechanics.limits import STRAIGHT, clear_angle
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
-from tactile_bayes.mechanics.states import Rig, Scene
+from tactile_bayes.mechanics.states import Rig
 from tactile_bayes.mechanics.stretches import Accuracy
-from tactile_bayes.mechanics.tables import MOST_FRICTION, Tables, Workspace, prepare, tables, workspace
+from tactile_bayes.mechanics.tables import Tables, Workspace, prepare, tables, workspace
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_sweeps"]
 
@@ -33,7 +34,7 @@ _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
 _FAST = Accuracy(resolved=1e-3, sharp=1e-6, halvings=12, first_step=1e-6, last_step=1e-4, polished=True)
 """Accuracy that noise requires."""
 
-_EXACT_ORDER, _FAST_ORDER = 32, 16
+_EXACT_ORDER, _FAST_ORDER = 32, 12
 """Numbers of nodes on a stretch."""
 
 _NEVER_MISSED = np.full(3, np.inf)
@@ -161,7 +162,7 @@ def _solve(
     asks_clearance: bool,
     known: Tables,
     states: Workspace,
-    workspace: PathWorkspace,
+    workspace: BranchWorkspace,
     table: Floats,
     loads: Floats,
     all_states: Floats,
@@ -199,8 +200,8 @@ def _solve(
             prepare(known, prepared, states)
         rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
         found = Found(loads[c], all_states[c], changes[i])
-        scene = Scene(outline, rig, exact or prepared > MOST_FRICTION, known, states)
-        ends = follow(scene, knots, samples, accuracy, tolerance, workspace, found)
+        scene = BranchScene(outline, STRAIGHT, rig, exact)
+        ends = follow_branch(scene, knots, samples, accuracy, tolerance, workspace, found)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
         event.snap_angle, event.snap_parameter = ends.snap_angle, ends.snap_parameter
@@ -263,7 +264,7 @@ def solve_sweeps(
         asks_clearance,
         tables(),
         workspace(),
-        path_workspace(longest, order, shapes.knots.shape[1]),
+        branch_workspace(longest, order, shapes.knots.shape[1]),
         np.empty(shapes.tables.shape[1:]),
         loads,
         all_states,

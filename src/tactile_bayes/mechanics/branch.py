@@ -1,0 +1,479 @@
+"""The branch of equilibria of any rod along one contour, from first contact to snap-off.
+
+The branch is followed in legs (`leg`), which are halved until the tails of their series are small enough. A leg ends
+where the phase changes or the contour is not smooth. As on the path of a straight rod (`path`), the first maximum of
+the drive angle is the snap-off, unless the dip after it is shallow.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.curves import (
+    ANGLE,
+    DIP,
+    LOST,
+    REST,
+    WAY,
+    Course,
+    Curves,
+    first_fall,
+    largest_curvature,
+    lay_over_angle,
+    left_of,
+    regained,
+)
+from tactile_bayes.mechanics.equilibrium import SETTLED, Balance, Equilibrium, Loaded, balance, dot, settle
+from tactile_bayes.mechanics.leg import (
+    NUDGE,
+    Before,
+    Leg,
+    LegCurves,
+    first_equilibrium,
+    guess,
+    leg_curves,
+    leg_from,
+    sample_leg,
+    settle_on,
+    shortened,
+)
+from tactile_bayes.mechanics.limits import Rest, approach
+from tactile_bayes.mechanics.outline import Outline, ends, place
+from tactile_bayes.mechanics.continuation import Ends
+from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
+from tactile_bayes.mechanics.readings import Asked, Followed, Found, Samples, asked, find_samples, look_for, write_loads
+from tactile_bayes.mechanics.series import (
+    at_all,
+    change_of,
+    copy_rows,
+    crossing,
+    tail,
+    value,
+    value_and_slope,
+    weighted,
+)
+from tactile_bayes.mechanics.states import Rig
+from tactile_bayes.mechanics.stretches import Accuracy
+
+__all__ = ["BranchScene", "BranchWorkspace", "branch_workspace", "follow_branch"]
+
+_FIRST = 0.5
+"""Length of the first leg; see `leg_from`."""
+
+_LONGEST, _SHORTEST = 1.0, 1e-6
+"""Lengths between which those of legs lie."""
+
+_ACCEPT = 0.2
+_FLOOR = 1e-2
+_AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.03, 0.8, 0.3, 2.0
+"""Share of the tolerated error that is aimed at, and bounds on the change of the length."""
+
+_MOST = 160
+"""Largest number of legs of a path."""
+
+_IN_A_DIP = 1e-5
+"""Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
+
+_NO_MOMENT = 1e-12
+"""Holding moment [EI/L] that counts as zero."""
+
+_ROUNDING = 1e-14
+"""Tail of the series of a drive angle that its rounding leaves [rad]."""
+
+_SETTLED = 1e-14
+"""Share of a leg by which an exact state may miss its drive angle; the series correct for it."""
+
+_TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
+_NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
+
+
+_BY_P, _BY_Q = Equilibrium(1.0, 0.0, 0.0), Equilibrium(0.0, 1.0, 0.0)
+
+
+class BranchScene(NamedTuple):
+    """All that a branch depends on: one contour in the sweep frame, the rod at rest, and the rig."""
+
+    outline: Outline
+    rest: Rest
+    rig: Rig
+    exact: bool
+    """True if events are computed to rounding."""
+
+
+class BranchWorkspace(NamedTuple):
+    """Workspace for one branch, reused for the next."""
+
+    leg: LegCurves
+    asked: Asked
+    knots: Floats
+    """Parameters at which the contour may not be smooth."""
+    followed: Floats
+    """Legs that have been followed, as in `Leg` and `Course`, shape (legs, 14)."""
+    curves: Floats
+    """Their series, shape (legs, 7, order)."""
+
+
+def branch_workspace(samples: int, order: int, knots: int) -> BranchWorkspace:
+    """Workspace for at most so many samples, with `order` nodes on a leg and `knots` knots of the contour."""
+    return BranchWorkspace(
+        leg_curves(order), asked(samples), np.empty(knots), np.empty((_MOST, 14)), np.empty((_MOST, 7, order))
+    )
+
+
+@compiled
+def _loaded(scene: BranchScene, tip: bool) -> Loaded:
+    rig = scene.rig
+    return Loaded(scene.outline, scene.rest.curvature, rig.friction_angle, rig.compliance, tip)
+
+
+@compiled
+def _knot(leg: Leg, knots: Floats, low: float, work: LegCurves) -> tuple[float, float]:
+    """First knot or end of the contour that a leg passes, and a position behind it; above 1 if it passes none."""
+    before = leg.begin.p
+    for k in range(work.nodes.size + 1):
+        way = 1.0 if k == work.nodes.size else work.nodes[k]
+        after = value(work.place, way)
+        for i in range(-1, knots.size):
+            knot = low if i < 0 else knots[i]
+            if (before - knot) * (after - knot) < 0.0 and abs(leg.begin.p - knot) > NUDGE:
+                return knot, way
+        before = after
+    return math.nan, 2.0
+
+
+@compiled
+def _excess(accuracy: Accuracy, tolerance: Floats, dips: bool, work: LegCurves) -> float:
+    """Estimated error of the series over the tolerated one; see `curves.misses`."""
+    curves = work.curves
+    angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
+    if dips:
+        return angle / (_IN_A_DIP * DIP)
+    found = max(angle / max(accuracy.resolved * change, _ROUNDING), angle / accuracy.sharp)
+    for c in range(3):
+        loads = curves.series[c]
+        found = max(found, (tail(loads) + angle * change_of(loads) / change) / tolerance[c])
+    if not accuracy.polished:
+        for c in range(ANGLE):
+            found = max(found, tail(curves.series[c]) / (accuracy.resolved * max(change_of(curves.series[c]), 1.0)))
+    return found
+
+
+@compiled
+def _change(leg: Leg, delta: float, accuracy: Accuracy, work: LegCurves) -> float:
+    """Position at which the phase changes; above 1 if it does not."""
+    curves, limit, sign = work.curves, 1.0, 1.0
+    if leg.tip:
+        limit, sign = -delta, -1.0
+    on, rest = curves.on, curves.series[REST]
+    weighted(on.on_grid, rest, curves.on_grid)
+    for cell in range(1, on.grid.size):
+        if sign * (curves.on_grid[cell] - limit) > 0.0:
+            weighted(on.slopes, rest, work.rest_slope)
+            left, right = on.grid[cell - 1], on.grid[cell]
+            if not leg.tip:
+                left, right = right, left
+            return crossing(rest, work.rest_slope, limit, left, right, 0.5 * (left + right), accuracy.last_step)
+    return 2.0
+
+
+@compiled
+def _polished_fold(loaded: Loaded, leg: Leg, stop: float, work: LegCurves) -> float:
+    """Position at which the exact derivative of the drive angle vanishes, by secants from the interpolant."""
+    curves = work.curves
+    weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
+    bend = value(curves.bend, stop)
+    at_stop, last = settle_on(loaded, leg, stop, guess(work, stop), SETTLED).angle_rate, 2e-2
+    for _ in range(7):
+        step = at_stop / bend
+        if not abs(step) < 0.5 * last:
+            break
+        new = min(max(stop - step, 0.0), 1.0)
+        at_new = settle_on(loaded, leg, new, guess(work, new), SETTLED).angle_rate
+        bend = (at_new - at_stop) / (new - stop)
+        stop, at_stop, last = new, at_new, abs(step)
+    return stop
+
+
+@compiled
+def _share(leg: Leg, found: Balance) -> float:
+    """Position on a leg."""
+    at, begin = found.at, leg.begin
+    return dot(leg.normal, Equilibrium(at.p - begin.p, at.q - begin.q, at.force - begin.force))
+
+
+@compiled
+def _past(loaded: Loaded, at_knot: Balance) -> Balance:
+    """Equilibrium at a knot, with the tangent and the rates behind it."""
+    at = at_knot.at
+    behind = Equilibrium(at.p + math.copysign(NUDGE, at_knot.tangent.p), at.q, at.force)
+    rates = balance(loaded, behind)[0]
+    return Balance(
+        at,
+        at_knot.drive_angle,
+        at_knot.holding_moment,
+        at_knot.force_x,
+        at_knot.force_y,
+        rates.tangent,
+        rates.angle_rate,
+        rates.moment_rate,
+        rates.x_rate,
+        rates.y_rate,
+    )
+
+
+@compiled
+def _bent(stop: float, scene: BranchScene, curves: Curves) -> float:
+    """Largest change of the rod's curvature up to a position on a leg."""
+    for c in range(5):
+        for k in range(curves.on.nodes.size):
+            curves.values[c, k] = value(curves.series[c], curves.on.nodes[k])
+    return largest_curvature(stop, scene.rest.curvature, scene.rig, curves)
+
+
+@compiled
+def follow_branch(
+    scene: BranchScene,
+    knots: Floats,
+    samples: Samples,
+    accuracy: Accuracy,
+    tolerance: Floats,
+    workspace: BranchWorkspace,
+    found: Found,
+) -> Ends:
+    """Follow a branch from first contact to snap-off; arguments as of `path.follow`."""
+    outline, rig, work = scene.outline, scene.rig, workspace.leg
+    curves = work.curves
+    near = approach(outline, scene.rest, accuracy.first_step)
+    if near.reach != _TOUCHES:
+        return _nothing(near.reach, near.distance)
+    low, delta = ends(outline)[0], rig.friction_angle
+    loaded = _loaded(scene, near.tip_first)
+    z = first_equilibrium(loaded, scene.rest, near)
+    begin = balance(loaded, z)[0]
+    first = begin.drive_angle
+    nowhere = Equilibrium(math.nan, math.nan, math.nan)
+    onset, nothing = Equilibrium(0.0, 0.0, 1.0), Before(nowhere, nowhere)
+    onward_from, behind_begin, length, known = onset, nothing, _FIRST, 0.0
+    settled, power = max(SETTLED, 0.3 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
+    begin_angle, snap_parameter, fate = first, z.p, _NEVER
+    changes, largest, is_first, done, runs_out = 0, math.nan, True, 0, False
+    wants_states = found.changes.shape[0] > 0
+    for _ in range(_MOST):
+        leg = leg_from(loaded, begin, onward_from, length)
+        sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, known, settled, work)
+        known, knot = 0.0, math.nan
+        if sound:
+            knot, node = _knot(leg, knots, low, work)
+            if node <= 1.0:
+                share = _share(leg, settle(loaded, guess(work, node), Equilibrium(knot, 0.0, 0.0), _BY_P, 0.0, SETTLED))
+                leg = shortened(leg, share)
+                sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, share, settled, work)
+        excess = _excess(accuracy, tolerance, fate != _NEVER, work) if sound else math.inf
+        pace = min(max((_AIM / excess) ** power, _LEAST_PACE), _MOST_PACE) if sound else _LEAST_PACE
+        if scene.exact and excess < _FLOOR:
+            pace = _MOST_PACE
+        if not excess <= _ACCEPT and length > (_LONGEST * 0.5**accuracy.halvings if sound else _SHORTEST):
+            length *= min(pace, _BACK)
+            known = min(pace, _BACK) if sound and math.isnan(knot) else 0.0
+            continue
+        if not sound:
+            break
+        change, at_change = _change(leg, delta, accuracy, work), begin
+        if change <= 1.0:
+            limit = Equilibrium(0.0, -delta if leg.tip else 1.0, 0.0)
+            at_change = settle(loaded, guess(work, change), limit, _BY_Q, 0.0, SETTLED)
+            change = min(max(_share(leg, at_change), 0.0), 1.0)
+        last, behind = min(change, 1.0), -1.0
+        if fate == _NEVER:
+            stop = first_fall(accuracy, is_first, curves)
+            if stop == 0.0:
+                fate, behind = _THRUST if abs(begin.holding_moment) <= _NO_MOMENT else _CORNER, 0.0
+            else:
+                folds, stop = stop <= last, min(stop, last)
+                if folds and scene.exact:
+                    stop = _polished_fold(loaded, leg, stop, work)
+                until = at_change if change <= 1.0 else end
+                if folds:
+                    until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
+                snap_parameter, steadiness = until.at.p, 0.0
+                if folds:
+                    fate = _THRUST if abs(until.holding_moment) <= _NO_MOMENT else _FOLD
+                else:
+                    rate = value(curves.series[ANGLE + 1], stop)
+                    steadiness = min(max(rate * stop / (until.drive_angle - begin_angle), 0.0), 1.0)
+                if wants_states:
+                    bent = _bent(stop, scene, curves)
+                    largest = bent if math.isnan(largest) else max(bent, largest)
+                if found.changes.shape[0] > changes and (
+                    not changes or (found.changes[changes - 1, 1] > 0.0) != leg.tip
+                ):
+                    found.changes[changes, 0], found.changes[changes, 1] = leg.begin.p, leg.tip
+                    changes += 1
+                if samples.angles.size:
+                    _store(leg, Course(stop, begin_angle, until.drive_angle, steadiness), work, workspace, done)
+                    done += 1
+                begin_angle, is_first, behind = until.drive_angle, False, stop
+        onward = 2.0
+        if fate != _NEVER:
+            if change < 1.0:
+                sample_leg(loaded, shortened(leg, change), begin, nothing, change, settled, work)
+                behind = min(behind / change, 1.0)
+            onward = regained(behind, begin_angle, curves)
+            if onward == LOST:
+                break
+        behind_begin, onward_from = nothing, leg.along
+        if onward <= 1.0:
+            fate = _NEVER
+            begin = settle_on(loaded, leg, last * onward, guess(work, onward), SETTLED)
+            onward_from = begin.tangent
+        elif change <= 1.0:
+            loaded = _loaded(scene, not leg.tip)
+            begin = balance(loaded, Equilibrium(at_change.at.p, 1.0 if leg.tip else -delta, at_change.at.force))[0]
+            onward_from = Equilibrium(0.0, -1.0 if leg.tip else 1.0, 0.0)
+        elif math.isnan(knot):
+            behind_begin = last_before
+            begin, onward_from = end, end.tangent
+        else:
+            begin, onward_from = _past(loaded, end), end.tangent
+            if knot == low:
+                runs_out = True
+                break
+        length = min(pace * length, _LONGEST)
+        if not math.isfinite(begin.at.p):
+            break
+    if fate == _NEVER:
+        return _nothing(_RUNS_OUT if runs_out else _GRAZES, near.distance)
+    if not begin_angle > first:
+        return _nothing(_GRAZES, near.distance)
+    if samples.relative:
+        for j in range(samples.angles.size):
+            workspace.asked.angles[j] = first + samples.angles[j] * (begin_angle - first) + rig.offset
+        samples = Samples(workspace.asked.angles[: samples.angles.size], samples.rows, False)
+    for k in range(done):
+        leg, course = _recall(work, workspace, k)
+        part = Followed(scene, leg, accuracy, course, curves, workspace.asked)
+        there = find_samples(samples, part)
+        if not wants_states:
+            write_loads(there, part, found.loads)
+        elif accuracy.polished:
+            _polish_states(there, part, work, found)
+        else:
+            _write_states(there, part, work, found)
+    return Ends(_TOUCHES, near.distance, first, near.begin, begin_angle, snap_parameter, fate, changes, largest)
+
+
+@compiled
+def _store(leg: Leg, course: Course, work: LegCurves, workspace: BranchWorkspace, k: int) -> None:
+    row, curves = workspace.followed[k], work.curves
+    for c in range(3):
+        row[c], row[3 + c], row[6 + c] = leg.begin[c], leg.along[c], leg.normal[c]
+    row[9] = leg.tip
+    for c in range(4):
+        row[10 + c] = course[c]
+    copy_rows(curves.series, workspace.curves[k])
+    for i in range(work.place.size):
+        workspace.curves[k, 6, i] = work.place[i]
+
+
+@compiled
+def _recall(work: LegCurves, workspace: BranchWorkspace, k: int) -> tuple[Leg, Course]:
+    row, curves = workspace.followed[k], work.curves
+    copy_rows(workspace.curves[k], curves.series)
+    for i in range(work.place.size):
+        work.place[i] = workspace.curves[k, 6, i]
+        curves.values[ANGLE, i] = value(curves.series[ANGLE], curves.on.nodes[i])
+    begin, along = Equilibrium(row[0], row[1], row[2]), Equilibrium(row[3], row[4], row[5])
+    leg = Leg(begin, along, Equilibrium(row[6], row[7], row[8]), row[9] > 0.0)
+    return leg, Course(row[10], row[11], row[12], row[13])
+
+
+@compiled
+def _nothing(reach: int, distance: float) -> Ends:
+    return Ends(reach, distance, math.nan, math.nan, math.nan, math.nan, _NEVER, 0, math.nan)
+
+
+@compiled
+def _note(row: int, p: float, q: float, tip: bool, scene: BranchScene, out: Found) -> None:
+    """Write phase and place of a state, and the loads of its row."""
+    states, rig = out.states[row], scene.rig
+    at = place(scene.outline, p)
+    alpha = math.atan2(at.sin, at.cos)
+    states[0] = TIP if tip else TANGENTIAL
+    states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
+    states[9], states[10] = (1.0, alpha + rig.friction_angle + q) if tip else (q, alpha)
+    states[11], states[12] = math.nan, math.nan
+    for c in range(3):
+        out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]
+
+
+@compiled
+def _write_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
+    """Write the states of the samples on a leg, from the series."""
+    course, curves, workspace = part.course, part.curves, part.workspace
+    count = samples.rows.size
+    # Just before the end of contact the last drive angle matters.
+    off = value(curves.series[ANGLE], course.stop) - course.end
+    for j in range(count):
+        workspace.wanted[j] += off
+    look_for(part, count)
+    at_all(curves.series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
+    for j in range(count):
+        row = samples.rows[j]
+        states = out.states[row]
+        states[5] = workspace.wanted[j] - off - part.scene.rig.compliance * workspace.found[0, j]
+        for c in range(3):
+            states[6 + c] = workspace.found[c, j]
+        p = value(work.place, 0.25 * (workspace.twice[j] + 2.0))
+        _note(row, p, workspace.found[REST, j], part.stretch.tip, part.scene, out)
+
+
+@compiled
+def _polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
+    """Write exact states at the drive angles of the samples on a leg, by Newton's method in the stretched angle."""
+    scene, leg, course, curves, workspace = part.scene, part.stretch, part.course, part.curves, part.workspace
+    stop, steadiness, over_angle = course.stop, course.steadiness, curves.over_angle
+    loaded = _loaded(scene, leg.tip)
+    lay_over_angle(part.accuracy, course, curves)
+    weighted(curves.on.slopes, over_angle[WAY], curves.bend)
+    for j in range(samples.rows.size):
+        row, target = samples.rows[j], 0.25 * (workspace.twice[j] + 2.0)
+        way, pace = value_and_slope(over_angle[WAY], curves.bend, target)
+        way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle falls again
+        low, high, before = 0.0, stop, stop
+        for _ in range(100):
+            state = settle_on(loaded, leg, way, guess(work, way), SETTLED)
+            # Rounding may undo the very first contact.
+            turned = 1.0 - left_of(state.drive_angle, course) if math.isfinite(state.drive_angle) else 0.0
+            missing = target - turned
+            if abs(missing) <= _SETTLED or not high > low:
+                break
+            if missing > 0.0:
+                low = way
+            else:
+                high = way
+            rate = state.angle_rate
+            newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
+            # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
+            new = way + missing * (newton if newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target) else pace)
+            if not (low < new < high and abs(new - way) <= 0.5 * before):
+                new = 0.5 * (low + high)
+            before = abs(new - way)
+            if new == way or not before > 0.0:
+                break
+            way = new
+        if not math.isfinite(state.drive_angle):
+            continue
+        # The digits of a position are limited: the interpolant corrects for the remaining distance to the angle.
+        reached = 1.0 - left_of(state.drive_angle, course)
+        states = out.states[row]
+        states[5] = state.drive_angle - scene.rig.compliance * state.holding_moment
+        states[6], states[7], states[8] = state.holding_moment, state.force_x, state.force_y
+        for c in range(3):
+            states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
+        _note(row, state.at.p, state.at.q, leg.tip, scene, out)
