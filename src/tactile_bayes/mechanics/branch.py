@@ -14,6 +14,7 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.continuation import Ends
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     DIP,
@@ -44,7 +45,6 @@ from tactile_bayes.mechanics.leg import (
 )
 from tactile_bayes.mechanics.limits import Rest, approach
 from tactile_bayes.mechanics.outline import Outline, ends, place
-from tactile_bayes.mechanics.continuation import Ends
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import Asked, Followed, Found, Samples, asked, find_samples, look_for, write_loads
@@ -208,10 +208,10 @@ def _share(leg: Leg, found: Balance) -> float:
 
 
 @compiled
-def _past(loaded: Loaded, at_knot: Balance) -> Balance:
+def _past(loaded: Loaded, at_knot: Balance, sense: float) -> Balance:
     """Equilibrium at a knot, with the tangent and the rates behind it."""
     at = at_knot.at
-    behind = Equilibrium(at.p + math.copysign(NUDGE, at_knot.tangent.p), at.q, at.force)
+    behind = Equilibrium(at.p + math.copysign(NUDGE, sense), at.q, at.force)
     rates = balance(loaded, behind)[0]
     return Balance(
         at,
@@ -261,26 +261,28 @@ def follow_branch(
     onset, nothing = Equilibrium(0.0, 0.0, 1.0), Before(nowhere, nowhere)
     onward_from, behind_begin, length, known = onset, nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.3 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
+    shortest = _LONGEST * 0.5**accuracy.halvings
     begin_angle, snap_parameter, fate = first, z.p, _NEVER
     changes, largest, is_first, done, runs_out = 0, math.nan, True, 0, False
     wants_states = found.changes.shape[0] > 0
     for _ in range(_MOST):
         leg = leg_from(loaded, begin, onward_from, length)
         sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, known, settled, work)
-        known, knot = 0.0, math.nan
+        known, knot, at_knot = 0.0, math.nan, begin
         if sound:
             knot, node = _knot(leg, knots, low, work)
-            if node <= 1.0:
-                share = _share(leg, settle(loaded, guess(work, node), Equilibrium(knot, 0.0, 0.0), _BY_P, 0.0, SETTLED))
-                leg = shortened(leg, share)
+            if node <= 1.0:  # rates at the end are those before the knot
+                at_knot = settle(loaded, guess(work, node), Equilibrium(knot, 0.0, 0.0), _BY_P, 0.0, SETTLED)
+                share = _share(leg, at_knot) * (1.0 - NUDGE)
+                leg, length = shortened(leg, share), share * length
                 sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, share, settled, work)
         excess = _excess(accuracy, tolerance, fate != _NEVER, work) if sound else math.inf
         pace = min(max((_AIM / excess) ** power, _LEAST_PACE), _MOST_PACE) if sound else _LEAST_PACE
         if scene.exact and excess < _FLOOR:
             pace = _MOST_PACE
-        if not excess <= _ACCEPT and length > (_LONGEST * 0.5**accuracy.halvings if sound else _SHORTEST):
+        if not excess <= _ACCEPT and length > (shortest if sound else _SHORTEST):
             length *= min(pace, _BACK)
-            known = min(pace, _BACK) if sound and math.isnan(knot) else 0.0
+            known = min(pace, _BACK) if sound else 0.0
             continue
         if not sound:
             break
@@ -298,7 +300,9 @@ def follow_branch(
                 folds, stop = stop <= last, min(stop, last)
                 if folds and scene.exact:
                     stop = _polished_fold(loaded, leg, stop, work)
-                until = at_change if change <= 1.0 else end
+                until = end if math.isnan(knot) else at_knot
+                if change <= 1.0:
+                    until = at_change
                 if folds:
                     until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
                 snap_parameter, steadiness = until.at.p, 0.0
@@ -340,11 +344,11 @@ def follow_branch(
             behind_begin = last_before
             begin, onward_from = end, end.tangent
         else:
-            begin, onward_from = _past(loaded, end), end.tangent
+            begin, onward_from = _past(loaded, at_knot, end.tangent.p), end.tangent
             if knot == low:
                 runs_out = True
                 break
-        length = min(pace * length, _LONGEST)
+        length = max(min(pace * length, _LONGEST), shortest)
         if not math.isfinite(begin.at.p):
             break
     if fate == _NEVER:
