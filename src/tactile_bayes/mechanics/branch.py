@@ -29,9 +29,10 @@ from tactile_bayes.mechanics.curves import (
     left_of,
     regained,
 )
-from tactile_bayes.mechanics.equilibrium import SETTLED, Balance, Equilibrium, Loaded, balance, dot, settle
+from tactile_bayes.mechanics.equilibrium import SETTLED, Balance, Equilibrium, Loaded, balance, dot, settle, settle_at
 from tactile_bayes.mechanics.leg import (
     NUDGE,
+    PLACE,
     Before,
     Leg,
     LegCurves,
@@ -70,7 +71,7 @@ _LONGEST, _SHORTEST = 1.0, 1e-6
 """Lengths between which those of legs lie."""
 
 _ACCEPT = 0.2
-_FLOOR = 1e-2
+_FLOOR, _NOISE = 1e-2, 1e3
 _AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.03, 0.8, 0.3, 2.0
 """Share of the tolerated error that is aimed at, and bounds on the change of the length."""
 
@@ -93,7 +94,7 @@ _TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 
 
-_BY_P, _BY_Q = Equilibrium(1.0, 0.0, 0.0), Equilibrium(0.0, 1.0, 0.0)
+_BY_Q = Equilibrium(0.0, 1.0, 0.0)
 
 
 class BranchScene(NamedTuple):
@@ -134,16 +135,15 @@ def _loaded(scene: BranchScene, tip: bool) -> Loaded:
 
 @compiled
 def _knot(leg: Leg, knots: Floats, low: float, work: LegCurves) -> tuple[float, float]:
-    """First knot or end of the contour that a leg passes, and a position behind it; above 1 if it passes none."""
-    before = leg.begin.p
-    for k in range(work.nodes.size + 1):
-        way = 1.0 if k == work.nodes.size else work.nodes[k]
-        after = value(work.place, way)
+    """First knot or end of the contour that a leg passes, and about where; a position above 1 if it passes none."""
+    before, old = leg.begin.p, 0.0
+    for k in range(1, work.nodes.size):
+        after = work.at_nodes[PLACE, k]
         for i in range(-1, knots.size):
             knot = low if i < 0 else knots[i]
             if (before - knot) * (after - knot) < 0.0 and abs(leg.begin.p - knot) > NUDGE:
-                return knot, way
-        before = after
+                return knot, old + (work.nodes[k] - old) * (before - knot) / (before - after)
+        before, old = after, work.nodes[k]
     return math.nan, 2.0
 
 
@@ -261,7 +261,7 @@ def follow_branch(
     onset, nothing = Equilibrium(0.0, 0.0, 1.0), Before(nowhere, nowhere)
     onward_from, behind_begin, length, known = onset, nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.3 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
-    shortest = _LONGEST * 0.5**accuracy.halvings
+    shortest, excess_before = _LONGEST * 0.5**accuracy.halvings, math.inf
     begin_angle, snap_parameter, fate = first, z.p, _NEVER
     changes, largest, is_first, done, runs_out = 0, math.nan, True, 0, False
     wants_states = found.changes.shape[0] > 0
@@ -272,20 +272,26 @@ def follow_branch(
         if sound:
             knot, node = _knot(leg, knots, low, work)
             if node <= 1.0:  # rates at the end are those before the knot
-                at_knot = settle(loaded, guess(work, node), Equilibrium(knot, 0.0, 0.0), _BY_P, 0.0, SETTLED)
+                at_knot = settle_at(loaded, knot, guess(work, node))
                 share = _share(leg, at_knot) * (1.0 - NUDGE)
+                if not share > 0.0:
+                    length *= _LEAST_PACE
+                    continue
                 leg, length = shortened(leg, share), share * length
                 sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, share, settled, work)
         excess = _excess(accuracy, tolerance, fate != _NEVER, work) if sound else math.inf
         pace = min(max((_AIM / excess) ** power, _LEAST_PACE), _MOST_PACE) if sound else _LEAST_PACE
         if scene.exact and excess < _FLOOR:
             pace = _MOST_PACE
-        if not excess <= _ACCEPT and length > (shortest if sound else _SHORTEST):
+        noisy = 0.5 * excess_before < excess < _NOISE  # rounding, which a shorter leg does not make smaller
+        excess_before = excess
+        if not (excess <= _ACCEPT or noisy) and length > (shortest if sound else _SHORTEST):
             length *= min(pace, _BACK)
             known = min(pace, _BACK) if sound else 0.0
             continue
         if not sound:
             break
+        excess_before = math.inf
         change, at_change = _change(leg, delta, accuracy, work), begin
         if change <= 1.0:
             limit = Equilibrium(0.0, -delta if leg.tip else 1.0, 0.0)
@@ -348,7 +354,7 @@ def follow_branch(
             if knot == low:
                 runs_out = True
                 break
-        length = max(min(pace * length, _LONGEST), shortest)
+        length = max(min((max(pace, 1.0) if noisy else pace) * length, _LONGEST), shortest)
         if not math.isfinite(begin.at.p):
             break
     if fate == _NEVER:

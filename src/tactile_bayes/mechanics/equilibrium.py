@@ -21,7 +21,7 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.outline import Outline, place
 from tactile_bayes.mechanics.pose import pose_and_slopes
 
-__all__ = ["SETTLED", "Balance", "Equilibrium", "Loaded", "balance", "cross", "dot", "settle"]
+__all__ = ["SETTLED", "Balance", "Equilibrium", "Loaded", "balance", "cross", "dot", "settle", "settle_at"]
 
 _MOST_STEPS = 25
 
@@ -161,6 +161,34 @@ def settle(
                 found.x_rate,
                 found.y_rate,
             )
+    return nowhere()
+
+
+@compiled
+def settle_at(loaded: Loaded, p: float, start: Equilibrium) -> Balance:
+    """Equilibrium at a parameter of the contour, where its curvature may be infinite; NaN if none is found.
+
+    Tangent and rates need not be finite.
+    """
+    at = Equilibrium(p, start.q, start.force)
+    for _ in range(_MOST_STEPS):
+        equations = balance(loaded, at)[1]
+        miss_u, miss_v, by_u, by_v = equations.miss_u, equations.miss_v, equations.by_u, equations.by_v
+        det = by_u.q * by_v.force - by_u.force * by_v.q
+        dq, df = (miss_u * by_v.force - miss_v * by_u.force) / det, (by_u.q * miss_v - by_v.q * miss_u) / det
+        largest = max(abs(dq) / _MOST_TURN, abs(df) / (_MOST_LOADING * (1.0 + at.force)))
+        if not largest < math.inf:
+            break
+        share = min(1.0, 1.0 / largest) if largest > 0.0 else 1.0
+        at = Equilibrium(p, at.q - share * dq, at.force - share * df)
+        if largest <= SETTLED:
+            return balance(loaded, at)[0]
+    return nowhere()
+
+
+@compiled
+def nowhere() -> Balance:
+    """Balance of NaN."""
     nothing = Equilibrium(math.nan, math.nan, math.nan)
     return Balance(nothing, math.nan, math.nan, math.nan, math.nan, nothing, math.nan, math.nan, math.nan, math.nan)
 

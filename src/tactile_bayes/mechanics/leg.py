@@ -22,6 +22,7 @@ from tactile_bayes.numerics import chebyshev
 
 __all__ = [
     "NUDGE",
+    "PLACE",
     "Before",
     "Leg",
     "LegCurves",
@@ -41,7 +42,7 @@ greater its weight, the fewer legs a branch has."""
 NUDGE = 1e-9
 """Distance beyond a knot of the contour, in its parameter, at which it is smooth."""
 
-_PLACE = 5
+PLACE = 5
 """Row of the contour's parameter at the nodes."""
 
 
@@ -242,8 +243,8 @@ def sample_leg(
         at_nodes[2, k], at_nodes[2, half + k] = found.force_y, found.y_rate
         at_nodes[REST, k], at_nodes[REST, half + k] = found.at.q, found.tangent.q
         at_nodes[ANGLE, k], at_nodes[ANGLE, half + k] = found.drive_angle, found.angle_rate
-        at_nodes[_PLACE, k], at_nodes[_PLACE, half + k] = found.at.p, found.tangent.p
-    for c in range(_PLACE):
+        at_nodes[PLACE, k], at_nodes[PLACE, half + k] = found.at.p, found.tangent.p
+    for c in range(PLACE):
         weighted(work.fit, at_nodes[c], series[c])
-    weighted(work.fit, at_nodes[_PLACE], work.place)
+    weighted(work.fit, at_nodes[PLACE], work.place)
     return True, found, Before(old.at, old.tangent)
