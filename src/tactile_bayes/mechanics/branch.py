@@ -70,9 +70,9 @@ _FIRST = 0.5
 _LONGEST, _SHORTEST = 1.0, 1e-6
 """Lengths between which those of legs lie."""
 
-_ACCEPT = 0.2
+_ACCEPT = 0.05
 _FLOOR, _NOISE = 1e-2, 1e3
-_AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.03, 0.8, 0.3, 2.0
+_AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.01, 0.8, 0.3, 2.0
 """Share of the tolerated error that is aimed at, and bounds on the change of the length."""
 
 _MOST = 160
@@ -81,7 +81,7 @@ _MOST = 160
 _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
 
-_NO_MOMENT = 1e-12
+_NO_MOMENT = 1e-7
 """Holding moment [EI/L] that counts as zero."""
 
 _ROUNDING = 1e-14
@@ -260,7 +260,7 @@ def follow_branch(
     nowhere = Equilibrium(math.nan, math.nan, math.nan)
     onset, nothing = Equilibrium(0.0, 0.0, 1.0), Before(nowhere, nowhere)
     onward_from, behind_begin, length, known = onset, nothing, _FIRST, 0.0
-    settled, power = max(SETTLED, 0.3 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
+    settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
     shortest, excess_before = _LONGEST * 0.5**accuracy.halvings, math.inf
     begin_angle, snap_parameter, fate = first, z.p, _NEVER
     changes, largest, is_first, done, runs_out = 0, math.nan, True, 0, False

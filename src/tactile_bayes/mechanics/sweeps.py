@@ -25,7 +25,7 @@ __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_sweeps"]
 
 _TOUCHES = int(Reachability.TOUCHES)
 
-_EXACT = Accuracy(resolved=1e-8, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
+_EXACT = Accuracy(resolved=1e-9, sharp=np.inf, halvings=12, first_step=4e-16, last_step=4e-16, polished=True)
 """Accuracy with states and events to rounding."""
 
 _SMOOTH = _EXACT._replace(resolved=1e-10, polished=False)
