@@ -14,22 +14,30 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.continuation import Ends
 from tactile_bayes.mechanics.curves import (
     ANGLE,
     DIP,
     LOST,
     REST,
-    WAY,
+    Accuracy,
     Course,
     Curves,
     first_fall,
     largest_curvature,
-    lay_over_angle,
-    left_of,
     regained,
 )
-from tactile_bayes.mechanics.equilibrium import SETTLED, Balance, Equilibrium, Loaded, balance, dot, settle, settle_at
+from tactile_bayes.mechanics.equilibrium import (
+    SETTLED,
+    Balance,
+    Equilibrium,
+    Loaded,
+    Scene,
+    balance,
+    dot,
+    in_phase,
+    settle,
+    settle_at,
+)
 from tactile_bayes.mechanics.leg import (
     NUDGE,
     PLACE,
@@ -44,25 +52,33 @@ from tactile_bayes.mechanics.leg import (
     settle_on,
     shortened,
 )
-from tactile_bayes.mechanics.limits import Rest, approach
-from tactile_bayes.mechanics.outline import Outline, ends, place
-from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.limits import approach
+from tactile_bayes.mechanics.outline import ends
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
-from tactile_bayes.mechanics.readings import Asked, Followed, Found, Samples, asked, find_samples, look_for, write_loads
+from tactile_bayes.mechanics.readings import (
+    Asked,
+    Followed,
+    Found,
+    Samples,
+    asked,
+    find_samples,
+    polish_states,
+    write_loads,
+    write_states,
+)
 from tactile_bayes.mechanics.series import (
-    at_all,
     change_of,
     copy_rows,
     crossing,
     tail,
     value,
-    value_and_slope,
     weighted,
 )
-from tactile_bayes.mechanics.states import Rig
-from tactile_bayes.mechanics.stretches import Accuracy
 
-__all__ = ["BranchScene", "BranchWorkspace", "branch_workspace", "follow_branch"]
+__all__ = ["MOST_CHANGES", "BranchWorkspace", "Ends", "branch_workspace", "follow_branch"]
+
+MOST_CHANGES = 16
+"""Largest number of phases of a branch that are recorded."""
 
 _FIRST = 0.5
 """Length of the first leg; see `leg_from`."""
@@ -97,14 +113,20 @@ _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
 _BY_Q = Equilibrium(0.0, 1.0, 0.0)
 
 
-class BranchScene(NamedTuple):
-    """All that a branch depends on: one contour in the sweep frame, the rod at rest, and the rig."""
+class Ends(NamedTuple):
+    """Beginning and end of a path; NaN where there is none. Drive angles are in the sweep frame."""
 
-    outline: Outline
-    rest: Rest
-    rig: Rig
-    exact: bool
-    """True if events are computed to rounding."""
+    reach: int
+    distance: float
+    first_angle: float
+    first_parameter: float
+    snap_angle: float
+    snap_parameter: float
+    snap_off: int
+    phases: int
+    """Number of phases."""
+    curvature: float
+    """Largest curvature of the rod up to snap-off [1/L]; NaN if no states are computed."""
 
 
 class BranchWorkspace(NamedTuple):
@@ -125,12 +147,6 @@ def branch_workspace(samples: int, order: int, knots: int) -> BranchWorkspace:
     return BranchWorkspace(
         leg_curves(order), asked(samples), np.empty(knots), np.empty((_MOST, 14)), np.empty((_MOST, 7, order))
     )
-
-
-@compiled
-def _loaded(scene: BranchScene, tip: bool) -> Loaded:
-    rig = scene.rig
-    return Loaded(scene.outline, scene.rest.curvature, rig.friction_angle, rig.compliance, tip)
 
 
 @compiled
@@ -228,7 +244,7 @@ def _past(loaded: Loaded, at_knot: Balance, sense: float) -> Balance:
 
 
 @compiled
-def _bent(stop: float, scene: BranchScene, curves: Curves) -> float:
+def _bent(stop: float, scene: Scene, curves: Curves) -> float:
     """Largest change of the rod's curvature up to a position on a leg."""
     for c in range(5):
         for k in range(curves.on.nodes.size):
@@ -238,7 +254,7 @@ def _bent(stop: float, scene: BranchScene, curves: Curves) -> float:
 
 @compiled
 def follow_branch(
-    scene: BranchScene,
+    scene: Scene,
     knots: Floats,
     samples: Samples,
     accuracy: Accuracy,
@@ -253,7 +269,7 @@ def follow_branch(
     if near.reach != _TOUCHES:
         return _nothing(near.reach, near.distance)
     low, delta = ends(outline)[0], rig.friction_angle
-    loaded = _loaded(scene, near.tip_first)
+    loaded = in_phase(scene, near.tip_first)
     z = first_equilibrium(loaded, scene.rest, near)
     begin = balance(loaded, z)[0]
     first = begin.drive_angle
@@ -343,7 +359,7 @@ def follow_branch(
             begin = settle_on(loaded, leg, last * onward, guess(work, onward), SETTLED)
             onward_from = begin.tangent
         elif change <= 1.0:
-            loaded = _loaded(scene, not leg.tip)
+            loaded = in_phase(scene, not leg.tip)
             begin = balance(loaded, Equilibrium(at_change.at.p, 1.0 if leg.tip else -delta, at_change.at.force))[0]
             onward_from = Equilibrium(0.0, -1.0 if leg.tip else 1.0, 0.0)
         elif math.isnan(knot):
@@ -372,9 +388,9 @@ def follow_branch(
         if not wants_states:
             write_loads(there, part, found.loads)
         elif accuracy.polished:
-            _polish_states(there, part, work, found)
+            polish_states(there, part, work, found)
         else:
-            _write_states(there, part, work, found)
+            write_states(there, part, work, found)
     return Ends(_TOUCHES, near.distance, first, near.begin, begin_angle, snap_parameter, fate, changes, largest)
 
 
@@ -406,84 +422,3 @@ def _recall(work: LegCurves, workspace: BranchWorkspace, k: int) -> tuple[Leg, C
 @compiled
 def _nothing(reach: int, distance: float) -> Ends:
     return Ends(reach, distance, math.nan, math.nan, math.nan, math.nan, _NEVER, 0, math.nan)
-
-
-@compiled
-def _note(row: int, p: float, q: float, tip: bool, scene: BranchScene, out: Found) -> None:
-    """Write phase and place of a state, and the loads of its row."""
-    states, rig = out.states[row], scene.rig
-    at = place(scene.outline, p)
-    alpha = math.atan2(at.sin, at.cos)
-    states[0] = TIP if tip else TANGENTIAL
-    states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
-    states[9], states[10] = (1.0, alpha + rig.friction_angle + q) if tip else (q, alpha)
-    states[11], states[12] = math.nan, math.nan
-    for c in range(3):
-        out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]
-
-
-@compiled
-def _write_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
-    """Write the states of the samples on a leg, from the series."""
-    course, curves, workspace = part.course, part.curves, part.workspace
-    count = samples.rows.size
-    # Just before the end of contact the last drive angle matters.
-    off = value(curves.series[ANGLE], course.stop) - course.end
-    for j in range(count):
-        workspace.wanted[j] += off
-    look_for(part, count)
-    at_all(curves.series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
-    for j in range(count):
-        row = samples.rows[j]
-        states = out.states[row]
-        states[5] = workspace.wanted[j] - off - part.scene.rig.compliance * workspace.found[0, j]
-        for c in range(3):
-            states[6 + c] = workspace.found[c, j]
-        p = value(work.place, 0.25 * (workspace.twice[j] + 2.0))
-        _note(row, p, workspace.found[REST, j], part.stretch.tip, part.scene, out)
-
-
-@compiled
-def _polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
-    """Write exact states at the drive angles of the samples on a leg, by Newton's method in the stretched angle."""
-    scene, leg, course, curves, workspace = part.scene, part.stretch, part.course, part.curves, part.workspace
-    stop, steadiness, over_angle = course.stop, course.steadiness, curves.over_angle
-    loaded = _loaded(scene, leg.tip)
-    lay_over_angle(part.accuracy, course, curves)
-    weighted(curves.on.slopes, over_angle[WAY], curves.bend)
-    for j in range(samples.rows.size):
-        row, target = samples.rows[j], 0.25 * (workspace.twice[j] + 2.0)
-        way, pace = value_and_slope(over_angle[WAY], curves.bend, target)
-        way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle falls again
-        low, high, before = 0.0, stop, stop
-        for _ in range(100):
-            state = settle_on(loaded, leg, way, guess(work, way), SETTLED)
-            # Rounding may undo the very first contact.
-            turned = 1.0 - left_of(state.drive_angle, course) if math.isfinite(state.drive_angle) else 0.0
-            missing = target - turned
-            if abs(missing) <= _SETTLED or not high > low:
-                break
-            if missing > 0.0:
-                low = way
-            else:
-                high = way
-            rate = state.angle_rate
-            newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
-            # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
-            new = way + missing * (newton if newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target) else pace)
-            if not (low < new < high and abs(new - way) <= 0.5 * before):
-                new = 0.5 * (low + high)
-            before = abs(new - way)
-            if new == way or not before > 0.0:
-                break
-            way = new
-        if not math.isfinite(state.drive_angle):
-            continue
-        # The digits of a position are limited: the interpolant corrects for the remaining distance to the angle.
-        reached = 1.0 - left_of(state.drive_angle, course)
-        states = out.states[row]
-        states[5] = state.drive_angle - scene.rig.compliance * state.holding_moment
-        states[6], states[7], states[8] = state.holding_moment, state.force_x, state.force_y
-        for c in range(3):
-            states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
-        _note(row, state.at.p, state.at.q, leg.tip, scene, out)

@@ -15,31 +15,24 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.outline import Place, frame, place
-from tactile_bayes.mechanics.series import Nodes, change_of, crossing, nodes_of, tail, value, value_and_slope, weighted
-from tactile_bayes.mechanics.states import Rig, Scene, State, exact_state, tabled_state
-from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
+from tactile_bayes.mechanics.equilibrium import Rig
+from tactile_bayes.mechanics.series import Nodes, crossing, nodes_of, value, value_and_slope, weighted
 
 __all__ = [
     "ANGLE",
     "DIP",
     "LOST",
-    "MISS",
     "REST",
     "WAY",
+    "Accuracy",
     "Course",
     "Curves",
-    "angle_rate",
     "curves_of",
-    "exact_at",
     "first_fall",
     "largest_curvature",
     "lay_over_angle",
     "left_of",
-    "misses",
-    "polished_fold",
     "regained",
-    "sample",
 ]
 
 REST, ANGLE = 3, 4
@@ -48,12 +41,6 @@ angle of the tip), and the drive angle."""
 
 WAY = 3
 """Row of the position where loads are series in the drive angle."""
-
-MISS = 1e-8
-"""Tolerance of the derivatives of exact states where they only guide a search."""
-
-_ROUNDING = 1e-14
-"""Tail of the series of a drive angle that its rounding leaves [rad]: shorter stretches do not make it smaller."""
 
 DIP = 1e-4
 """Least fall of the drive angle beyond a maximum that makes it the snap-off [rad]. After a smaller fall the rod hardly
@@ -64,6 +51,23 @@ LOST = -1.0
 
 _LAST = 1e-13
 """Newton step, as a share of a stretch, below which its interpolants have rounding errors only."""
+
+
+class Accuracy(NamedTuple):
+    """Accuracy of a path."""
+
+    resolved: float
+    """Tolerated error of an interpolant, as a share of the change of the drive angle on a stretch."""
+    sharp: float
+    """Tolerated error of the drive angle of an event [rad]."""
+    halvings: int
+    """Largest number of halvings of a stretch; a singularity at its end exhausts them."""
+    first_step: float
+    """Newton step, as a share of the bracket, at which the search for first contact ends."""
+    last_step: float
+    """Newton step, as a share of the bracket, at which searches on a stretch end."""
+    polished: bool
+    """True if states at drive angles are solved for, and not taken from the series."""
 
 
 class Curves(NamedTuple):
@@ -103,49 +107,6 @@ def curves_of(order: int) -> Curves:
         values=np.zeros((5, order)),
         on_grid=np.empty(2 * order + 1),
     )
-
-
-@compiled
-def exact_at(scene: Scene, stretch: Stretch, way: float) -> tuple[State, float]:
-    """Exact state at a position on a stretch, and the derivative of the drive angle by it for a stiff suspension."""
-    at = place(scene.outline, along(stretch, way))
-    state = exact_state(scene, at, stretch.tip, 0.0)
-    return state, angle_rate(at, state) * along_rate(stretch, way)
-
-
-@compiled
-def sample(scene: Scene, stretch: Stretch, curves: Curves) -> None:
-    """Fit the series of loads and drive angle in the position."""
-    values, on, exact = curves.values, curves.on, scene.exact
-    for k in range(on.nodes.size):
-        at = place(scene.outline, along(stretch, on.nodes[k]))
-        if exact:
-            state = exact_state(scene, at, stretch.tip, MISS)
-            values[0, k], values[1, k] = state.holding_moment, state.force_x
-            values[2, k], values[ANGLE, k] = state.force_y, state.drive_angle
-            values[REST, k] = state.tip_angle if stretch.tip else state.arclength
-        else:
-            quick = tabled_state(scene, at, stretch.tip)
-            values[0, k], values[1, k] = quick.holding_moment, quick.force_x
-            values[2, k], values[ANGLE, k] = quick.force_y, quick.drive_angle
-        values[ANGLE, k] += scene.rig.compliance * values[0, k]
-    for c in range(5):
-        if exact or c != REST:
-            weighted(on.fit, values[c], curves.series[c])
-
-
-@compiled
-def misses(accuracy: Accuracy, tolerance: Floats, curves: Curves) -> bool:
-    """Return whether the series miss the drive angle, the loads or the states by more than the tolerances."""
-    angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
-    rough = angle > max(accuracy.resolved * change, _ROUNDING) or angle > accuracy.sharp
-    for c in range(3):
-        loads = curves.series[c]
-        rough |= tail(loads) + angle * change_of(loads) / change > tolerance[c]
-    if not accuracy.polished:
-        for c in range(ANGLE):
-            rough |= tail(curves.series[c]) > accuracy.resolved * max(change_of(curves.series[c]), 1.0)
-    return rough
 
 
 @compiled
@@ -189,31 +150,6 @@ def regained(stop: float, most: float, curves: Curves) -> float:
             return crossing(angle, slope, most, above, below, 0.5 * (above + below), _LAST)
         below, falls = above, not rises
     return 2.0
-
-
-@compiled
-def angle_rate(at: Place, state: State) -> float:
-    """Derivative of the drive angle by the contour's parameter."""
-    lever, facing = frame(at)
-    turning = -facing * at.speed / (at.x * at.x + at.y * at.y)
-    return turning + state.by_slope * (at.bend - turning) + state.by_distance * 2.0 * lever * at.speed
-
-
-@compiled
-def polished_fold(scene: Scene, stretch: Stretch, stop: float, curves: Curves) -> float:
-    """Position at which the exact derivative of the drive angle vanishes, by secants from the interpolant."""
-    weighted(curves.on.slopes, curves.series[ANGLE + 1], curves.bend)
-    bend = value(curves.bend, stop)
-    at_stop, last = exact_at(scene, stretch, stop)[1], 2e-2
-    for _ in range(7):
-        step = at_stop / bend
-        if not abs(step) < 0.5 * last:
-            break
-        new = min(max(stop - step, 0.0), 1.0)
-        at_new = exact_at(scene, stretch, new)[1]
-        bend = (at_new - at_stop) / (new - stop)
-        stop, at_stop, last = new, at_new, abs(step)
-    return stop
 
 
 @compiled

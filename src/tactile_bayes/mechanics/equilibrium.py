@@ -18,10 +18,23 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.limits import Rest
 from tactile_bayes.mechanics.outline import Outline, place
 from tactile_bayes.mechanics.pose import pose_and_slopes
 
-__all__ = ["SETTLED", "Balance", "Equilibrium", "Loaded", "balance", "cross", "dot", "settle", "settle_at"]
+__all__ = [
+    "SETTLED",
+    "Balance",
+    "Equilibrium",
+    "Loaded",
+    "Rig",
+    "Scene",
+    "balance",
+    "dot",
+    "in_phase",
+    "settle",
+    "settle_at",
+]
 
 _MOST_STEPS = 25
 
@@ -49,6 +62,31 @@ class Loaded(NamedTuple):
     friction_angle: float
     compliance: float
     tip: bool
+
+
+class Rig(NamedTuple):
+    """Parameters of the loads other than rod and contour."""
+
+    friction_angle: float
+    """Friction angle δ = arctan μ [rad]."""
+    compliance: float
+    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
+    offset: float
+    """Encoder offset in the sweep frame [rad]."""
+    sign: float
+    """−1 in backward sweeps, else 1."""
+    rigidity: float
+    """Factor on loads: flexural rigidity over the rigidity in their unit."""
+
+
+class Scene(NamedTuple):
+    """All that an equilibrium depends on: one contour in the sweep frame, the rod at rest, and the rig."""
+
+    outline: Outline
+    rest: Rest
+    rig: Rig
+    exact: bool
+    """True if events are computed to rounding."""
 
 
 class Balance(NamedTuple):
@@ -82,6 +120,13 @@ class _Equations(NamedTuple):
 
 
 @compiled
+def in_phase(scene: Scene, tip: bool) -> Loaded:
+    """Rod in one phase of contact."""
+    rig = scene.rig
+    return Loaded(scene.outline, scene.rest.curvature, rig.friction_angle, rig.compliance, tip)
+
+
+@compiled
 def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
     """Loads and tangent at a point near the branch."""
     delta, p, q, force = loaded.friction_angle, at.p, at.q, max(at.force, 0.0)
@@ -100,7 +145,7 @@ def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
         by_force.turn + compliance * along,
     )
     angle = math.atan2(sin, cos) + psi1 + here.turn + compliance * moment
-    tangent = cross(by_u, by_v)
+    tangent = _cross(by_u, by_v)
     turning = force * spot.bend * tangent.p
     found = Balance(
         at,
@@ -132,7 +177,7 @@ def settle(
         miss_u, miss_v, by_u, by_v, angle_by, lever_by_p, bend = equations
         off = dot(normal, Equilibrium(at.p - origin.p, at.q - origin.q, at.force - origin.force)) - level
         det = dot(normal, found.tangent)
-        first, second, third = cross(by_v, normal), cross(normal, by_u), found.tangent
+        first, second, third = _cross(by_v, normal), _cross(normal, by_u), found.tangent
         dp = (miss_u * first.p + miss_v * second.p + off * third.p) / det
         dq = (miss_u * first.q + miss_v * second.q + off * third.q) / det
         df = (miss_u * first.force + miss_v * second.force + off * third.force) / det
@@ -161,7 +206,7 @@ def settle(
                 found.x_rate,
                 found.y_rate,
             )
-    return nowhere()
+    return _nowhere()
 
 
 @compiled
@@ -183,18 +228,18 @@ def settle_at(loaded: Loaded, p: float, start: Equilibrium) -> Balance:
         at = Equilibrium(p, at.q - share * dq, at.force - share * df)
         if largest <= SETTLED:
             return balance(loaded, at)[0]
-    return nowhere()
+    return _nowhere()
 
 
 @compiled
-def nowhere() -> Balance:
+def _nowhere() -> Balance:
     """Balance of NaN."""
     nothing = Equilibrium(math.nan, math.nan, math.nan)
     return Balance(nothing, math.nan, math.nan, math.nan, math.nan, nothing, math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
-def cross(a: Equilibrium, b: Equilibrium) -> Equilibrium:
+def _cross(a: Equilibrium, b: Equilibrium) -> Equilibrium:
     return Equilibrium(a.q * b.force - a.force * b.q, a.force * b.p - a.p * b.force, a.p * b.q - a.q * b.p)
 
 

@@ -15,7 +15,7 @@ from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["STRAIGHT", "Approach", "Limits", "Rest", "approach", "clear_angle", "limits"]
+__all__ = ["STRAIGHT", "Approach", "Rest", "approach", "clear_angle"]
 
 
 class _Sought(IntEnum):
@@ -64,23 +64,6 @@ class Approach(NamedTuple):
     """True if the tip touches first, and not a point before it."""
     low: float
     """Least parameter of the contour."""
-
-
-class Limits(NamedTuple):
-    """Limits of the path of an outline, as parameters of the contour."""
-
-    reach: int
-    """A `Reachability`."""
-    distance: float
-    """Least distance of contour and pivot [L]."""
-    begin: float
-    """First contact."""
-    end: float
-    """Point where the line of force passes through the pivot, the rod is too short again, or the contour ends."""
-    tip_first: bool
-    """True if the tip touches first, and not a point before it."""
-    runs_out: bool
-    """True if the contour ends there."""
 
 
 @compiled
@@ -169,23 +152,6 @@ def approach(outline: Outline, rest: Rest, last_step: float) -> Approach:
     elif beyond_high or open_end:
         reach = _ENDS
     return Approach(reach, distance, nearest, begin, tip_first, low)
-
-
-@compiled
-def limits(outline: Outline, delta: float, last_step: float) -> Limits:
-    """Limits of the path of a straight rod for a friction angle δ [rad]; see `approach`."""
-    reach, distance, nearest, begin, tip_first, low = approach(outline, STRAIGHT, last_step)
-    # With friction the line of force passes through the pivot only beyond the nearest point, if within reach.
-    end = nearest
-    if delta > 0.0:
-        largest = 0.5 * math.pi + delta
-        if _missing(outline, STRAIGHT, _Sought.TURNED, largest, low)[0] >= 0.0:
-            end = low
-        else:
-            end = _root(outline, STRAIGHT, _Sought.TURNED, largest, nearest, low, last_step)
-        if _is_out(outline, STRAIGHT, end):
-            end = _root(outline, STRAIGHT, _Sought.WITHIN, 0.0, nearest, end, last_step)
-    return Limits(reach, distance, begin, end, tip_first, end == low)
 
 
 @compiled

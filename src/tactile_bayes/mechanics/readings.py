@@ -9,12 +9,12 @@ import numpy as np
 
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.curves import ANGLE, MISS, REST, WAY, Course, Curves, angle_rate, lay_over_angle, left_of
-from tactile_bayes.mechanics.outline import Place, place
+from tactile_bayes.mechanics.curves import ANGLE, REST, WAY, Accuracy, Course, Curves, lay_over_angle, left_of
+from tactile_bayes.mechanics.equilibrium import SETTLED, Scene, in_phase
+from tactile_bayes.mechanics.leg import Leg, LegCurves, guess, settle_on
+from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.mechanics.series import at_all, crossing, value, value_and_slope, weighted
-from tactile_bayes.mechanics.states import Rig, Scene, exact_state
-from tactile_bayes.mechanics.stretches import Accuracy, Stretch, along, along_rate
 
 __all__ = [
     "STATE_COLUMNS",
@@ -24,7 +24,6 @@ __all__ = [
     "Samples",
     "asked",
     "find_samples",
-    "look_for",
     "polish_states",
     "write_loads",
     "write_states",
@@ -82,10 +81,10 @@ class Asked(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """A stretch that has been followed, with its series."""
+    """A leg that has been followed, with its series."""
 
     scene: Scene
-    stretch: Stretch
+    leg: Leg
     accuracy: Accuracy
     course: Course
     curves: Curves
@@ -125,7 +124,7 @@ def _before(angles: Floats, angle: float) -> int:
 
 
 @compiled
-def look_for(part: Followed, count: int) -> None:
+def _look_for(part: Followed, count: int) -> None:
     """Convert the stretched drive angles of samples to positions z on the stretch, as 4z − 2.
 
     Newton's method starts between the nodes of the series, for all samples together; samples for which it does not
@@ -166,7 +165,7 @@ def look_for(part: Followed, count: int) -> None:
 def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
     """Write the loads of the samples on a stretch, from the series."""
     count, rig, curves, workspace = samples.rows.size, part.scene.rig, part.curves, part.workspace
-    look_for(part, count)
+    _look_for(part, count)
     sideward = rig.sign * rig.rigidity
     at_all(curves.series[:REST], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
@@ -176,44 +175,46 @@ def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
 
 
 @compiled
-def _note(row: int, p: float, at: Place, tip: bool, rig: Rig, out: Found) -> None:
+def _note(row: int, p: float, q: float, tip: bool, scene: Scene, out: Found) -> None:
     """Write phase and place of a state, and the loads of its row."""
-    states = out.states[row]
+    states, rig = out.states[row], scene.rig
+    at = place(scene.outline, p)
+    alpha = math.atan2(at.sin, at.cos)
     states[0] = TIP if tip else TANGENTIAL
-    states[1], states[2], states[3], states[4] = p, at.x, at.y, math.atan2(at.sin, at.cos)
+    states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
+    states[9], states[10] = (1.0, alpha + rig.friction_angle + q) if tip else (q, alpha)
+    states[11], states[12] = math.nan, math.nan
     for c in range(3):
         out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]
 
 
 @compiled
-def write_states(samples: Samples, part: Followed, out: Found) -> None:
-    """Write the states of the samples on a stretch, from the series, without derivatives."""
-    scene, stretch, course, curves, workspace = part.scene, part.stretch, part.course, part.curves, part.workspace
+def write_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
+    """Write the states of the samples on a leg, from the series."""
+    course, curves, workspace = part.course, part.curves, part.workspace
     count = samples.rows.size
     # Just before the end of contact the last drive angle matters.
     off = value(curves.series[ANGLE], course.stop) - course.end
     for j in range(count):
         workspace.wanted[j] += off
-    look_for(part, count)
+    _look_for(part, count)
     at_all(curves.series[:ANGLE], workspace.twice, count, workspace.now, workspace.before, workspace.found)
     for j in range(count):
         row = samples.rows[j]
-        p = along(stretch, 0.25 * (workspace.twice[j] + 2.0))
-        at, states = place(scene.outline, p), out.states[row]
-        states[5] = workspace.wanted[j] - off - scene.rig.compliance * workspace.found[0, j]
+        states = out.states[row]
+        states[5] = workspace.wanted[j] - off - part.scene.rig.compliance * workspace.found[0, j]
         for c in range(3):
             states[6 + c] = workspace.found[c, j]
-        _note(row, p, at, stretch.tip, scene.rig, out)
-        rest = workspace.found[REST, j]
-        states[9], states[10] = (1.0, rest) if stretch.tip else (rest, states[4])
-        states[11], states[12] = math.nan, math.nan
+        p = value(work.place, 0.25 * (workspace.twice[j] + 2.0))
+        _note(row, p, workspace.found[REST, j], part.leg.tip, part.scene, out)
 
 
 @compiled
-def polish_states(samples: Samples, part: Followed, out: Found) -> None:
-    """Write exact states at the drive angles of the samples on a stretch, by Newton's method in the stretched angle."""
-    scene, stretch, course, curves, workspace = part.scene, part.stretch, part.course, part.curves, part.workspace
-    stop, steadiness, over_angle, rig = course.stop, course.steadiness, curves.over_angle, scene.rig
+def polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found) -> None:
+    """Write exact states at the drive angles of the samples on a leg, by Newton's method in the stretched angle."""
+    scene, leg, course, curves, workspace = part.scene, part.leg, part.course, part.curves, part.workspace
+    stop, steadiness, over_angle = course.stop, course.steadiness, curves.over_angle
+    loaded = in_phase(scene, leg.tip)
     lay_over_angle(part.accuracy, course, curves)
     weighted(curves.on.slopes, over_angle[WAY], curves.bend)
     for j in range(samples.rows.size):
@@ -222,12 +223,9 @@ def polish_states(samples: Samples, part: Followed, out: Found) -> None:
         way = stop - abs(stop - min(max(way, 0.0), 2.0 * stop))  # beyond a fold the drive angle falls again
         low, high, before = 0.0, stop, stop
         for _ in range(100):
-            p = along(stretch, way)
-            at = place(scene.outline, p)
-            state = exact_state(scene, at, stretch.tip, MISS)
-            driven = state.drive_angle + rig.compliance * state.holding_moment
+            state = settle_on(loaded, leg, way, guess(work, way), SETTLED)
             # Rounding may undo the very first contact.
-            turned = 1.0 - left_of(driven, course) if math.isfinite(driven) else 0.0
+            turned = 1.0 - left_of(state.drive_angle, course) if math.isfinite(state.drive_angle) else 0.0
             missing = target - turned
             if abs(missing) <= _SETTLED or not high > low:
                 break
@@ -235,24 +233,23 @@ def polish_states(samples: Samples, part: Followed, out: Found) -> None:
                 low = way
             else:
                 high = way
-            rate = angle_rate(at, state) * along_rate(stretch, way)
+            rate = state.angle_rate
             newton = (steadiness + 2.0 * (1.0 - steadiness) * (1.0 - turned)) * (course.end - course.begin) / rate
             # Much nearer to the end than the target the rate may be zero or rounding: take the interpolant's rate.
-            sound = rig.compliance == 0.0 and newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target)
-            new = way + missing * (newton if sound else pace)
+            new = way + missing * (newton if newton > 0.0 and 1.0 - turned > 0.5 * (1.0 - target) else pace)
             if not (low < new < high and abs(new - way) <= 0.5 * before):
                 new = 0.5 * (low + high)
             before = abs(new - way)
             if new == way or not before > 0.0:
                 break
             way = new
-        if not math.isfinite(driven):
+        if not math.isfinite(state.drive_angle):
             continue
-        # The digits of a parameter are limited: the interpolant corrects for the remaining distance to the angle.
-        reached = 1.0 - left_of(driven, course)
+        # The digits of a position are limited: the interpolant corrects for the remaining distance to the angle.
+        reached = 1.0 - left_of(state.drive_angle, course)
         states = out.states[row]
-        for c in range(8):
-            states[5 + c] = state[c]
+        states[5] = state.drive_angle - scene.rig.compliance * state.holding_moment
+        states[6], states[7], states[8] = state.holding_moment, state.force_x, state.force_y
         for c in range(3):
             states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
-        _note(row, p, at, stretch.tip, rig, out)
+        _note(row, state.at.p, state.at.q, leg.tip, scene, out)

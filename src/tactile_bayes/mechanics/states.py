@@ -26,14 +26,10 @@ from tactile_bayes.mechanics.arc import (
 )
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.outline import Outline, Place, frame, place
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 from tactile_bayes.mechanics.tables import (
     AMPLITUDE,
-    FORCE,
     MOST_FRICTION,
-    STRETCH,
-    TURN,
     Tables,
     Workspace,
     in_polar,
@@ -43,15 +39,9 @@ from tactile_bayes.mechanics.tables import (
 
 __all__ = [
     "Found",
-    "QuickState",
-    "Rig",
-    "Scene",
     "State",
     "contact",
     "contacts",
-    "exact_state",
-    "excess",
-    "tabled_state",
     "wrenches",
 ]
 
@@ -59,33 +49,6 @@ _BEYOND = 1e-12
 """Angle by which rounding may turn a chord beyond the line of force through the pivot [rad]."""
 
 _NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
-
-
-class Rig(NamedTuple):
-    """Parameters of the loads other than rod and contour."""
-
-    friction_angle: float
-    """Friction angle δ = arctan μ [rad]."""
-    compliance: float
-    """Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)]."""
-    offset: float
-    """Encoder offset in the sweep frame [rad]."""
-    sign: float
-    """−1 in backward sweeps, else 1."""
-    rigidity: float
-    """Factor on loads: flexural rigidity over the rigidity in their unit."""
-
-
-class Scene(NamedTuple):
-    """All that a state depends on: one contour in the sweep frame, the rig, and the tables."""
-
-    outline: Outline
-    rig: Rig
-    exact: bool
-    """True if states are computed to rounding; otherwise they come from tables."""
-    known: Tables
-    workspace: Workspace
-    """Prepared for the friction angle."""
 
 
 class State(NamedTuple):
@@ -100,15 +63,6 @@ class State(NamedTuple):
     by_slope: float
     by_distance: float
     """As in `Wrench`."""
-
-
-class QuickState(NamedTuple):
-    """The part of a `State` that a likelihood needs."""
-
-    drive_angle: float
-    holding_moment: float
-    force_x: float
-    force_y: float
 
 
 _NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
@@ -181,16 +135,6 @@ def _tip_state(
         by_distance = -0.5 * (angle_1 * by_chi.turn - angle_x * (1.0 + by_psi1.turn)) / det / value
     force, tip_angle = arc.length * arc.length, beta + 0.5 * math.pi - epsilon1
     return State(tip_angle + arc.turn, force * u, -force * sin, force * cos, 1.0, tip_angle, by_slope, by_distance)
-
-
-@compiled
-def exact_state(scene: Scene, at: Place, tip: bool, miss: float) -> State:
-    """State in a contact of known phase, to rounding; derivatives as in `_tip_state`."""
-    alpha, delta = math.atan2(at.sin, at.cos), scene.rig.friction_angle
-    if tip:
-        return _tip_state(at.x, at.y, alpha, delta, miss, scene.known, scene.workspace)
-    length, arc, by_chi = _tangential(at.x, at.y, alpha, delta, scene.workspace)
-    return _tangential_state(at.x, at.y, alpha, delta, length, arc, by_chi)
 
 
 @cached
@@ -288,41 +232,3 @@ def contacts(columns: Floats, out: Floats) -> None:
         found = contact(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
         for k in range(6):
             out[i, k] = found[k]
-
-
-@compiled
-def tabled_state(scene: Scene, at: Place, tip: bool) -> QuickState:
-    """State in a contact of known phase from tables, for a friction angle of at most `MOST_FRICTION`."""
-    delta, workspace = scene.rig.friction_angle, scene.workspace
-    along, across = frame(at)
-    sin, cos = at.sin, at.cos
-    slope = math.atan2(sin, cos)
-    distance2 = at.x * at.x + at.y * at.y
-    if delta > 0.0:
-        turn_sin, turn_cos = math.sin(delta), math.cos(delta)
-        sin, cos = sin * turn_cos + cos * turn_sin, cos * turn_cos - sin * turn_sin
-    u, v = at.x * cos + at.y * sin, at.y * cos - at.x * sin
-    if across < 0.0 or u < -_BEYOND or (tip and distance2 > 1.0):
-        return QuickState(math.nan, math.nan, math.nan, math.nan)
-    if tip:
-        deficit, chord_angle = math.sqrt(1.0 - distance2), max(math.atan2(u, v), 0.0)
-        angle, _, force, turn = in_polar(scene.known, deficit, chord_angle, FORCE, workspace)
-        force *= angle
-        drive_angle = slope + delta + 0.5 * math.pi + turn
-    else:
-        angle = math.atan2(across, along)
-        level = min(angle / (0.5 * math.pi + delta), 1.0)
-        force = series(workspace, FORCE, level) * angle / distance2
-        drive_angle = slope + series(workspace, TURN, level) * angle
-    return QuickState(drive_angle, force * u, -force * sin, force * cos)
-
-
-@compiled
-def excess(scene: Scene, p: float) -> float:
-    """Arc length of tangential contact at a parameter, less the length of the rod."""
-    at, delta = place(scene.outline, p), scene.rig.friction_angle
-    if scene.exact:
-        return _tangential(at.x, at.y, math.atan2(at.sin, at.cos), delta, scene.workspace)[0] - 1.0
-    along, across = frame(at)
-    level = min(math.atan2(max(across, 0.0), along) / (0.5 * math.pi + delta), 1.0)
-    return math.sqrt(at.x * at.x + at.y * at.y) * series(scene.workspace, STRETCH, level) - 1.0

@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
-from tactile_bayes.mechanics.branch import BranchScene, BranchWorkspace, branch_workspace, follow_branch
+from tactile_bayes.mechanics.branch import MOST_CHANGES, BranchWorkspace, branch_workspace, follow_branch
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.continuation import MOST_CHANGES
+from tactile_bayes.mechanics.curves import Accuracy
+from tactile_bayes.mechanics.equilibrium import Rig, Scene
 from tactile_bayes.mechanics.limits import STRAIGHT, clear_angle
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
-from tactile_bayes.mechanics.states import Rig
-from tactile_bayes.mechanics.stretches import Accuracy
-from tactile_bayes.mechanics.tables import Tables, Workspace, prepare, tables, workspace
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_sweeps"]
 
@@ -160,8 +158,6 @@ def _solve(
     accuracy: Accuracy,
     tolerance: Floats,
     asks_clearance: bool,
-    known: Tables,
-    states: Workspace,
     workspace: BranchWorkspace,
     table: Floats,
     loads: Floats,
@@ -179,14 +175,14 @@ def _solve(
         Whether states are computed to rounding, even where there are tables.
     tolerance : ndarray, shape (3,)
         Tolerated errors of moment and forces [EI/L and EI/L²].
-    states, workspace
-        Workspaces for one state, and for one path.
+    workspace : BranchWorkspace
+        Workspace for one path.
     table : ndarray, shape (rows, columns)
         Workspace for the table of one contour.
     loads, all_states, changes, events
         As in `Solutions`; the events are a structured array.
     """
-    count, knots, prepared = shapes.knots.shape[1], workspace.knots, math.nan
+    count, knots = shapes.knots.shape[1], workspace.knots
     for i in range(sweeps.size):
         sweep, event = sweeps[i], events[i]
         outline = _outline(shapes, sweep, table)
@@ -195,12 +191,9 @@ def _solve(
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
-        if sweep.friction_angle != prepared:
-            prepared = sweep.friction_angle
-            prepare(known, prepared, states)
         rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
         found = Found(loads[c], all_states[c], changes[i])
-        scene = BranchScene(outline, STRAIGHT, rig, exact)
+        scene = Scene(outline, STRAIGHT, rig, exact)
         ends = follow_branch(scene, knots, samples, accuracy, tolerance, workspace, found)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
@@ -262,8 +255,6 @@ def solve_sweeps(
         accuracy,
         _NEVER_MISSED if tolerance is None else tolerance,
         asks_clearance,
-        tables(),
-        workspace(),
         branch_workspace(longest, order, shapes.knots.shape[1]),
         np.empty(shapes.tables.shape[1:]),
         loads,
