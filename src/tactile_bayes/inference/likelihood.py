@@ -325,6 +325,7 @@ class RecordLikelihood:
             backward=np.repeat(self._signs < 0.0, count),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
+            rest_curvature=np.zeros(segments * count),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),
         )

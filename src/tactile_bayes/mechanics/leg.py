@@ -15,7 +15,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, Curves, curves_of
 from tactile_bayes.mechanics.equilibrium import Balance, Equilibrium, Loaded, dot, settle
-from tactile_bayes.mechanics.limits import Approach, Rest
+from tactile_bayes.mechanics.limits import Approach, Rest, chord_angle
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.series import value_and_slope, weighted
 from tactile_bayes.numerics import chebyshev
@@ -104,7 +104,7 @@ def first_equilibrium(loaded: Loaded, rest: Rest, found: Approach) -> Equilibriu
     """Equilibrium without force at first contact."""
     at = place(loaded.outline, found.begin)
     distance, curvature = math.hypot(at.x, at.y), rest.curvature
-    half = math.asin(min(max(0.5 * curvature * distance, -1.0), 1.0))
+    half = chord_angle(curvature, distance)
     if found.tip_first:
         psi1 = math.atan2(at.y, at.x) + half - math.atan2(at.sin, at.cos) - loaded.friction_angle
         return Equilibrium(found.begin, psi1, 0.0)

@@ -15,7 +15,7 @@ from tactile_bayes.mechanics.newton import newton_step
 from tactile_bayes.mechanics.outline import Outline, ends, frame, mirrored, place
 from tactile_bayes.mechanics.reachability import CLEARANCE, Reachability
 
-__all__ = ["STRAIGHT", "Approach", "Rest", "approach", "clear_angle"]
+__all__ = ["STRAIGHT", "Approach", "Rest", "approach", "chord_angle", "clear_angle", "rest_of"]
 
 
 class _Sought(IntEnum):
@@ -47,6 +47,13 @@ class Rest(NamedTuple):
 
 
 STRAIGHT = Rest(0.0, 1.0)
+
+
+@compiled
+def rest_of(curvature: float) -> Rest:
+    """Rest shape of an arc of length one."""
+    half = 0.5 * curvature
+    return Rest(curvature, 1.0 if half == 0.0 else math.sin(half) / half)
 
 
 class Approach(NamedTuple):
@@ -155,10 +162,17 @@ def approach(outline: Outline, rest: Rest, last_step: float) -> Approach:
 
 
 @compiled
-def clear_angle(outline: Outline, last_step: float) -> float:
-    """Drive angle beyond which a straight rod has passed the contour: first contact of the opposite sweep [rad]."""
-    opposite = mirrored(outline)
+def clear_angle(outline: Outline, rest: Rest, last_step: float) -> float:
+    """Drive angle beyond which an unloaded rod has passed the contour: first contact of the opposite sweep [rad]."""
+    opposite, curvature = mirrored(outline), -rest.curvature
     low, high = ends(opposite)
-    begin, _ = _first(opposite, STRAIGHT, high, _nearest(opposite, low, high, last_step)[0], last_step)
+    nearest = _nearest(opposite, low, high, last_step)[0]
+    begin, _ = _first(opposite, Rest(curvature, rest.reach), high, nearest, last_step)
     at = place(opposite, begin)
-    return math.pi - math.atan2(at.y, at.x)
+    return math.pi - (math.atan2(at.y, at.x) - chord_angle(curvature, math.hypot(at.x, at.y)))
+
+
+@compiled
+def chord_angle(curvature: float, distance: float) -> float:
+    """Angle of the chord of an arc to its tangents at the ends [rad]; π/2 for a chord longer than the diameter."""
+    return math.asin(min(max(0.5 * curvature * distance, -1.0), 1.0))

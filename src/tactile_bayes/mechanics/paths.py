@@ -63,7 +63,7 @@ class Paths:
     largest_curvature: Floats
     """Largest curvature of the rod up to snap-off [1/L], with a relative error of 1e-4."""
     clear_angle: Floats
-    """Drive angle beyond which a straight rod has passed the contour, as far as that is known [rad]."""
+    """Drive angle beyond which the unloaded rod has passed the contour, as far as that is known [rad]."""
     tolerance: Floats | None
     shapes: Shapes
     sweeps: Sweeps
@@ -123,7 +123,8 @@ class Paths:
         return _as_states(self.sampled[index])
 
     def states_at(self, index: Index, parameter: Floats) -> States:
-        """Exact states at parameters of the contours, on the path or beyond its end."""
+        """Exact states of straight rods at parameters of the contours, on the path or beyond its end."""
+        assert not self.sweeps.rest_curvature.any()
         locus = self.sweep_frame.locate(index, parameter)
         wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, self.friction_angle[index])
         return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
@@ -134,6 +135,7 @@ def trace(
     *,
     friction_angle: ArrayLike = 0.0,
     suspension_compliance: ArrayLike = 0.0,
+    rest_curvature: ArrayLike = 0.0,
     tolerance: Floats | None = None,
     drive_angles: Floats | None = None,
     relative: bool = False,
@@ -149,6 +151,8 @@ def trace(
         Friction angle δ = arctan μ [rad].
     suspension_compliance : float or array_like, shape (n,)
         Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)].
+    rest_curvature : float or array_like, shape (n,)
+        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
     tolerance : ndarray, shape (3,), optional
         Tolerated errors of the loads [EI/L and EI/L²], for likelihoods, which is several times faster; by default
         events are computed to rounding.
@@ -176,6 +180,7 @@ def trace(
         backward=np.ascontiguousarray(sweep_frame.mirrored),
         friction_angle=_each(friction_angle, count),
         compliance=_each(compliance, count),
+        rest_curvature=_each(rest_curvature, count),
         offset=np.zeros(count),
         rigidity=np.ones(count),
     )

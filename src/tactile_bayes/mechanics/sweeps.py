@@ -14,7 +14,7 @@ from tactile_bayes.mechanics.branch import MOST_CHANGES, BranchWorkspace, branch
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
 from tactile_bayes.mechanics.equilibrium import Rig, Scene
-from tactile_bayes.mechanics.limits import STRAIGHT, clear_angle
+from tactile_bayes.mechanics.limits import clear_angle, rest_of
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
@@ -65,6 +65,8 @@ class Sweeps(NamedTuple):
     backward: Flags
     friction_angle: Floats
     compliance: Floats
+    rest_curvature: Floats
+    """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]."""
     offset: Floats
     """Encoder offset in the laboratory frame [rad]."""
     rigidity: Floats
@@ -105,7 +107,7 @@ class Solutions(NamedTuple):
     curvature: Floats
     """Largest curvature of the rod up to snap-off [1/L], if states are computed."""
     clear_angle: Floats
-    """Drive angle beyond which the straight rod is clear [rad]; NaN if it is not computed."""
+    """Drive angle beyond which the unloaded rod is clear [rad]; NaN if it is not computed."""
 
 
 _INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")
@@ -193,7 +195,8 @@ def _solve(
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
         rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
         found = Found(loads[c], all_states[c], changes[i])
-        scene = Scene(outline, STRAIGHT, rig, exact)
+        rest = rest_of(sign * sweep.rest_curvature)
+        scene = Scene(outline, rest, rig, exact)
         ends = follow_branch(scene, knots, samples, accuracy, tolerance, workspace, found)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
@@ -201,7 +204,7 @@ def _solve(
         event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
         event.clear_angle = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
-            event.clear_angle = clear_angle(outline, accuracy.first_step)
+            event.clear_angle = clear_angle(outline, rest, accuracy.first_step)
 
 
 def solve_sweeps(

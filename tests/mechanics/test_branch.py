@@ -1,0 +1,121 @@
+"""Branches of equilibria of rods with constant rest curvature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from helpers.integration import ATOL, RTOL
+from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw
+from tactile_bayes.contours.sweep_frame import SweepFrame
+from tactile_bayes.mechanics.paths import trace
+from tactile_bayes.mechanics.phases import NONE, TIP
+from tactile_bayes.mechanics.reachability import Reachability, SnapOff
+
+COUNT = 30
+RNG = np.random.default_rng(11)
+SIZES, Q, X_C = np.exp(RNG.normal(0.0, 0.5, COUNT)), RNG.uniform(0.2, 0.8, COUNT), RNG.normal(0.0, 0.15, COUNT)
+CONTOURS = {
+    "parabola": Parabola(SIZES, Q, X_C),
+    "circle": Circle(0.5 * SIZES, Q, X_C),
+    "ellipse": Ellipse(SIZES, 0.5 * SIZES[::-1], Q, X_C),
+    "sharp power": PowerLaw(SIZES, RNG.uniform(1.3, 1.9, COUNT), Q, X_C),
+    "joined": Joined(Parabola(SIZES, Q, X_C), Circle(0.5 * SIZES[::-1], Q, X_C)),
+}
+ANGLES = np.linspace(-1.0, 4.5, 56)
+
+
+def traced(contour, curvature, *, backward=False, friction=0.0, compliance=0.0, **options):
+    contour, zero = contour.broadcast_to((COUNT,)), np.zeros(COUNT)
+    sweep_frame = SweepFrame(contour, zero, zero, 1.0, 0.0, np.full(COUNT, backward))
+    return trace(
+        sweep_frame,
+        friction_angle=np.arctan(friction),
+        suspension_compliance=compliance,
+        rest_curvature=curvature,
+        drive_angles=ANGLES,
+        **options,
+    )
+
+
+def mirrored(contour):
+    if isinstance(contour, Joined):
+        return Joined(mirrored(contour.right), mirrored(contour.left))
+    values = {**vars(contour), "x_c": -np.asarray(contour.x_c)}
+    return type(contour)(**values)
+
+
+@pytest.mark.parametrize("curvature", [-0.8, 0.05, 0.6])
+@pytest.mark.parametrize("name", CONTOURS)
+@pytest.mark.parametrize(("backward", "friction"), [(False, 0.0), (True, 0.3)])
+def test_states_satisfy_the_integrated_equations(name, curvature, backward, friction):
+    """From the pivot, with drive angle and loads, the rod ends at the contact, with its rest curvature there."""
+    paths = traced(CONTOURS[name], curvature, backward=backward, friction=friction)
+    assert np.count_nonzero(paths.reach == Reachability.TOUCHES) > COUNT // 2
+    states = paths.sampled[paths.sampled[..., 0] != NONE]
+    own = -curvature if backward else curvature
+    for state in states[:: max(1, len(states) // 8)]:
+        phase, _, x, y, alpha, drive_angle, moment, force_x, force_y, arclength, tip_angle = state[:11]
+
+        def slope(_s, z, force_x=force_x, force_y=force_y):
+            return [np.cos(z[2]), np.sin(z[2]), z[3], force_y * np.cos(z[2]) - force_x * np.sin(z[2])]
+
+        start = [0.0, 0.0, drive_angle, own - moment]
+        end = solve_ivp(slope, (0.0, arclength), start, method="DOP853", rtol=RTOL, atol=ATOL).y[:, -1]
+        assert end == pytest.approx([x, y, tip_angle, own], abs=1e-10)
+        assert np.arctan2(-force_x, force_y) == pytest.approx(alpha + np.arctan(friction), abs=1e-12)
+        assert arclength == 1.0 if phase == TIP else tip_angle == pytest.approx(alpha, abs=1e-12)
+
+
+@pytest.mark.parametrize("curvature", [-0.5, 0.5])
+@pytest.mark.parametrize("name", CONTOURS)
+def test_a_backward_sweep_is_the_forward_one_of_the_mirror_image(name, curvature):
+    forward = traced(CONTOURS[name], curvature, friction=0.1, compliance=0.05)
+    backward = traced(mirrored(CONTOURS[name]), -curvature, backward=True, friction=0.1, compliance=0.05)
+    np.testing.assert_array_equal(backward.reach, forward.reach)
+    for event in ("first_angle", "snap_angle"):
+        np.testing.assert_allclose(getattr(backward, event), getattr(forward, event), atol=1e-10)
+    np.testing.assert_allclose(backward.sampled[..., 6:9], forward.sampled[..., 6:9], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", CONTOURS)
+def test_a_straight_rod_is_the_limit(name):
+    """Linearly in the curvature: the difference for 1e-6 is ten times that for 1e-7."""
+    straight, small, smaller = (traced(CONTOURS[name], curvature) for curvature in (0.0, 1e-5, 1e-6))
+    there = straight.reach == Reachability.TOUCHES
+    far, near = (np.abs(one.snap_angle - straight.snap_angle)[there] for one in (small, smaller))
+    assert far.max() < 1e-4
+    np.testing.assert_allclose(near, 0.1 * far, atol=1e-3 * far.max())
+
+
+@pytest.mark.parametrize("curvature", [-0.6, 0.7])
+def test_the_drive_angle_of_a_fold_is_the_greatest_nearby(curvature):
+    """Of the states before it, to the resolution of the samples; and the drive angles in contact end there."""
+    paths = traced(CONTOURS["parabola"], curvature)
+    folds = np.flatnonzero((paths.reach == Reachability.TOUCHES) & (paths.snap_off == SnapOff.FOLD))
+    assert folds.size > 10
+    for i in folds:
+        contact = paths.sampled[i, :, 0] != NONE
+        np.testing.assert_array_equal(contact, (paths.first_angle[i] <= ANGLES) & (paths.snap_angle[i] >= ANGLES))
+
+
+def test_a_rod_curved_against_the_load_is_straightened_first():
+    """Its contact then moves outward, to greater parameters, before it moves inward."""
+    paths = traced(CONTOURS["parabola"], 0.8)
+    there = paths.reach == Reachability.TOUCHES
+    parameter = np.where(paths.sampled[..., 0] != NONE, paths.sampled[..., 1], -np.inf).max(axis=1)
+    assert np.mean(parameter[there] > paths.first_parameter[there]) > 0.5
+    straight = traced(CONTOURS["parabola"], 0.0)
+    parameter = np.where(straight.sampled[..., 0] != NONE, straight.sampled[..., 1], -np.inf).max(axis=1)
+    assert np.all(parameter <= straight.first_parameter)
+
+
+@pytest.mark.parametrize("name", CONTOURS)
+def test_loads_as_accurate_as_noise_requires_are_near_the_exact_ones(name):
+    noise = np.array([0.02, 0.05, 0.05])
+    likely, exact = traced(CONTOURS[name], -0.4, tolerance=0.1 * noise), traced(CONTOURS[name], -0.4)
+    np.testing.assert_array_equal(likely.reach, exact.reach)
+    off = np.abs(likely.observables(ANGLES) - exact.observables(ANGLES)) / noise
+    assert np.quantile(off, 0.999) < 0.01
+    np.testing.assert_allclose(likely.snap_angle, exact.snap_angle, atol=1e-5)
