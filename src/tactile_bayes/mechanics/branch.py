@@ -91,8 +91,8 @@ _FLOOR, _NOISE = 1e-2, 1e3
 _AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.01, 0.8, 0.3, 2.0
 """Share of the tolerated error that is aimed at, and bounds on the change of the length."""
 
-_MOST = 160
-"""Largest number of legs of a path."""
+_MOST = 256
+"""Largest number of legs of a path, and a quarter of the largest number that are tried."""
 
 _IN_A_DIP = 1e-5
 """Error of the drive angle beyond a maximum, over the least fall that makes it the snap-off."""
@@ -281,7 +281,9 @@ def follow_branch(
     begin_angle, snap_parameter, fate = first, z.p, _NEVER
     changes, largest, is_first, done, runs_out = 0, math.nan, True, 0, False
     wants_states = found.changes.shape[0] > 0
-    for _ in range(_MOST):
+    for _ in range(4 * _MOST):
+        if done == _MOST:
+            break
         leg = leg_from(loaded, begin, onward_from, length)
         sound, end, last_before = sample_leg(loaded, leg, begin, behind_begin, known, settled, work)
         known, knot, at_knot = 0.0, math.nan, begin
