@@ -1,8 +1,10 @@
 """The branch of equilibria of any rod along one contour, from first contact to snap-off.
 
 The branch is followed in legs (`leg`), which are halved until the tails of their series are small enough. A leg ends
-where the phase changes or the contour is not smooth. As on the path of a straight rod (`path`), the first maximum of
-the drive angle is the snap-off, unless the dip after it is shallow.
+where the phase changes or the contour is not smooth. The first maximum of the drive angle is the snap-off: a fold (its
+derivative vanishes), a corner, or the point where the line of force passes through the pivot. A maximum after which the
+drive angle falls by less than `curves.DIP` before it exceeds the maximum again does not count: the branch continues
+where it does so. This happens where a radius of curvature vanishes.
 """
 
 from __future__ import annotations
@@ -35,13 +37,14 @@ from tactile_bayes.mechanics.equilibrium import (
     balance,
     dot,
     in_phase,
+    less,
+    nowhere,
     settle,
     settle_at,
 )
 from tactile_bayes.mechanics.leg import (
     NUDGE,
     PLACE,
-    Before,
     Leg,
     LegCurves,
     first_equilibrium,
@@ -53,7 +56,6 @@ from tactile_bayes.mechanics.leg import (
     shortened,
 )
 from tactile_bayes.mechanics.limits import approach
-from tactile_bayes.mechanics.outline import ends
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
     Asked,
@@ -87,7 +89,11 @@ _LONGEST, _SHORTEST = 1.0, 1e-6
 """Lengths between which those of legs lie."""
 
 _ACCEPT = 0.05
+"""Share of the tolerated error that is accepted."""
+
 _FLOOR, _NOISE = 1e-2, 1e3
+"""Shares of the tolerated error: below the first an exact leg has rounding errors only, above the second others too."""
+
 _AIM, _BACK, _LEAST_PACE, _MOST_PACE = 0.01, 0.8, 0.3, 2.0
 """Share of the tolerated error that is aimed at, and bounds on the change of the length."""
 
@@ -103,12 +109,8 @@ _NO_MOMENT = 1e-7
 _ROUNDING = 1e-14
 """Tail of the series of a drive angle that its rounding leaves [rad]."""
 
-_SETTLED = 1e-14
-"""Share of a leg by which an exact state may miss its drive angle; the series correct for it."""
-
 _TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
-
 
 _BY_Q = Equilibrium(0.0, 1.0, 0.0)
 
@@ -165,7 +167,7 @@ def _knot(leg: Leg, knots: Floats, low: float, work: LegCurves) -> tuple[float, 
 
 @compiled
 def _excess(accuracy: Accuracy, tolerance: Floats, dips: bool, work: LegCurves) -> float:
-    """Estimated error of the series over the tolerated one; see `curves.misses`."""
+    """Estimated error of the drive angle, the loads or the states over the tolerated one."""
     curves = work.curves
     angle, change = tail(curves.series[ANGLE]), change_of(curves.series[ANGLE])
     if dips:
@@ -219,8 +221,7 @@ def _polished_fold(loaded: Loaded, leg: Leg, stop: float, work: LegCurves) -> fl
 @compiled
 def _share(leg: Leg, found: Balance) -> float:
     """Position on a leg."""
-    at, begin = found.at, leg.begin
-    return dot(leg.normal, Equilibrium(at.p - begin.p, at.q - begin.q, at.force - begin.force))
+    return dot(leg.normal, less(found.at, leg.begin))
 
 
 @compiled
@@ -262,20 +263,28 @@ def follow_branch(
     workspace: BranchWorkspace,
     found: Found,
 ) -> Ends:
-    """Follow a branch from first contact to snap-off; arguments as of `path.follow`."""
-    outline, rig, work = scene.outline, scene.rig, workspace.leg
+    """Follow a branch from first contact to snap-off.
+
+    Parameters
+    ----------
+    scene : Scene
+    knots : ndarray, shape (k,)
+        Parameters at which the contour may not be smooth.
+    tolerance : ndarray, shape (3,)
+        Tolerated errors of moment and forces [EI/L and EI/L²].
+    """
+    rig, work = scene.rig, workspace.leg
     curves = work.curves
-    near = approach(outline, scene.rest, accuracy.first_step)
+    near = approach(scene.outline, scene.rest, accuracy.first_step)
     if near.reach != _TOUCHES:
         return _nothing(near.reach, near.distance)
-    low, delta = ends(outline)[0], rig.friction_angle
+    low, delta = near.low, rig.friction_angle
     loaded = in_phase(scene, near.tip_first)
     z = first_equilibrium(loaded, scene.rest, near)
     begin = balance(loaded, z)[0]
     first = begin.drive_angle
-    nowhere = Equilibrium(math.nan, math.nan, math.nan)
-    onset, nothing = Equilibrium(0.0, 0.0, 1.0), Before(nowhere, nowhere)
-    onward_from, behind_begin, length, known = onset, nothing, _FIRST, 0.0
+    onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
+    behind_begin, length, known = nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
     shortest, excess_before = _LONGEST * 0.5**accuracy.halvings, math.inf
     begin_angle, snap_parameter, fate = first, z.p, _NEVER

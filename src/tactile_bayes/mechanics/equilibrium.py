@@ -32,8 +32,11 @@ __all__ = [
     "balance",
     "dot",
     "in_phase",
+    "less",
+    "nowhere",
     "settle",
     "settle_at",
+    "times",
 ]
 
 _MOST_STEPS = 25
@@ -115,7 +118,6 @@ class _Equations(NamedTuple):
     by_u: Equilibrium
     by_v: Equilibrium
     angle_by: Equilibrium
-    lever_by_p: float
     bend: float
 
 
@@ -159,7 +161,7 @@ def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
         -sin * tangent.force - cos * turning,
         cos * tangent.force - sin * turning,
     )
-    return found, _Equations(along - here.u, across - here.v, by_u, by_v, angle_by, by_u.p, spot.bend)
+    return found, _Equations(along - here.u, across - here.v, by_u, by_v, angle_by, spot.bend)
 
 
 @compiled
@@ -174,8 +176,8 @@ def settle(
     at = start
     for _ in range(_MOST_STEPS):
         found, equations = balance(loaded, at)
-        miss_u, miss_v, by_u, by_v, angle_by, lever_by_p, bend = equations
-        off = dot(normal, Equilibrium(at.p - origin.p, at.q - origin.q, at.force - origin.force)) - level
+        miss_u, miss_v, by_u, by_v, angle_by, bend = equations
+        off = dot(normal, less(at, origin)) - level
         det = dot(normal, found.tangent)
         first, second, third = _cross(by_v, normal), _cross(normal, by_u), found.tangent
         dp = (miss_u * first.p + miss_v * second.p + off * third.p) / det
@@ -190,7 +192,7 @@ def settle(
             angle = found.drive_angle - dot(angle_by, Equilibrium(dp, dq, df))
             before = found.at.force
             lever = found.holding_moment / before if before > 0.0 else 0.0
-            moment = found.holding_moment - df * lever - before * lever_by_p * dp
+            moment = found.holding_moment - df * lever - before * by_u.p * dp
             share, turn = (-df / before if before > 0.0 else 0.0), -bend * dp
             force_x = found.force_x + share * found.force_x - turn * found.force_y
             force_y = found.force_y + share * found.force_y + turn * found.force_x
@@ -206,7 +208,7 @@ def settle(
                 found.x_rate,
                 found.y_rate,
             )
-    return _nowhere()
+    return nowhere()
 
 
 @compiled
@@ -228,11 +230,11 @@ def settle_at(loaded: Loaded, p: float, start: Equilibrium) -> Balance:
         at = Equilibrium(p, at.q - share * dq, at.force - share * df)
         if largest <= SETTLED:
             return balance(loaded, at)[0]
-    return _nowhere()
+    return nowhere()
 
 
 @compiled
-def _nowhere() -> Balance:
+def nowhere() -> Balance:
     """Balance of NaN."""
     nothing = Equilibrium(math.nan, math.nan, math.nan)
     return Balance(nothing, math.nan, math.nan, math.nan, math.nan, nothing, math.nan, math.nan, math.nan, math.nan)
@@ -246,3 +248,14 @@ def _cross(a: Equilibrium, b: Equilibrium) -> Equilibrium:
 @compiled
 def dot(a: Equilibrium, b: Equilibrium) -> float:
     return a.p * b.p + a.q * b.q + a.force * b.force
+
+
+@compiled
+def less(a: Equilibrium, b: Equilibrium) -> Equilibrium:
+    """Difference a − b."""
+    return Equilibrium(a.p - b.p, a.q - b.q, a.force - b.force)
+
+
+@compiled
+def times(factor: float, a: Equilibrium) -> Equilibrium:
+    return Equilibrium(factor * a.p, factor * a.q, factor * a.force)

@@ -14,7 +14,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, Curves, curves_of
-from tactile_bayes.mechanics.equilibrium import Balance, Equilibrium, Loaded, dot, settle
+from tactile_bayes.mechanics.equilibrium import Balance, Equilibrium, Loaded, dot, less, settle, times
 from tactile_bayes.mechanics.limits import Approach, Rest, chord_angle
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.series import value_and_slope, weighted
@@ -23,7 +23,6 @@ from tactile_bayes.numerics import chebyshev
 __all__ = [
     "NUDGE",
     "PLACE",
-    "Before",
     "Leg",
     "LegCurves",
     "first_equilibrium",
@@ -123,9 +122,9 @@ def leg_from(loaded: Loaded, begin: Balance, before: Equilibrium, length: float)
     size = length / math.sqrt(dot(across, tangent))
     if dot(across, before) < 0.0:
         size = -size
-    along = Equilibrium(size * tangent.p, size * tangent.q, size * tangent.force)
+    along = times(size, tangent)
     scale = 1.0 / (size * dot(across, tangent))
-    return Leg(begin.at, along, Equilibrium(scale * across.p, scale * across.q, scale * across.force), loaded.tip)
+    return Leg(begin.at, along, times(scale, across), loaded.tip)
 
 
 @compiled
@@ -134,7 +133,7 @@ def shortened(leg: Leg, share: float) -> Leg:
     along, normal = leg.along, leg.normal
     return Leg(
         leg.begin,
-        Equilibrium(share * along.p, share * along.q, share * along.force),
+        times(share, along),
         Equilibrium(normal.p / share, normal.q / share, normal.force / share),
         leg.tip,
     )
@@ -143,11 +142,11 @@ def shortened(leg: Leg, share: float) -> Leg:
 @compiled
 def settle_on(loaded: Loaded, leg: Leg, way: float, start: Equilibrium, settled: float) -> Balance:
     """Equilibrium at a position on a leg; tangent and rates are derivatives by the position."""
-    return by_way(leg, settle(loaded, start, leg.begin, leg.normal, way, settled))
+    return _by_way(leg, settle(loaded, start, leg.begin, leg.normal, way, settled))
 
 
 @compiled
-def by_way(leg: Leg, found: Balance) -> Balance:
+def _by_way(leg: Leg, found: Balance) -> Balance:
     """Equilibrium with tangent and rates by the position on a leg."""
     tangent = found.tangent
     scale = 1.0 / dot(leg.normal, tangent)
@@ -157,7 +156,7 @@ def by_way(leg: Leg, found: Balance) -> Balance:
         found.holding_moment,
         found.force_x,
         found.force_y,
-        Equilibrium(scale * tangent.p, scale * tangent.q, scale * tangent.force),
+        times(scale, tangent),
         scale * found.angle_rate,
         scale * found.moment_rate,
         scale * found.x_rate,
@@ -179,10 +178,10 @@ def _combined(weights: Floats, found: Balance, old: Balance, older: Balance) -> 
 
 
 @compiled
-def _cubic(leg: Leg, found: Balance, before: Before, way: float) -> Equilibrium:
+def _cubic(leg: Leg, found: Balance, before: Balance, way: float) -> Equilibrium:
     """Cubic through the beginning of a leg and an equilibrium before it, with their tangents, at a position."""
     z, rate, old, tangent = found.at, found.tangent, before.at, before.tangent
-    h = dot(leg.normal, Equilibrium(z.p - old.p, z.q - old.q, z.force - old.force))
+    h = dot(leg.normal, less(z, old))
     scale = 1.0 / dot(leg.normal, tangent)
     return Equilibrium(
         _cubic_at(z.p, rate.p, old.p, scale * tangent.p, h, way),
@@ -198,13 +197,6 @@ def _cubic_at(new: float, rate: float, old: float, old_rate: float, h: float, t:
     return new + t * (rate + t * (bend + t * twist))
 
 
-class Before(NamedTuple):
-    """An equilibrium before a leg and the tangent there, in any length; NaN where there is none."""
-
-    at: Equilibrium
-    tangent: Equilibrium
-
-
 @compiled
 def guess(work: LegCurves, way: float) -> Equilibrium:
     """Equilibrium at a position, from the series."""
@@ -216,15 +208,15 @@ def guess(work: LegCurves, way: float) -> Equilibrium:
 
 @compiled
 def sample_leg(
-    loaded: Loaded, leg: Leg, begin: Balance, before: Before, known: float, settled: float, work: LegCurves
-) -> tuple[bool, Balance, Before]:
+    loaded: Loaded, leg: Leg, begin: Balance, before: Balance, known: float, settled: float, work: LegCurves
+) -> tuple[bool, Balance, Balance]:
     """Fit the series of a leg, unless the branch does not cut all planes, and return the equilibria at its last nodes.
 
     The search at a node starts from a polynomial through the nodes before it. If the series of a longer leg in the same
     direction are at hand, of which this is the share `known` > 0, it starts from these.
     """
     series, at_nodes, half = work.curves.series, work.at_nodes, work.nodes.size
-    found = by_way(leg, begin)
+    found = _by_way(leg, begin)
     old, older = found, found
     for k in range(half):
         if k > 0:
@@ -247,4 +239,4 @@ def sample_leg(
     for c in range(PLACE):
         weighted(work.fit, at_nodes[c], series[c])
     weighted(work.fit, at_nodes[PLACE], work.place)
-    return True, found, Before(old.at, old.tangent)
+    return True, found, old

@@ -1,4 +1,4 @@
-"""Limits of a path: whether a rod reaches the contour, first contact, and the point where the lever arm vanishes.
+"""Limits of a path: whether a rod reaches the contour, and first contact.
 
 At first contact the rod has its rest shape. Where that is a circular arc of curvature κ0, the rod has the angle
 asin(κ0 r/2) to the line from the pivot at the distance r from it.
@@ -24,7 +24,7 @@ class _Sought(IntEnum):
     LEVER = 0
     """Lever arm of a force across the contour."""
     TURNED = 1
-    """Given angle less the angle between the unloaded rod and the contour's direction."""
+    """Angle of the contour's direction to the unloaded rod."""
     WITHIN = 2
     """Margin to the rod's reach."""
 
@@ -63,8 +63,6 @@ class Approach(NamedTuple):
     """A `Reachability`."""
     distance: float
     """Least distance of contour and pivot [L]."""
-    nearest: float
-    """Nearest point."""
     begin: float
     """First contact."""
     tip_first: bool
@@ -74,7 +72,7 @@ class Approach(NamedTuple):
 
 
 @compiled
-def _missing(outline: Outline, rest: Rest, what: _Sought, turned: float, p: float) -> tuple[float, float]:
+def _missing(outline: Outline, rest: Rest, what: _Sought, p: float) -> tuple[float, float]:
     """Function whose root is sought, and its derivative."""
     at = place(outline, p)
     along, facing = frame(at)
@@ -85,25 +83,24 @@ def _missing(outline: Outline, rest: Rest, what: _Sought, turned: float, p: floa
     # The angle between the line from the pivot and the contour's direction grows to the left as long as the contour
     # faces the pivot. It jumps below the pivot, where no contour is.
     bearing = math.atan2(-at.x, at.y) + 0.5 * math.pi
+    angle = bearing - math.atan2(at.sin, at.cos)
     rate = facing * at.speed / (at.x * at.x + at.y * at.y) + at.bend
     if rest.curvature != 0.0:
         distance = math.hypot(at.x, at.y)
-        sine = min(max(0.5 * rest.curvature * distance, -1.0), 1.0)
-        turned -= math.asin(sine)
+        angle += chord_angle(rest.curvature, distance)
+        sine = 0.5 * rest.curvature * distance
         if abs(sine) < 1.0:
             rate -= 0.5 * rest.curvature * along * at.speed / (distance * math.sqrt((1.0 - sine) * (1.0 + sine)))
-    return turned - (bearing - math.atan2(at.sin, at.cos)), rate
+    return -angle, rate
 
 
 @compiled
-def _root(
-    outline: Outline, rest: Rest, what: _Sought, turned: float, positive: float, negative: float, last_step: float
-) -> float:
+def _root(outline: Outline, rest: Rest, what: _Sought, positive: float, negative: float, last_step: float) -> float:
     """Root by Newton's method within a bracket, until a step is a given share of it."""
     p, before = 0.5 * (positive + negative), abs(negative - positive)
     settled = last_step * before
     for _ in range(100):
-        value, slope = _missing(outline, rest, what, turned, p)
+        value, slope = _missing(outline, rest, what, p)
         new, positive, negative, before = newton_step(p, value, slope, positive, negative, before)
         step = abs(new - p)
         p = new
@@ -115,13 +112,13 @@ def _root(
 @compiled
 def _nearest(outline: Outline, low: float, high: float, last_step: float) -> tuple[float, bool, bool]:
     """Parameter of the nearest point, and whether it lies beyond the greatest or the least parameter."""
-    beyond_high = _missing(outline, STRAIGHT, _Sought.LEVER, 0.0, high)[0] <= 0.0
-    beyond_low = _missing(outline, STRAIGHT, _Sought.LEVER, 0.0, low)[0] >= 0.0
+    beyond_high = _missing(outline, STRAIGHT, _Sought.LEVER, high)[0] <= 0.0
+    beyond_low = _missing(outline, STRAIGHT, _Sought.LEVER, low)[0] >= 0.0
     if beyond_high:
         return high, beyond_high, beyond_low
     if beyond_low:
         return low, beyond_high, beyond_low
-    return _root(outline, STRAIGHT, _Sought.LEVER, 0.0, high, low, last_step), beyond_high, beyond_low
+    return _root(outline, STRAIGHT, _Sought.LEVER, high, low, last_step), beyond_high, beyond_low
 
 
 @compiled
@@ -133,9 +130,9 @@ def _is_out(outline: Outline, rest: Rest, p: float) -> bool:
 @compiled
 def _first(outline: Outline, rest: Rest, high: float, nearest: float, last_step: float) -> tuple[float, bool]:
     """Parameter of first contact, and whether the tip touches first."""
-    tangent = _root(outline, rest, _Sought.TURNED, 0.0, high, nearest, last_step)
+    tangent = _root(outline, rest, _Sought.TURNED, high, nearest, last_step)
     if _is_out(outline, rest, tangent):
-        return _root(outline, rest, _Sought.WITHIN, 0.0, nearest, tangent, last_step), True
+        return _root(outline, rest, _Sought.WITHIN, nearest, tangent, last_step), True
     return tangent, False
 
 
@@ -158,7 +155,7 @@ def approach(outline: Outline, rest: Rest, last_step: float) -> Approach:
         reach = _TOO_FAR
     elif beyond_high or open_end:
         reach = _ENDS
-    return Approach(reach, distance, nearest, begin, tip_first, low)
+    return Approach(reach, distance, begin, tip_first, low)
 
 
 @compiled

@@ -101,13 +101,8 @@ def _tangential_state(x: float, y: float, alpha: float, delta: float, length: fl
 
 
 @compiled
-def _tip_state(
-    x: float, y: float, alpha: float, delta: float, miss: float, known: Tables, workspace: Workspace
-) -> State:
-    """State in tip contact (Phase A): distance and direction of the tip give amplitude and direction at the contact.
-
-    Derivatives have an error of 1e-8, or of rounding if `miss` is 0.
-    """
+def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, workspace: Workspace) -> State:
+    """State in tip contact (Phase A): distance and direction of the tip give amplitude and direction at the contact."""
     larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
     deficit2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
     if not deficit2 >= 0.0:
@@ -122,8 +117,7 @@ def _tip_state(
     )
     by_slope, by_distance = math.nan, -math.inf
     if chi > 0.0:
-        if miss == 0.0:
-            _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * epsilon1) ** 2)
+        _, by_chi, by_psi1 = arc_and_slopes(chi, math.sin(0.5 * epsilon1) ** 2)
         angle_x, angle_1, value = (
             chord_direction_rate(arc, by_chi),
             1.0 + chord_direction_rate(arc, by_psi1),
@@ -164,7 +158,7 @@ def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArra
                 _store(_tangential_state(x, y, alpha, delta, length, arc, by_chi), out[i])
                 phase[i] = TANGENTIAL
         if phase[i] == TIP or (phase[i] == NONE and out[i, 8] > 1.0):
-            ending = _tip_state(x, y, alpha, delta, 0.0, known, workspace)
+            ending = _tip_state(x, y, alpha, delta, known, workspace)
             _store(ending, out[i])
             phase[i] = NONE if math.isnan(ending.arclength) else TIP
 
