@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from helpers.legendre import equilibrium, tangential_arclength
+from helpers.single_states import states_at
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw
 from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.curves import DIP
@@ -96,7 +97,7 @@ def test_invariants_on_random_contours(family, standoff):
     # Along the contour, from just after first contact up to snap-off.
     ways = np.linspace(0.02, 1.0, 60) ** 2
     parameter = paths.first_parameter[index, None] + (paths.snap_parameter - paths.first_parameter)[index, None] * ways
-    w = paths.states_at(index[:, None], parameter).wrench
+    w = states_at(paths, index[:, None], parameter).wrench
     assert np.all(w.phase != NONE)
     loads = np.stack([w.drive_angle, w.holding_moment, w.force_x, w.force_y])
     assert np.isfinite(loads).all()
@@ -129,7 +130,7 @@ def test_snap_off_is_the_first_maximum(family, options):
     ways = np.linspace(0.002, 1.0, 400) ** 2
     begin = paths.first_parameter[index]
     parameter = begin[:, None] + (seen_end - begin)[:, None] * ways
-    angle = np.nan_to_num(paths.states_at(index[:, None], parameter).wrench.drive_angle, nan=-9.0)
+    angle = np.nan_to_num(states_at(paths, index[:, None], parameter).wrench.drive_angle, nan=-9.0)
     falls = np.diff(angle, axis=1) < -1e-9
     at = np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)
     dense = angle[np.arange(index.size), at]
@@ -139,7 +140,7 @@ def test_snap_off_is_the_first_maximum(family, options):
     # A maximum may be too flat for the dense scan, which then goes on to the next one: it must be one, though.
     side = 2e-5 * (begin - seen_end)
     beside = paths.snap_parameter[index] + side * np.array([[1.0], [-1.0]])
-    around = paths.states_at(np.broadcast_to(index, beside.shape), beside).wrench.drive_angle
+    around = states_at(paths, np.broadcast_to(index, beside.shape), beside).wrench.drive_angle
     flat = (miss < 0) & np.all(around < paths.snap_angle[index] + (0 if options is SCAN else 1e-4), axis=0)
     bad = ~(np.abs(miss) < room) & ~flat
     assert not bad.any(), [(int(i), float(m)) for i, m in zip(index[bad], miss[bad], strict=True)]
@@ -156,7 +157,7 @@ def test_a_shallow_dip_is_passed_over():
     begin, end = paths.first_parameter[index, None], _nearest_parameter(sweep_frame, index)[:, None]
     away = np.geomspace(1e-6, 1.0, 300)
     parameter = np.concatenate([begin * away[::-1], np.zeros_like(begin), end * away], axis=1)
-    angle = paths.states_at(index[:, None], parameter).wrench.drive_angle
+    angle = states_at(paths, index[:, None], parameter).wrench.drive_angle
     angle = np.where(np.isnan(angle), -9.0, angle)
     most = np.maximum.accumulate(angle, axis=1)
     lost = most - angle > DIP
@@ -177,7 +178,7 @@ def test_a_dip_beside_a_corner_ends_the_path_though_it_is_narrow():
     exact, likely = trace(sweep_frame, **SCAN), trace(sweep_frame, **LIKELIHOOD)
     assert exact.snap_off[0] == SnapOff.CORNER
     ahead = np.linspace(exact.snap_parameter[0], exact.snap_parameter[0] - 0.1, 1000)
-    angle = exact.states_at(np.array([[0]]), ahead[None]).wrench.drive_angle[0]
+    angle = states_at(exact, np.array([[0]]), ahead[None]).wrench.drive_angle[0]
     assert DIP < np.max(np.maximum.accumulate(angle) - angle) < 5 * DIP
     assert angle[-1] > angle[0]
     np.testing.assert_allclose(likely.snap_angle, exact.snap_angle, rtol=0, atol=1e-6)
@@ -214,7 +215,7 @@ def test_tip_and_tangent_touch_at_almost_the_same_time(beyond, options):
     end = _nearest_parameter(near.sweep_frame, index)
     ways = np.linspace(0.002, 1.0, 400) ** 2
     parameter = near.first_parameter[:, None] + (end - near.first_parameter)[:, None] * ways
-    angle = np.nan_to_num(near.states_at(index[:, None], parameter).wrench.drive_angle, nan=-9.0)
+    angle = np.nan_to_num(states_at(near, index[:, None], parameter).wrench.drive_angle, nan=-9.0)
     falls = np.diff(angle, axis=1) < -1e-9
     dense = angle[index, np.where(falls.any(axis=1), falls.argmax(axis=1), ways.size - 1)]
     assert np.all(np.abs(near.snap_angle - dense) < 1e-2)
@@ -422,5 +423,5 @@ def test_the_dense_corner_is_where_arc_length_is_one():
     paths = trace(sweep_frame_of(Parabola(0.5, 0.5)), **SCAN)
     assert SnapOff(int(paths.snap_off[0])) == SnapOff.CORNER
     assert paths.snap_parameter[0] == pytest.approx(corner, abs=1e-12)
-    phases = paths.states_at(np.zeros(2, dtype=np.intp), corner + np.array([1e-9, -1e-9])).wrench.phase
+    phases = states_at(paths, np.zeros(2, dtype=np.intp), corner + np.array([1e-9, -1e-9])).wrench.phase
     np.testing.assert_array_equal(phases, [TANGENTIAL, TIP])

@@ -24,6 +24,7 @@ from scipy.optimize import root
 from helpers.contours_drawn import Scene, scenes
 from helpers.exact_path import ExactPath
 from helpers.exact_rod import mp
+from helpers.single_states import states_at
 from tactile_bayes.contours import Circle, Ellipse, Joined, Parabola, PowerLaw, ShapeFree, paper_profile
 from tactile_bayes.errors import ContourError
 from tactile_bayes.mechanics.elastica import tangential_arclength
@@ -50,15 +51,15 @@ FEW = settings(
 MANY = settings(FEW, max_examples=300)
 
 
-def states_at(paths, parameters):
+def states_along(paths, parameters):
     parameters = np.atleast_1d(parameters)
-    return paths.states_at(np.zeros(parameters.size, dtype=np.intp), parameters)
+    return states_at(paths, np.zeros(parameters.size, dtype=np.intp), parameters)
 
 
 def greatest_loads(paths):
     """The greatest moment and forces on the path, from states along all of it."""
     first, snap = paths.first_parameter[0], paths.snap_parameter[0]
-    wrench = states_at(paths, snap + (first - snap) * np.linspace(0.0, 1.0, 400)[:-1] ** 2).wrench
+    wrench = states_along(paths, snap + (first - snap) * np.linspace(0.0, 1.0, 400)[:-1] ** 2).wrench
     return np.array([np.nanmax(np.abs(getattr(wrench, name))) for name in CHANNELS])
 
 
@@ -77,9 +78,9 @@ def check_against_forty_digits(scene):
     exact, greatest = ExactPath(*scene), greatest_loads(paths)
     first, snap = float(paths.first_angle[0]), float(paths.snap_angle[0])
 
-    kind, last = exact.snap_off(exact.start(states_at(paths, paths.snap_parameter[0])))
+    kind, last = exact.snap_off(exact.start(states_along(paths, paths.snap_parameter[0])))
     assert abs(float(mp.mpf(snap) - last.drive_angle)) <= SNAP_OFF
-    at_end = states_at(paths, paths.snap_parameter[0]).wrench
+    at_end = states_along(paths, paths.snap_parameter[0]).wrench
     off = np.abs([float(getattr(at_end, name)[0]) for name in CHANNELS] - last.loads())
     assert np.all(off <= ACCURACY * greatest)
 
@@ -374,5 +375,5 @@ def test_the_kinds_of_ends():
     for kind, scene in ends.items():
         paths = scene.paths()
         exact = ExactPath(*scene)
-        found, _ = exact.snap_off(exact.start(states_at(paths, paths.snap_parameter[0])))
+        found, _ = exact.snap_off(exact.start(states_along(paths, paths.snap_parameter[0])))
         assert found == kind == SnapOff(int(paths.snap_off[0])).name.lower()

@@ -34,6 +34,8 @@ class SweepFrame:
         Half the rod's diameter, in the same unit.
     mirrored : ndarray of bool, shape (n,)
         Whether the sweep is a backward one.
+    rest_curvature : float or ndarray, shape (n,)
+        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/rod length].
     """
 
     contour: Contour
@@ -42,6 +44,7 @@ class SweepFrame:
     length: Parameter
     standoff: Parameter
     mirrored: Flags
+    rest_curvature: Parameter = 0.0
 
     @property
     def size(self) -> int:

@@ -56,6 +56,8 @@ from tactile_bayes.mechanics.leg import (
     shortened,
 )
 from tactile_bayes.mechanics.limits import approach
+from tactile_bayes.mechanics.outline import ends, is_inside, place
+from tactile_bayes.mechanics.pose import pose
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
     Asked,
@@ -110,7 +112,11 @@ _ROUNDING = 1e-14
 """Tail of the series of a drive angle that its rounding leaves [rad]."""
 
 _TOUCHES, _RUNS_OUT, _GRAZES = int(Reachability.TOUCHES), int(Reachability.RUNS_OUT), int(Reachability.GRAZES)
+_TOUCHES_TWICE = int(Reachability.TOUCHES_TWICE)
 _NEVER, _FOLD, _CORNER, _THRUST = (int(kind) for kind in SnapOff)
+
+_BODY = 8
+"""Number of parts of the rod between which a second contact is looked for."""
 
 _BY_Q = Equilibrium(0.0, 1.0, 0.0)
 
@@ -124,6 +130,7 @@ class Ends(NamedTuple):
     first_parameter: float
     snap_angle: float
     snap_parameter: float
+    """Where the path ends; also that of a second contact, if there is one."""
     snap_off: int
     phases: int
     """Number of phases."""
@@ -277,17 +284,19 @@ def follow_branch(
     curves = work.curves
     near = approach(scene.outline, scene.rest, accuracy.first_step)
     if near.reach != _TOUCHES:
-        return _nothing(near.reach, near.distance)
+        return _nothing(near.reach, near.distance, math.nan)
     low, delta = near.low, rig.friction_angle
     loaded = in_phase(scene, near.tip_first)
     z = first_equilibrium(loaded, scene.rest, near)
     begin = balance(loaded, z)[0]
     first = begin.drive_angle
     onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
+    if loaded.tip and z.q + delta < 0.0:
+        return _nothing(_TOUCHES_TWICE, near.distance, z.p)
     behind_begin, length, known = nothing, _FIRST, 0.0
     settled, power = max(SETTLED, 0.1 * accuracy.last_step), 1.0 / (2 * work.nodes.size - 1)
     shortest, excess_before = _LONGEST * 0.5**accuracy.halvings, math.inf
-    begin_angle, snap_parameter, fate = first, z.p, _NEVER
+    begin_angle, last_at, last_tip, fate = first, z, loaded.tip, _NEVER
     changes, largest, is_first, done, runs_out = 0, math.nan, True, 0, False
     wants_states = found.changes.shape[0] > 0
     for _ in range(4 * _MOST):
@@ -338,7 +347,10 @@ def follow_branch(
                     until = at_change
                 if folds:
                     until = settle_on(loaded, leg, stop, guess(work, stop), SETTLED)
-                snap_parameter, steadiness = until.at.p, 0.0
+                twice = _second_contact(scene, leg, stop, work)
+                if not math.isnan(twice):
+                    return _nothing(_TOUCHES_TWICE, near.distance, twice)
+                last_at, last_tip, steadiness = until.at, leg.tip, 0.0
                 if folds:
                     fate = _THRUST if abs(until.holding_moment) <= _NO_MOMENT else _FOLD
                 else:
@@ -347,10 +359,10 @@ def follow_branch(
                 if wants_states:
                     bent = _bent(stop, scene, curves)
                     largest = bent if math.isnan(largest) else max(bent, largest)
-                if found.changes.shape[0] > changes and (
-                    not changes or (found.changes[changes - 1, 1] > 0.0) != leg.tip
+                if found.changes.shape[0] > changes + 1 and (
+                    not changes or (found.changes[changes - 1, 3] > 0.0) != leg.tip
                 ):
-                    found.changes[changes, 0], found.changes[changes, 1] = leg.begin.p, leg.tip
+                    _note_event(leg.begin, leg.tip, found.changes[changes])
                     changes += 1
                 if samples.angles.size:
                     _store(leg, Course(stop, begin_angle, until.drive_angle, steadiness), work, workspace, done)
@@ -385,9 +397,11 @@ def follow_branch(
         if not math.isfinite(begin.at.p):
             break
     if fate == _NEVER:
-        return _nothing(_RUNS_OUT if runs_out else _GRAZES, near.distance)
+        return _nothing(_RUNS_OUT if runs_out else _GRAZES, near.distance, math.nan)
     if not begin_angle > first:
-        return _nothing(_GRAZES, near.distance)
+        return _nothing(_GRAZES, near.distance, math.nan)
+    if wants_states:
+        _note_event(last_at, last_tip, found.changes[changes])
     if samples.relative:
         for j in range(samples.angles.size):
             workspace.asked.angles[j] = first + samples.angles[j] * (begin_angle - first) + rig.offset
@@ -402,7 +416,56 @@ def follow_branch(
             polish_states(there, part, work, found)
         else:
             write_states(there, part, work, found)
-    return Ends(_TOUCHES, near.distance, first, near.begin, begin_angle, snap_parameter, fate, changes, largest)
+    return Ends(_TOUCHES, near.distance, first, near.begin, begin_angle, last_at.p, fate, changes, largest)
+
+
+@compiled
+def _note_event(at: Equilibrium, tip: bool, out: Floats) -> None:
+    out[0], out[1], out[2], out[3] = at.p, at.q, at.force, tip
+
+
+@compiled
+def _second_contact(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> float:
+    """Contact up to a position on a leg at which a rod curved toward the object would touch it twice; NaN without one.
+
+    In tangential contact the free end goes on as an arc. It is in the object at once where the contour is less curved
+    than the rod, or further on, at its tip. In tip contact it may be the loaded part.
+    """
+    outline, curvature = scene.outline, scene.rest.curvature
+    if curvature <= 0.0:
+        return math.nan
+    low, high = ends(outline)
+    for k in range(work.nodes.size):
+        if k > 0 and work.nodes[k] > stop:
+            break
+        p, q = work.at_nodes[PLACE, k], work.at_nodes[REST, k]
+        spot = place(outline, p)
+        if not leg.tip and spot.bend <= curvature * spot.speed:
+            return p
+        if not scene.exact and 0 < k < work.nodes.size - 1 and work.nodes[k + 1] <= stop:
+            continue
+        if leg.tip:
+            force = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k])
+            for j in range(1, _BODY):
+                of_end = pose(q, j / _BODY, force, curvature)
+                cos, sin = _turned(spot.cos, spot.sin, scene.rig.friction_angle)
+                x, y = -of_end.u * cos + of_end.v * sin, -of_end.u * sin - of_end.v * cos
+                if y * spot.cos > x * spot.sin and is_inside(outline, spot.x + x, spot.y + y, low, high):
+                    return p
+        elif q < 1.0:
+            turn = 0.5 * curvature * (1.0 - q)
+            chord = 2.0 * math.sin(turn) / curvature
+            cos, sin = _turned(spot.cos, spot.sin, turn)
+            if is_inside(outline, spot.x + chord * cos, spot.y + chord * sin, low, high):
+                return p
+    return math.nan
+
+
+@compiled
+def _turned(cos: float, sin: float, angle: float) -> tuple[float, float]:
+    """Cosine and sine of an angle plus another."""
+    other, of_other = math.cos(angle), math.sin(angle)
+    return cos * other - sin * of_other, sin * other + cos * of_other
 
 
 @compiled
@@ -431,5 +494,5 @@ def _recall(work: LegCurves, workspace: BranchWorkspace, k: int) -> tuple[Leg, C
 
 
 @compiled
-def _nothing(reach: int, distance: float) -> Ends:
-    return Ends(reach, distance, math.nan, math.nan, math.nan, math.nan, _NEVER, 0, math.nan)
+def _nothing(reach: int, distance: float, where: float) -> Ends:
+    return Ends(reach, distance, math.nan, math.nan, math.nan, where, _NEVER, 0, math.nan)

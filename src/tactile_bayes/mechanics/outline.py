@@ -15,11 +15,14 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.contours.halves import OVAL, PARABOLA, POWER_LAW, SLOPES
 from tactile_bayes.mechanics.compiler import compiled
 
-__all__ = ["Half", "Outline", "Place", "bearing", "ends", "frame", "mirrored", "place"]
+__all__ = ["Half", "Outline", "Place", "ends", "frame", "is_inside", "mirrored", "place"]
 
 _UPRIGHT = 0.5 * np.pi
 _FAR = 1e3
 """Rod lengths beyond which an end of a contour does not matter."""
+
+_HALVINGS = 30
+"""Halvings of the range in which the parameter at an x is sought."""
 
 
 class Half(NamedTuple):
@@ -176,10 +179,18 @@ def frame(at: Place) -> tuple[float, float]:
 
 
 @compiled
-def bearing(outline: Outline, p: float) -> float:
-    """Polar angle of the point at a parameter about the pivot [rad]."""
-    at = place(outline, p)
-    return math.atan2(at.y, at.x)
+def is_inside(outline: Outline, x: float, y: float, low: float, high: float) -> bool:
+    """Whether a point is within the object as far as it is known: between contour and chord of two of its points."""
+    left, right = place(outline, low), place(outline, high)
+    if not (left.x < x < right.x and (y - left.y) * (right.x - left.x) < (x - left.x) * (right.y - left.y)):
+        return False
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if place(outline, middle).x < x:
+            low = middle
+        else:
+            high = middle
+    return y > place(outline, high).y
 
 
 @compiled

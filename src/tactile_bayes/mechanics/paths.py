@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.sweep_frame import SweepFrame
-from tactile_bayes.mechanics.elastica import Wrench, wrench_from_contact
+from tactile_bayes.mechanics.elastica import Wrench
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
 from tactile_bayes.mechanics.shapes import shapes_of
 
@@ -34,6 +34,11 @@ class States(NamedTuple):
     """Point of the rod's centreline at the contact."""
     slope_angle: Floats
     wrench: Wrench
+
+    def take(self, *where: Index) -> States:
+        """Return the states at indices, one for each axis."""
+        wrench: list[Any] = [column[where] for column in self.wrench]
+        return States(self.parameter[where], self.x[where], self.y[where], self.slope_angle[where], Wrench(*wrench))
 
 
 @dataclass(frozen=True)
@@ -56,10 +61,10 @@ class Paths:
     """Drive angle of snap-off [rad]."""
     snap_parameter: Floats
     snap_off: NDArray[np.int8]
-    change_parameter: Floats
-    """Parameters at which phases begin, shape (n, phases); NaN beyond the last."""
-    change_to_tip: Flags
-    """True if a phase is tip contact, shape (n, phases)."""
+    changes: Floats
+    """Beginnings of phases, then the end of the last, as in `Found`, shape (n, phases + 1, 4); NaN beyond."""
+    phases: Index
+    """Number of phases."""
     largest_curvature: Floats
     """Largest curvature of the rod up to snap-off [1/L], with a relative error of 1e-4."""
     clear_angle: Floats
@@ -122,12 +127,19 @@ class Paths:
         """States of contours at the drive angles given to `trace`, shape (*index.shape, k); NaN out of contact."""
         return _as_states(self.sampled[index])
 
-    def states_at(self, index: Index, parameter: Floats) -> States:
-        """Exact states of straight rods at parameters of the contours, on the path or beyond its end."""
-        assert not self.sweeps.rest_curvature.any()
-        locus = self.sweep_frame.locate(index, parameter)
-        wrench = wrench_from_contact(locus.x, locus.y, locus.slope_angle, self.friction_angle[index])
-        return States(parameter, locus.x, locus.y, locus.slope_angle, wrench)
+    def changes_to_tip(self) -> list[list[bool]]:
+        """Return whether the phases of each path are tip contact."""
+        to_tip = (self.changes[..., 3] > 0.0).tolist()
+        return [of_path[:count] for of_path, count in zip(to_tip, self.phases.tolist(), strict=True)]
+
+    def event_states(self) -> States:
+        """Exact states at first contact, at the changes of the phase and at snap-off, shape (n, phases + 1).
+
+        Those of a path are its first `phases + 1`; the others are NaN.
+        """
+        from tactile_bayes.mechanics.sweeps import solve_events  # numba takes a second to load
+
+        return _as_states(solve_events(self.shapes, self.sweeps, self.changes))
 
 
 def trace(
@@ -135,7 +147,6 @@ def trace(
     *,
     friction_angle: ArrayLike = 0.0,
     suspension_compliance: ArrayLike = 0.0,
-    rest_curvature: ArrayLike = 0.0,
     tolerance: Floats | None = None,
     drive_angles: Floats | None = None,
     relative: bool = False,
@@ -151,8 +162,6 @@ def trace(
         Friction angle δ = arctan μ [rad].
     suspension_compliance : float or array_like, shape (n,)
         Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)].
-    rest_curvature : float or array_like, shape (n,)
-        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
     tolerance : ndarray, shape (3,), optional
         Tolerated errors of the loads [EI/L and EI/L²], for likelihoods, which is several times faster; by default
         events are computed to rounding.
@@ -180,14 +189,14 @@ def trace(
         backward=np.ascontiguousarray(sweep_frame.mirrored),
         friction_angle=_each(friction_angle, count),
         compliance=_each(compliance, count),
-        rest_curvature=_each(rest_curvature, count),
+        rest_curvature=_each(sweep_frame.rest_curvature, count),
         offset=np.zeros(count),
         rigidity=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
     solutions = _swept(shapes, sweeps, tolerance, angles, relative, states=True, polished=polished)
-    there = np.arange(solutions.changes.shape[1]) < solutions.phases[:, None]
     most = int(solutions.phases.max(initial=0))
+    changes = np.where(solutions.phases[:, None, None] > 0, solutions.changes[:, : most + 1], np.nan)
     return Paths(
         sweep_frame=sweep_frame,
         friction_angle=friction_angle,
@@ -198,8 +207,8 @@ def trace(
         snap_angle=solutions.snap_angle,
         snap_parameter=solutions.snap_parameter,
         snap_off=solutions.snap_off,
-        change_parameter=np.where(there, solutions.changes[..., 0], np.nan)[:, :most],
-        change_to_tip=(there & (solutions.changes[..., 1] > 0.0))[:, :most],
+        changes=changes,
+        phases=solutions.phases,
         largest_curvature=solutions.curvature,
         clear_angle=solutions.clear_angle,
         tolerance=tolerance,

@@ -27,6 +27,8 @@ class Reachability(IntEnum):
     """The rod would still touch at the other end of the contour."""
     GRAZES = 6
     """Contact is so weak that rounding hides how it ends."""
+    TOUCHES_TWICE = 7
+    """A rod that is curved toward the object would touch it at two points."""
 
     @property
     def message(self) -> str:
@@ -42,6 +44,7 @@ _MESSAGES = {
     Reachability.TOO_CLOSE: "too close to the pivot",
     Reachability.RUNS_OUT: "still touched at its other end",
     Reachability.GRAZES: "hardly touched",
+    Reachability.TOUCHES_TWICE: "touched twice",
 }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, WAY, Accuracy, Course, Curves, lay_over_angle, left_of
-from tactile_bayes.mechanics.equilibrium import SETTLED, Scene, in_phase
+from tactile_bayes.mechanics.equilibrium import SETTLED, Balance, Scene, in_phase
 from tactile_bayes.mechanics.leg import Leg, LegCurves, guess, settle_on
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
@@ -26,6 +26,7 @@ __all__ = [
     "find_samples",
     "polish_states",
     "write_loads",
+    "write_state",
     "write_states",
 ]
 
@@ -61,8 +62,8 @@ class Found(NamedTuple):
     states: Floats
     """States in the sweep frame, initially zero, shape (rows, `STATE_COLUMNS`)."""
     changes: Floats
-    """Beginnings of phases: parameter in the sweep frame, and 1 for tip contact, shape (phases, 2); no rows if no
-    states are computed."""
+    """Beginnings of phases, then the end of the last: coordinates p, q and f of the equilibrium, and 1 for tip contact,
+    shape (phases + 1, 4); no rows if no states are computed."""
 
 
 class Asked(NamedTuple):
@@ -175,15 +176,29 @@ def write_loads(samples: Samples, part: Followed, out: Floats) -> None:
 
 
 @compiled
-def _note(row: int, p: float, q: float, tip: bool, scene: Scene, out: Found) -> None:
-    """Write phase and place of a state, and the loads of its row."""
-    states, rig = out.states[row], scene.rig
+def write_state(found: Balance, tip: bool, scene: Scene, out: Floats) -> None:
+    """Write the columns of a state."""
+    out[5] = found.drive_angle - scene.rig.compliance * found.holding_moment
+    out[6], out[7], out[8] = found.holding_moment, found.force_x, found.force_y
+    _write_place(found.at.p, found.at.q, tip, scene, out)
+
+
+@compiled
+def _write_place(p: float, q: float, tip: bool, scene: Scene, states: Floats) -> None:
+    """Write phase and place of a state."""
     at = place(scene.outline, p)
     alpha = math.atan2(at.sin, at.cos)
     states[0] = TIP if tip else TANGENTIAL
     states[1], states[2], states[3], states[4] = p, at.x, at.y, alpha
-    states[9], states[10] = (1.0, alpha + rig.friction_angle + q) if tip else (q, alpha)
+    states[9], states[10] = (1.0, alpha + scene.rig.friction_angle + q) if tip else (q, alpha)
     states[11], states[12] = math.nan, math.nan
+
+
+@compiled
+def _note(row: int, p: float, q: float, tip: bool, scene: Scene, out: Found) -> None:
+    """Write phase and place of a state, and the loads of its row."""
+    states, rig = out.states[row], scene.rig
+    _write_place(p, q, tip, scene, states)
     for c in range(3):
         out.loads[row, c] = rig.rigidity * (1.0 if c == 2 else rig.sign) * states[6 + c]
 
@@ -248,8 +263,7 @@ def polish_states(samples: Samples, part: Followed, work: LegCurves, out: Found)
         # The digits of a position are limited: the interpolant corrects for the remaining distance to the angle.
         reached = 1.0 - left_of(state.drive_angle, course)
         states = out.states[row]
-        states[5] = state.drive_angle - scene.rig.compliance * state.holding_moment
-        states[6], states[7], states[8] = state.holding_moment, state.force_x, state.force_y
+        write_state(state, leg.tip, scene, states)
         for c in range(3):
             states[6 + c] += value(over_angle[c], target) - value(over_angle[c], reached)
         _note(row, state.at.p, state.at.q, leg.tip, scene, out)

@@ -16,13 +16,16 @@ __all__ = ["LARGEST_STRAIN", "Rod"]
 _THICKEST = 1e70
 """Diameter whose fourth power overflows [m]."""
 
+_MOST_TURN = math.pi
+"""Turn between base and tip [rad] up to which every point of an arc is farther from the base than those before it."""
+
 LARGEST_STRAIN = 0.1
 """Bending strain up to which a rod is slender and its bending moment is proportional to its curvature."""
 
 
 @dataclass(frozen=True)
 class Rod:
-    """A straight uniform rod.
+    """A uniform rod, straight or a circular arc.
 
     Without arguments the rod is dimensionless: lengths are in units of the rod's length L, moments of EI/L,
     forces of EI/L² (equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945).
@@ -39,24 +42,30 @@ class Rod:
     elastic_strain : float, optional
         Largest bending strain without permanent deformation: about 0.002 for mild steel, 0.005 for spring steel, 0.05
         for nitinol. `scan` warns if a rod with a diameter is bent beyond it. Records do not state it.
+    rest_curvature : float
+        Curvature of the unloaded rod [1/m]: it is a circular arc. A positive one bends counter-clockwise from base to
+        tip; the drive angle is the direction at the base.
 
     Raises
     ------
     ParameterError
         If length or flexural rigidity is not positive and finite, the diameter is negative or larger than the length,
-        or the elastic strain is not positive.
+        the elastic strain is not positive, or the rod at rest is more than a half circle.
 
     Examples
     --------
     >>> rod = Rod(length=0.1, flexural_rigidity=1.2e-5)
     >>> rod.moment_unit, rod.force_unit
     (0.00012, 0.0012)
+    >>> Rod(length=0.1, flexural_rigidity=1.2e-5, rest_curvature=4.0)
+    Rod(length=0.1, flexural_rigidity=1.2e-05, diameter=0.0, rest_curvature=4.0)
     """
 
     length: float = 1.0
     flexural_rigidity: float = 1.0
     diameter: float = 0.0
     elastic_strain: float | None = None
+    rest_curvature: float = 0.0
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -69,6 +78,9 @@ class Rod:
                 f"the rod's diameter is {self.diameter!r} and its length {self.length!r}: a rod is longer than it is "
                 "thick, give both in metres"
             )
+        most = _MOST_TURN / self.length
+        correction = f"give a number [1/m] between ±{most:.4g}, where the rod is a half circle; 0 if it is straight"
+        check_number("the rod's rest_curvature", self.rest_curvature, correction, least=-most, most=most)
         square = float(self.length) * float(self.length)
         if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
             raise ParameterError(
@@ -77,15 +89,21 @@ class Rod:
             )
 
     def __repr__(self) -> str:
-        strain = "" if self.elastic_strain is None else f", elastic_strain={self.elastic_strain!r}"
+        more = "" if self.elastic_strain is None else f", elastic_strain={self.elastic_strain!r}"
+        more += "" if self.rest_curvature == 0.0 else f", rest_curvature={self.rest_curvature!r}"
         return (
             f"Rod(length={self.length!r}, flexural_rigidity={self.flexural_rigidity!r}, "
-            f"diameter={self.diameter!r}{strain})"
+            f"diameter={self.diameter!r}{more})"
         )
 
     @classmethod
     def circular(
-        cls, length: float, diameter: float, youngs_modulus: float, elastic_strain: float | None = None
+        cls,
+        length: float,
+        diameter: float,
+        youngs_modulus: float,
+        elastic_strain: float | None = None,
+        rest_curvature: float = 0.0,
     ) -> Rod:
         """Rod of solid circular cross-section: EI = E π d⁴ / 64.
 
@@ -95,7 +113,7 @@ class Rod:
             Length and diameter [m].
         youngs_modulus : float
             Young's modulus E [Pa].
-        elastic_strain : float, optional
+        elastic_strain, rest_curvature : float, optional
             As in `Rod`.
 
         Returns
@@ -116,7 +134,7 @@ class Rod:
         for name, value in (("diameter", diameter), ("youngs_modulus", youngs_modulus)):
             check_positive(f"the rod's {name}", value)
         fourth = float(diameter) ** 4 if diameter < _THICKEST else math.inf
-        return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain)
+        return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain, rest_curvature)
 
     @property
     def is_dimensionless(self) -> bool:
@@ -137,6 +155,11 @@ class Rod:
     def force_unit(self) -> float:
         """Unit of force, EI/L² [N]."""
         return self.flexural_rigidity / self.length**2
+
+    @property
+    def curvature_unit(self) -> float:
+        """Unit of curvature, 1/L [1/m]."""
+        return 1.0 / self.length
 
     @property
     def load_units(self) -> Floats:

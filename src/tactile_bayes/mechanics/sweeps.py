@@ -13,13 +13,13 @@ from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOP
 from tactile_bayes.mechanics.branch import MOST_CHANGES, BranchWorkspace, branch_workspace, follow_branch
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
-from tactile_bayes.mechanics.equilibrium import Rig, Scene
+from tactile_bayes.mechanics.equilibrium import Equilibrium, Rig, Scene, balance, in_phase
 from tactile_bayes.mechanics.limits import clear_angle, rest_of
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.reachability import Reachability
-from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples
+from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, write_state
 
-__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_sweeps"]
+__all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
 _TOUCHES = int(Reachability.TOUCHES)
 
@@ -94,7 +94,7 @@ class Solutions(NamedTuple):
     states: Floats
     """States as in `Found`, shape (contours, rows or 0, columns)."""
     changes: Floats
-    """Beginnings of phases as in `Found`, shape (sweeps, phases or 0, 2)."""
+    """Events as in `Found`, shape (sweeps, phases + 1 or 0, 4)."""
     phases: Index
     """Number of phases."""
     reach: NDArray[np.int8]
@@ -111,6 +111,14 @@ class Solutions(NamedTuple):
 
 
 _INDICES, _FLAGS, _CODES = ("contour", "segment", "phases"), ("backward",), ("reach", "snap_off")
+
+
+def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
+    """Sweeps as a structured array."""
+    out = np.empty(sweeps.contour.size, dtype=_SWEEP)
+    for name, values in zip(Sweeps._fields, sweeps, strict=True):
+        out[name] = values
+    return out
 
 
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
@@ -151,6 +159,38 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
     return mirrored(outline) if sweep.backward else outline
 
 
+@compiled
+def _scene(shapes: Shapes, sweep: Any, exact: bool, table: Floats) -> Scene:
+    """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
+    sign = -1.0 if sweep.backward else 1.0
+    rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
+    return Scene(_outline(shapes, sweep, table), rest_of(sign * sweep.rest_curvature), rig, exact)
+
+
+@cached
+def _solve_events(shapes: Shapes, sweeps: Any, events: Floats, table: Floats, out: Floats) -> None:
+    """Write the states of events; see `solve_events`."""
+    for i in range(sweeps.size):
+        scene = _scene(shapes, sweeps[i], True, table)
+        for k in range(events.shape[1]):
+            out[i, k] = math.nan
+            out[i, k, 0] = 0.0
+            if not math.isnan(events[i, k, 0]):
+                tip = events[i, k, 3] > 0.0
+                at = Equilibrium(events[i, k, 0], events[i, k, 1], events[i, k, 2])
+                write_state(balance(in_phase(scene, tip), at)[0], tip, scene, out[i, k])
+
+
+def solve_events(shapes: Shapes, sweeps: Sweeps, events: Floats) -> Floats:
+    """States of events of sweeps, shape (sweeps, k, columns), from their coordinates as in `Found`, (sweeps, k, 4).
+
+    The phase is `NONE` and the rest NaN for coordinates that are NaN.
+    """
+    out = np.empty((*events.shape[:2], STATE_COLUMNS))
+    _solve_events(shapes, _as_sweeps(sweeps), events, np.empty(shapes.tables.shape[1:]), out)
+    return out
+
+
 @cached
 def _solve(
     shapes: Shapes,
@@ -186,17 +226,13 @@ def _solve(
     """
     count, knots = shapes.knots.shape[1], workspace.knots
     for i in range(sweeps.size):
-        sweep, event = sweeps[i], events[i]
-        outline = _outline(shapes, sweep, table)
-        c, sign = sweep.contour, -1.0 if sweep.backward else 1.0
+        sweep, event, c = sweeps[i], events[i], sweeps[i].contour
+        scene = _scene(shapes, sweep, exact, table)
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
         samples = Samples(segments.angles[first:last], segments.rows[first:last], segments.relative)
-        rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
         found = Found(loads[c], all_states[c], changes[i])
-        rest = rest_of(sign * sweep.rest_curvature)
-        scene = Scene(outline, rest, rig, exact)
         ends = follow_branch(scene, knots, samples, accuracy, tolerance, workspace, found)
         event.reach, event.distance = ends.reach, ends.distance
         event.first_angle, event.first_parameter = ends.first_angle, ends.first_parameter
@@ -204,7 +240,7 @@ def _solve(
         event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
         event.clear_angle = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
-            event.clear_angle = clear_angle(outline, rest, accuracy.first_step)
+            event.clear_angle = clear_angle(scene.outline, scene.rest, accuracy.first_step)
 
 
 def solve_sweeps(
@@ -242,12 +278,10 @@ def solve_sweeps(
     if tolerance is None:
         accuracy, order = _EXACT if polished else _SMOOTH, _EXACT_ORDER
     count, rows = shape
-    sweep = np.empty(sweeps.contour.size, dtype=_SWEEP)
-    for name, values in zip(Sweeps._fields, sweeps, strict=True):
-        sweep[name] = values
+    sweep = _as_sweeps(sweeps)
     loads = np.zeros((count, rows, 3))
     all_states = np.zeros((count, rows if states else 0, STATE_COLUMNS))
-    changes = np.empty((sweep.size, MOST_CHANGES if states else 0, 2))
+    changes = np.full((sweep.size, MOST_CHANGES + 1 if states else 0, 4), np.nan)
     events = np.empty(sweep.size, dtype=_EVENTS)
     longest = int(np.diff(segments.first).max(initial=0))
     _solve(

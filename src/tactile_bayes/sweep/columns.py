@@ -60,14 +60,13 @@ def sweep_samples(paths: Paths, units: ManyUnits, index: Index) -> dict[str, NDA
 
 def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Floats]]:
     """`EVENT_COLUMNS` of "first_contact" and "snap_off" in the laboratory frame, shape (n,); NaN without contact."""
-    index = np.arange(paths.sweep_frame.size)
+    index, states = np.arange(paths.sweep_frame.size), paths.event_states()
     events = {}
-    for name, angle, parameter in (
-        ("first_contact", paths.first_angle, paths.first_parameter),
-        ("snap_off", paths.snap_angle, paths.snap_parameter),
+    for name, angle, event in (
+        ("first_contact", paths.first_angle, np.zeros_like(paths.phases)),
+        ("snap_off", paths.snap_angle, paths.phases),
     ):
-        states = paths.states_at(index, parameter)
-        found = to_lab_frame(paths.sweep_frame, index, states, units.of(index))
+        found = to_lab_frame(paths.sweep_frame, index, states.take(index, event), units.of(index))
         turned = np.where(paths.sweep_frame.mirrored, np.pi - angle, angle)
         events[name] = {**{column: found[column] for column in EVENT_COLUMNS}, "drive_angle": turned}
     return events
@@ -75,8 +74,4 @@ def sweep_events(paths: Paths, units: ManyUnits) -> Mapping[str, Mapping[str, Fl
 
 def phases_of(paths: Paths) -> list[str]:
     """Phases of every sweep in order, as "A-B-A" (A is tip contact, B tangential); "" for a sweep without contact."""
-    count = np.isfinite(paths.change_parameter).sum(axis=1)
-    return [
-        "-".join("A" if tip else "B" for tip in to_tip[:phases])
-        for to_tip, phases in zip(paths.change_to_tip.tolist(), count.tolist(), strict=True)
-    ]
+    return ["-".join("A" if tip else "B" for tip in to_tip) for to_tip in paths.changes_to_tip()]

@@ -7,9 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tactile_bayes.mechanics.elastica import Wrench
-from tactile_bayes.mechanics.paths import Paths, States
-from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.paths import Paths
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.sweep.lab_frame import to_lab_frame
@@ -77,14 +75,10 @@ class SweepEvents:
 
 
 def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod: Rod) -> SweepEvents:
-    to_tip = paths.change_to_tip[0]
-    parameters = np.concatenate([paths.first_parameter, paths.change_parameter[0, 1:], paths.snap_parameter])
-    index = np.zeros(parameters.size, dtype=np.intp)
-    states = paths.states_at(index, parameters)
-    # At first contact the rod is straight and unloaded; rounding may put the point a little out of reach.
-    wrench = _at_rest_first(states, bool(to_tip[0]))
-    columns = to_lab_frame(paths.sweep_frame, index, states._replace(wrench=wrench), rod)
-    phases = ["tip" if tip else "tangential" for tip in to_tip]
+    phases = ["tip" if tip else "tangential" for tip in paths.changes_to_tip()[0]]
+    index = np.zeros(len(phases) + 1, dtype=np.intp)
+    states = paths.event_states().take(index, np.arange(index.size))
+    columns = to_lab_frame(paths.sweep_frame, index, states, rod)
     kinds = [
         phases[0],
         *(f"{before} → {after}" for before, after in pairwise(phases)),
@@ -95,21 +89,3 @@ def events_of(paths: Paths, direction: Direction, base: tuple[float, float], rod
     clear = bool(paths.is_clear()[0])
     strain = float(paths.largest_curvature[0]) * 0.5 * rod.diameter / rod.length
     return SweepEvents(direction, base, found[0], tuple(found[1:-1]), found[-1], clear, strain)
-
-
-def _at_rest_first(states: States, tip: bool) -> Wrench:
-    x, y = states.x[0], states.y[0]
-    bearing, distance = np.arctan2(y, x), np.hypot(x, y)
-    rest = {
-        "drive_angle": bearing,
-        "tip_angle": bearing,
-        "contact_arclength": 1.0 if tip else distance,
-        "holding_moment": 0.0,
-        "force_x": 0.0,
-        "force_y": 0.0,
-        "phase": TIP if tip else TANGENTIAL,
-    }
-    columns = {name: value.copy() for name, value in states.wrench._asdict().items()}
-    for name, value in rest.items():
-        columns[name][0] = value
-    return Wrench(**columns)

@@ -75,7 +75,20 @@ def sweep_paths(
                 f"{sweep} the rod touches the contour so slightly that rounding hides where contact ends: bring "
                 "contour and pivot closer together (are contour, pivot and rod in one unit?)"
             )
+        case Reachability.TOUCHES_TWICE:
+            raise ContourError(
+                f"{sweep} the rod would touch the contour twice: in contact at {_point(paths)} it is curved toward "
+                "the object so much that another part of it would cut the contour, and contact at two points is not "
+                "modelled; take a rod that is less curved, sweep in the other direction, or move the pivot"
+            )
     return paths
+
+
+def _point(paths: Paths) -> str:
+    """Where a path ends, in the unit of the contour."""
+    frame, at = paths.sweep_frame, paths.snap_parameter
+    locus = frame.contour.locate(np.where(frame.mirrored, -at, at))
+    return f"({locus.x[0]:.6g}, {locus.y[0]:.6g})"
 
 
 def _end(contour: Contour, at_right: bool) -> str:
@@ -101,7 +114,13 @@ def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direc
         )
     x, y = (np.full(1, float(b)) for b in base)
     return SweepFrame(
-        contour.broadcast_to((1,)), x, y, rod.length, 0.5 * rod.diameter, np.array([direction == "backward"])
+        contour.broadcast_to((1,)),
+        x,
+        y,
+        rod.length,
+        0.5 * rod.diameter,
+        np.array([direction == "backward"]),
+        rod.rest_curvature / rod.curvature_unit,
     )
 
 

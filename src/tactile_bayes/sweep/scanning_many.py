@@ -103,7 +103,15 @@ def scan_many(
             "degrees are converted by np.radians"
         )
     backward = np.full(count, direction == "backward")
-    sweep_frame = SweepFrame(contours.broadcast_to((count,)), x, y, rod.length, 0.5 * rod.diameter, backward)
+    sweep_frame = SweepFrame(
+        contours.broadcast_to((count,)),
+        x,
+        y,
+        rod.length,
+        0.5 * rod.diameter,
+        backward,
+        rod.rest_curvature / rod.curvature_unit,
+    )
     in_sweep_frame = np.pi - angles if direction == "backward" else angles
     paths = trace(sweep_frame, friction_angle=friction_angle_of(friction), drive_angles=in_sweep_frame, polished=False)
     units = ManyUnits(rod.length_unit, rod.moment_unit, rod.force_unit)
