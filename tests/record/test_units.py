@@ -58,7 +58,9 @@ def test_a_record_in_si_stays_so_with_its_own_rod_only():
 
 
 def test_a_rod_of_another_diameter_is_refused():
-    with refused(RecordError, "the record was made with a rod of diameter 0.0 (in rod lengths)"):
+    with refused(
+        RecordError, "the record was made with Rod(length=1.0, flexural_rigidity=1.0, diameter=0.0) (in rod lengths)"
+    ):
         to_si(make_record(columns()), WIRE)
 
 

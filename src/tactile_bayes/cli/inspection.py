@@ -94,11 +94,13 @@ def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
     if record.attrs["units"] == "SI":
         of_rod = [f"L = {quantity(rod.length, 'm')}", f"EI = {rod.flexural_rigidity:.4g} N m²"]
         of_rod += [f"diameter {quantity(rod.diameter, 'm')}"] if rod.diameter else []
+        of_rod += [f"rest curvature {rod.rest_curvature:.4g} 1/m"] if rod.rest_curvature else []
         of_rod += [f"EI/L = {quantity(rod.moment_unit, 'N m')}", f"EI/L² = {quantity(rod.force_unit, 'N')}"]
         units = f"SI, rod: {', '.join(of_rod)}"
     else:
         assumed = ", which the file does not state" if record.attrs.get("units_source") == "assumed" else ""
         units = f"dimensionless, in units of the rod{assumed}"
+        units += f", of rest curvature {rod.rest_curvature:.4g}/L" if rod.rest_curvature else ""
     axes = "fixed, along x and y" if frame_of(record) == "fixed" else "turning with the drive, along the rod and across"
     taken = [f"{name} = {origins[name]}" if name in origins else name for name in MEASURED]
     others = [str(name) for name in record.data_vars if name not in MEASURED]
@@ -167,7 +169,8 @@ def _channels(channels: xr.Dataset) -> Table:
 
 
 def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[str, Any]:
-    from tactile_bayes.record import frame_of
+    from tactile_bayes.record import frame_of, rod_of
+    from tactile_bayes.record.attributes import rod_attributes
 
     record = found.record
     sweeps = columns_of(found.sweeps, "sweep")
@@ -182,7 +185,7 @@ def _numbers(found: Inspection, again: str, files: Mapping[str, Path]) -> dict[s
         "columns": [str(name) for name in record.data_vars],
         "units": record.attrs["units"],
         "units_assumed": record.attrs.get("units_source") == "assumed",
-        "rod": {name: record.attrs[f"rod_{name}"] for name in ("length", "flexural_rigidity", "diameter")},
+        "rod": {name.removeprefix("rod_"): value for name, value in rod_attributes(rod_of(record)).items()},
         "load_cell_frame": frame_of(record),
         "load_cell": found.load_cell.entries() if found.load_cell is not None else None,
         "load_cell_source": found.load_cell_source,

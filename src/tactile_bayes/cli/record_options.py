@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from tactile_bayes.cli.numbers import assigned
-from tactile_bayes.cli.rig_options import rod_asked
+from tactile_bayes.cli.rig_options import RestCurvature, rod_asked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +41,7 @@ class RecordOptions:
     length: Annotated[float | None, typer.Option(help="Rod length [m], for SI files that do not state it.")] = None
     flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], likewise.")] = None
     diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0
+    rest_curvature: RestCurvature = 0.0
     force_noise: Annotated[
         float | None,
         typer.Option(
@@ -76,7 +77,7 @@ class RecordOptions:
             path,
             columns=self.origins,
             split_sweeps=self.split_sweeps,
-            rod=rod_asked(self.length, self.flexural_rigidity, self.diameter),
+            rod=rod_asked(self.length, self.flexural_rigidity, self.diameter, self.rest_curvature),
             missing=self.missing or (),
             load_cell_frame=self.load_cell_frame,
         )

@@ -13,7 +13,14 @@ if TYPE_CHECKING:
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.mechanics.rod import Rod
 
-__all__ = ["Friction", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions", "rod_asked"]
+__all__ = ["Friction", "NoiseOptions", "RestCurvature", "RigOptions", "RodOptions", "UnknownOptions", "rod_asked"]
+
+RestCurvature = Annotated[
+    float,
+    typer.Option(
+        help="Curvature of the unloaded rod [1/m, or 1/L], an arc; > 0 counter-clockwise from base to tip.",
+    ),
+]
 
 Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)]
 
@@ -57,11 +64,12 @@ class RodOptions:
     ] = None
     flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None
     diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0
+    rest_curvature: RestCurvature = 0.0
 
     @property
     def rod(self) -> Rod | None:
         """The rod, or None if no option gives one."""
-        return rod_asked(self.length, self.flexural_rigidity, self.diameter)
+        return rod_asked(self.length, self.flexural_rigidity, self.diameter, self.rest_curvature)
 
 
 @dataclass(frozen=True)
@@ -88,8 +96,8 @@ class UnknownOptions:
         list[str] | None,
         typer.Option(
             help="Unknown of the rig to be inferred, in place of rigidity_scale, drive_angle_offset, bias, lever, "
-            "backlash and friction: one of these, or drift, gain, suspension_compliance, base (positions of further "
-            "pivots); may be repeated."
+            "backlash and friction: one of these, or drift, gain, suspension_compliance, rest_curvature, base "
+            "(positions of further pivots); may be repeated."
         ),
     ] = None
     as_stated: Annotated[
@@ -113,7 +121,9 @@ class UnknownOptions:
         return [] if self.as_stated else list(self.nuisance or STANDARD)
 
 
-def rod_asked(length: float | None, flexural_rigidity: float | None, diameter: float) -> Rod | None:
+def rod_asked(
+    length: float | None, flexural_rigidity: float | None, diameter: float, rest_curvature: float
+) -> Rod | None:
     """Return the rod, or None if no option gives one.
 
     Raises
@@ -128,4 +138,6 @@ def rod_asked(length: float | None, flexural_rigidity: float | None, diameter: f
         raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
     if diameter and length is None:
         raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
-    return None if length is None or flexural_rigidity is None else Rod(length, flexural_rigidity, diameter)
+    if length is None or flexural_rigidity is None:
+        return Rod(rest_curvature=rest_curvature) if rest_curvature else None
+    return Rod(length, flexural_rigidity, diameter, rest_curvature=rest_curvature)

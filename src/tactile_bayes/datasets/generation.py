@@ -79,6 +79,7 @@ _CORRECTIONS = {
     "first touched beyond its end": _WIDER,
     "too close to the pivot": _HIGHER,
     "still touched at its other end": _WIDER,
+    "touched twice": "give rods that are less curved, or contours that are more so where rods touch them",
     "hardly touched": "bring contours and pivots closer to one another, or give contours of a size nearer to the rod's",
     _NOT_CLEAR: "give wider contours, or raise them: the straight rod would still cut the object",
     _NO_CONTOUR: "change the distribution of that parameter",
@@ -255,10 +256,10 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         np.stack([values[f"scan.bases[{b}][{axis}]"] for b, _ in spec.sweeps], axis=1).ravel() for axis in (0, 1)
     )
     backward = np.tile([direction == "backward" for _, direction in spec.sweeps], candidate.size)
-    length, standoff, units = np.ones(place.size), np.zeros(place.size), ManyUnits(1.0, 1.0, 1.0)
-    if spec.rod:
-        length, rigidity, diameter = (values[f"rod.{name}"][place] for name in spec.rod)
-        standoff, units = 0.5 * diameter, ManyUnits(length, rigidity / length, rigidity / length**2)
+    of_rod = {name: values[f"rod.{name}"][place] for name in spec.rod}
+    length, rigidity = (of_rod.get(name, np.ones(place.size)) for name in ("length", "flexural_rigidity"))
+    diameter, curvature = (of_rod.get(name, np.zeros(place.size)) for name in ("diameter", "rest_curvature"))
+    units = ManyUnits(length, rigidity / length, rigidity / length**2)
     drive, way = spec.drive, np.linspace(0.0, 1.0, spec.drive.samples)
     if drive.begin is None or drive.end is None:
         as_seen = (1.0 + 2.0 * drive.margin) * way - drive.margin
@@ -266,7 +267,7 @@ def _swept(spec: Specification, contours: Contour, candidate: Index, values: Map
         forward = drive.begin + (drive.end - drive.begin) * way
         as_seen = np.where(backward[:, None], np.pi - forward[::-1], forward)
     paths = trace(
-        SweepFrame(contours.take(place), base_x, base_y, length, standoff, backward),
+        SweepFrame(contours.take(place), base_x, base_y, length, 0.5 * diameter, backward, curvature * length),
         friction_angle=float(np.arctan(spec.friction)),
         drive_angles=as_seen,
         relative=as_seen.ndim == 1,

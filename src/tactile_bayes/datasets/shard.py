@@ -23,6 +23,7 @@ from tactile_bayes.datasets.specification_reading import read_text
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.reachability import SnapOff
 from tactile_bayes.record import COLUMNS, LOAD_CELL_UNITS, column_of
+from tactile_bayes.record.schema import ATTRIBUTE_UNITS
 from tactile_bayes.tasks import write_atomically
 
 __all__ = ["Written", "records_as_dataset", "shard_file", "write_shard"]
@@ -117,7 +118,7 @@ def records_as_dataset(spec: Specification, records: Records) -> xr.Dataset:
     for name, values in records.drawn.items():
         if name.startswith("rod."):
             entry = name.replace(".", "_")
-            unit = {"rod_flexural_rigidity": "N m²"}.get(entry, "m")
+            unit = ATTRIBUTE_UNITS[entry] if spec.units == "SI" else _plain(ATTRIBUTE_UNITS[entry])
             variables[entry] = ("record", values, {"units": unit, "long_name": entry.replace("_", " ")})
         elif name.startswith("load_cell."):
             entry = name.removeprefix("load_cell.")

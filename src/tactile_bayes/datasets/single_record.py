@@ -145,7 +145,7 @@ def _as_record(spec: Specification, data: xr.Dataset, truth: bool) -> xr.Dataset
         attrs = {name: value for name, value in attrs.items() if not name.startswith("truth_")}
     rod = None
     if spec.rod:
-        rod = Rod(*(float(data[f"rod_{name}"]) for name in ("length", "flexural_rigidity", "diameter")))
+        rod = Rod(**{name: float(data[f"rod_{name}"]) for name in spec.rod})
     order = [name for name in COLUMNS if name in columns] + [name for name in columns if name not in COLUMNS]
     known = {name: columns[name] for name in order if column_of(name) is not None}
     return make_record(known, rod=rod, attrs=attrs, load_cell_frame=spec.frame)

@@ -70,7 +70,8 @@ class Specification:
     each_group : bool
         Whether the groups are used in turn, and not drawn.
     rod : mapping of str to Distribution
-        length [m], flexural_rigidity [N m²] and diameter [m]; empty for a dimensionless data set.
+        length [m], flexural_rigidity [N m²], diameter [m] and rest_curvature [1/m]; of a dimensionless data set only
+        diameter and rest_curvature [L, 1/L], or nothing.
     bases : tuple of (Distribution, Distribution)
         Pivots (x, y) [m, or rod lengths].
     directions : tuple of str
@@ -107,7 +108,7 @@ class Specification:
     @property
     def units(self) -> str:
         """ "SI" or "dimensionless"."""
-        return "SI" if self.rod else "dimensionless"
+        return "SI" if "length" in self.rod else "dimensionless"
 
     @property
     def sha256(self) -> str:
@@ -117,7 +118,8 @@ class Specification:
     @property
     def has_thickness(self) -> bool:
         """True if the rod has, or may have, a diameter."""
-        return bool(self.rod) and (self.rod["diameter"].is_drawn or any(self.rod["diameter"].numbers))
+        diameter = self.rod.get("diameter")
+        return diameter is not None and (diameter.is_drawn or any(diameter.numbers))
 
     @property
     def shards(self) -> int:

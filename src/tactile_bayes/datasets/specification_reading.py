@@ -34,7 +34,7 @@ _LARGEST_SEED = 2**63 - 1
 
 _TABLES: Mapping[str, Iterable[str]] = {
     "": ("name", "description", "records", "seed", "shard_records", "precision", "each_contour"),
-    "rod.": ("length", "flexural_rigidity", "diameter"),
+    "rod.": ("length", "flexural_rigidity", "diameter", "rest_curvature"),
     "scan.": ("bases", "directions", "samples", "from_degrees", "to_degrees", "margin", "friction"),
     "load_cell.": ("frame", *LOAD_CELL_UNITS),
 }
@@ -212,14 +212,16 @@ def _refuse_no_contour(family: Family, distributions: Mapping[str, Distribution]
 def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
     if not rod:
         return {}
-    if "length" not in rod or "flexural_rigidity" not in rod:
+    if ("length" in rod) != ("flexural_rigidity" in rod):
         raise SpecificationError(
-            "rod needs length [m] and flexural_rigidity [N m²]; without [rod] lengths are in rod lengths"
+            "rod needs both length [m] and flexural_rigidity [N m²]; without the two, lengths are in rod lengths"
         )
-    distributions = {name: distribution_of(rod.get(name, 0.0), f"rod.{name}") for name in _TABLES["rod."]}
-    _refuse_negative(distributions, "rod.", or_zero={"diameter"})
+    given = {"diameter": 0.0, **rod} if "length" in rod else rod
+    distributions = {name: distribution_of(given[name], f"rod.{name}") for name in _TABLES["rod."] if name in given}
+    signed = {"rest_curvature"}
+    _refuse_negative({name: of for name, of in distributions.items() if name not in signed}, "rod.", {"diameter"})
     try:
-        Rod(*_at_share(distributions, 0.5).values())
+        Rod(**_at_share(distributions, 0.5))
     except ParameterError as error:
         raise SpecificationError(f"rod: {error}") from error
     return distributions

@@ -24,6 +24,7 @@ from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import CONTACT_SIDES
 from tactile_bayes.record import frame_of, record_hash, rod_of, validate, with_rod
+from tactile_bayes.record.attributes import rod_attributes
 
 __all__ = ["Experiment", "default_priors", "prior_in_words", "priors_in_words", "usual_load_cell"]
 
@@ -102,7 +103,6 @@ class Experiment:
     def about(self) -> dict[str, Any]:
         """Attributes of a posterior: record, assumptions and priors."""
         attrs, cell = self.record.attrs, self.noise.cell
-        rod = ("rod_length", "rod_flexural_rigidity", "rod_diameter")
         return {
             "data_sha256": record_hash(self.record),
             "family": self.family,
@@ -112,7 +112,8 @@ class Experiment:
             "priors": priors_in_words({**self.default_priors, **self.priors}),
             "units": attrs["units"],
             "load_cell_frame": frame_of(self.record),
-            **{name: attrs[name] for name in (CONTACT_SIDES, *rod) if name in attrs},
+            **{name: attrs[name] for name in (CONTACT_SIDES,) if name in attrs},
+            **rod_attributes(rod_of(self.record)),
             "approximations": "; ".join(cell.approximations),
             **{f"load_cell_{name}": v for name, v in cell.entries().items() if name not in self.noise.inferred},
         }

@@ -65,6 +65,8 @@ class Rig(NamedTuple):
     """Coulomb's coefficient."""
     drive_angle_backlash: Any = 0.0
     """Reading of the encoder in forward motion less that in backward motion, in addition to the data sheet [rad]."""
+    rest_curvature: Any = 0.0
+    """Rest curvature of the rod in addition to the stated one [1/L]."""
     base_shifts: Any = None
     """Shifts of pivots from their recorded positions [length], shape (n, pivots, 2), in the order of the record; pivots
     after the last given one are not shifted."""
@@ -185,7 +187,8 @@ class RecordLikelihood:
         base_x, base_y = self._bases(rig).reshape(-1, 2).T
         backward = np.repeat(self._signs < 0.0, count)
         every = contours.take(np.tile(np.arange(count), segments))
-        return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward)
+        curvature = np.tile(self.rod.rest_curvature / self.rod.curvature_unit + rig.rest_curvature, segments)
+        return SweepFrame(every, base_x, base_y, self.rod.length, 0.5 * self.rod.diameter, backward, curvature)
 
     def _bases(self, rig: Rig) -> Floats:
         """Return the pivots, shape (segments, n, 2)."""
@@ -325,7 +328,7 @@ class RecordLikelihood:
             backward=np.repeat(self._signs < 0.0, count),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
-            rest_curvature=np.zeros(segments * count),
+            rest_curvature=np.tile(self.rod.rest_curvature / self.rod.curvature_unit + rig.rest_curvature, segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),
         )

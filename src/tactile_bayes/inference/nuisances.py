@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -39,8 +39,8 @@ BIAS = 0.1
 """Standard deviation of the prior of a bias, in EI/L and EI/L²."""
 
 _RIGIDITY, _OFFSET, _GAIN, _FRICTION, _COMPLIANCE, _SHIFT = 0.05, np.radians(1.0), 0.02, 0.3, 0.05, 0.01
-_LEVER, _BACKLASH = 0.005, np.radians(0.2)
-"""Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; and L."""
+_LEVER, _BACKLASH, _CURVATURE = 0.005, np.radians(0.2), 0.05
+"""Standard deviations (scales of half normals) of the other priors: of ratios; rad; rad per EI/L; L; and 1/L."""
 
 
 _BASE = re.compile(r"base_(\d+)_([xy])")
@@ -64,6 +64,7 @@ _KINDS = {
     "backlash": _Kind(-np.pi, np.pi),
     "suspension_compliance": _Kind(0.0, np.inf, power_of_moment=-1),
     "friction": _Kind(0.0, float(np.tan(MAX_FRICTION_ANGLE))),
+    "rest_curvature": _Kind(-np.inf, np.inf, power_of_length=-1),
     **{name: _Kind(-np.inf, np.inf, power_of_moment=1) for name in (*_GROUPS["bias"], *_GROUPS["drift"])},
     **{name: _Kind(0.0, np.inf) for name in _GROUPS["gain"]},
     **{name: _Kind(-np.inf, np.inf, power_of_length=1) for name in _GROUPS["lever"]},
@@ -120,11 +121,15 @@ class Nuisances:
         if _BASE.fullmatch(name) or name in _GROUPS["lever"]:
             return "m"
         units = {"drive_angle_offset": "rad", "backlash": "rad", "suspension_compliance": "rad/(N m)"}
+        units["rest_curvature"] = "1/m"
         return units.get(name, "1")
 
     def rig(self, values: Mapping[str, Floats]) -> Rig:
         """Return the rig of every point, from values by name in the record's units, each of shape (n,)."""
-        known = {"friction": self.friction} if "friction" not in self.names else {}
+        known: dict[str, Any] = {"friction": self.friction} if "friction" not in self.names else {}
+        if "rest_curvature" in self.names:
+            off = values["rest_curvature"] - self.rod.rest_curvature
+            known["rest_curvature"] = off / self.units["rest_curvature"]
         return Rig(
             base_shifts=self._base_shifts(values),
             **known,
@@ -247,6 +252,8 @@ def nuisances_of(
     elapsed = np.linspace(-0.5, 0.5, measured.sizes["sample"])
     nuisances = Nuisances(tuple(names), {}, rod, friction, elapsed)
     defaults = {name: _default_prior(name, rod.length if "base" in name else nuisances.units[name]) for name in names}
+    if "rest_curvature" in defaults:
+        defaults["rest_curvature"] = stats.norm(rod.rest_curvature, _CURVATURE * rod.curvature_unit)
     return replace(nuisances, priors=defaults)
 
 

@@ -23,6 +23,8 @@ _QUANTITY = re.compile(
     r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"
 )
 
+_CURVATURE = "rod_rest_curvature"
+
 _SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_offset", "_backlash")
 
 __all__ = [
@@ -33,12 +35,19 @@ __all__ = [
     "same_rod",
     "stated_frame",
     "stated_rod",
+    "without_rod",
 ]
 
 
 def rod_attributes(rod: Rod) -> dict[str, float]:
-    """Convert a rod to attributes of a record; `stated_rod` is the inverse."""
-    return {"rod_length": rod.length, "rod_flexural_rigidity": rod.flexural_rigidity, "rod_diameter": rod.diameter}
+    """Convert a rod to attributes of a record, a rest curvature only if there is one; `stated_rod` is the inverse."""
+    attrs = {"rod_length": rod.length, "rod_flexural_rigidity": rod.flexural_rigidity, "rod_diameter": rod.diameter}
+    return attrs | ({_CURVATURE: rod.rest_curvature} if rod.rest_curvature else {})
+
+
+def without_rod(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes of a record without those of the rod."""
+    return {name: value for name, value in attrs.items() if not (name.startswith("rod_") and name in ATTRIBUTE_UNITS)}
 
 
 def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
@@ -59,9 +68,9 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
         )
     length = _quantity("rod_length", attrs["rod_length"], source)
     rigidity = _quantity("rod_flexural_rigidity", attrs["rod_flexural_rigidity"], source)
-    diameter = _quantity("rod_diameter", attrs.get("rod_diameter", 0.0), source)
+    diameter, curvature = (_quantity(name, attrs.get(name, 0.0), source) for name in ("rod_diameter", _CURVATURE))
     try:
-        rod = Rod(length, rigidity, diameter)
+        rod = Rod(length, rigidity, diameter, rest_curvature=curvature)
     except ParameterError as error:
         raise source.error(str(error)) from error
     if units == "dimensionless" and not rod.is_dimensionless:
@@ -85,8 +94,10 @@ def stated_frame(attrs: Mapping[str, Any], source: Source) -> Frame:
 
 def same_rod(one: Rod, other: Rod) -> bool:
     """Return whether two rods are equal up to the rounding of a few operations."""
-    pairs = zip(rod_attributes(one).values(), rod_attributes(other).values(), strict=True)
-    return all(math.isclose(*pair, rel_tol=1e-12) for pair in pairs)
+    of_one, of_other = rod_attributes(one), rod_attributes(other)
+    return of_one.keys() == of_other.keys() and all(
+        math.isclose(value, of_other[name], rel_tol=1e-12) for name, value in of_one.items()
+    )
 
 
 def completed_attributes(
@@ -103,7 +114,7 @@ def completed_attributes(
                 "wrong; to convert a record use in_frame(record, frame)"
             )
     if "units" not in completed:
-        of_the_rod = [name for name in attrs if name in rod_attributes(Rod())]
+        of_the_rod = [name for name in attrs if name not in without_rod(attrs)]
         if of_the_rod:
             raise source.error(
                 f"{of_the_rod[0]!r} is stated, but no units: state units 'SI' or 'dimensionless' "

@@ -53,6 +53,8 @@ def record_hash(record: xr.Dataset) -> str:
     rod = rod_of(record)
     add(str(record.attrs["units"]).encode())
     add(np.array([rod.length, rod.flexural_rigidity, rod.diameter], dtype="<f8").tobytes())
+    if rod.rest_curvature:  # straight rods do not state it
+        add(np.array([rod.rest_curvature], dtype="<f8").tobytes())
     if frame_of(record) != "fixed":  # older records do not state it
         add(frame_of(record).encode())
     for name in MEASURED:

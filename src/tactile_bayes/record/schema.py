@@ -163,6 +163,7 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
         "rod_length": "m",
         "rod_flexural_rigidity": "N m²",
         "rod_diameter": "m",
+        "rod_rest_curvature": "1/m",
         **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )

@@ -11,7 +11,7 @@ import xarray as xr
 from tactile_bayes.checks import check_optional
 from tactile_bayes.errors import ParameterError, RecordError
 from tactile_bayes.mechanics.rod import Rod
-from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod
+from tactile_bayes.record.attributes import rod_attributes, same_rod, stated_rod, without_rod
 from tactile_bayes.record.parsing import parsed_column
 from tactile_bayes.record.quantity import accepted_units, converted, unit_of
 from tactile_bayes.record.schema import LOAD_CELL_UNITS, UNITS, column_of
@@ -68,9 +68,9 @@ def with_rod(record: xr.Dataset, rod: Rod | None) -> xr.Dataset:
         return record
     if record.attrs["units"] == "dimensionless" and not rod.is_dimensionless:
         raise ParameterError(f"the record is dimensionless, so {rod} does not fit it: leave the rod out, or use to_si")
-    return record.assign_attrs(
-        rod_length=rod.length, rod_flexural_rigidity=rod.flexural_rigidity, rod_diameter=rod.diameter
-    )
+    replaced = record.copy(deep=False)
+    replaced.attrs = without_rod(record.attrs) | rod_attributes(rod)
+    return replaced
 
 
 def to_dimensionless(record: xr.Dataset) -> xr.Dataset:
@@ -114,7 +114,8 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
     record : xr.Dataset
         A dimensionless record, or an SI record with the same rod.
     rod : Rod
-        Rod with length [m] and flexural rigidity [N m²]; its diameter must be that of the record's rod.
+        Rod with length [m] and flexural rigidity [N m²]; its diameter and rest curvature must be those of the record's
+        rod.
 
     Returns
     -------
@@ -123,7 +124,7 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
     Raises
     ------
     RecordError
-        If `record` is not a record, or has a rod of another diameter.
+        If `record` is not a record, or has a rod of another diameter or rest curvature.
 
     Examples
     --------
@@ -143,15 +144,16 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
     in_lengths = _in_lengths(rod)
     if not same_rod(stated, in_lengths):
         raise RecordError(
-            f"the record was made with a rod of diameter {stated.diameter!r} (in rod lengths), but {rod} has "
-            f"{in_lengths.diameter!r}: give a rod of diameter {stated.diameter * rod.length_unit!r} m"
+            f"the record was made with {stated} (in rod lengths), but {rod} is {in_lengths} in these: give a rod of "
+            f"diameter {stated.diameter * rod.length_unit!r} m and rest curvature "
+            f"{stated.rest_curvature * rod.curvature_unit!r} 1/m"
         )
     return _converted(record, rod, "SI")
 
 
 def _in_lengths(rod: Rod) -> Rod:
     """Return the rod in its own units."""
-    return Rod(diameter=rod.diameter / rod.length_unit)
+    return Rod(diameter=rod.diameter / rod.length_unit, rest_curvature=rod.rest_curvature / rod.curvature_unit)
 
 
 def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
@@ -165,7 +167,7 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
                 variable.values = convert(variable.values, getattr(rod, column.scale))
             variable.attrs["units"] = column.unit_in(units)
     length = rod.length_unit
-    scales = {"N": rod.force_unit, "N m": rod.moment_unit, "m": length, "1/m": 1.0 / length}
+    scales = {"N": rod.force_unit, "N m": rod.moment_unit, "m": length, "1/m": rod.curvature_unit}
     for entry, unit in LOAD_CELL_UNITS.items():
         name = f"load_cell_{entry}"
         if name in converted.attrs and unit in scales:
