@@ -214,7 +214,7 @@ def _rod(rod: Mapping[str, Any]) -> dict[str, Distribution]:
         return {}
     if ("length" in rod) != ("flexural_rigidity" in rod):
         raise SpecificationError(
-            "rod needs both length [m] and flexural_rigidity [N m²]; without the two, lengths are in rod lengths"
+            "rod needs length [m] and flexural_rigidity [N m²] together; without them lengths are in rod lengths"
         )
     given = {"diameter": 0.0, **rod} if "length" in rod else rod
     distributions = {name: distribution_of(given[name], f"rod.{name}") for name in _TABLES["rod."] if name in given}
