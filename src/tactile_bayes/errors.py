@@ -63,7 +63,7 @@ class TactileBayesWarning(UserWarning):
 
 
 class ClearanceWarning(TactileBayesWarning):
-    """The straight rod would cut the object after snap-off."""
+    """The unloaded rod would cut the object after snap-off."""
 
 
 class DriftWarning(TactileBayesWarning):

@@ -14,11 +14,12 @@ from tactile_bayes.calibration.calibrate import experiment_of
 from tactile_bayes.calibration.simulation import simulate
 from tactile_bayes.contours import Circle, Parabola
 from tactile_bayes.errors import ParameterError
-from tactile_bayes.inference.likelihood import RecordLikelihood
+from tactile_bayes.inference.likelihood import RecordLikelihood, Rig
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct
 from tactile_bayes.record import CHANNELS, in_frame, make_record, rod_of
+from tactile_bayes.record.units import with_rod
 from tactile_bayes.sweep import scan
 
 SHARE = {False: 3e-4, True: 1e-6}
@@ -57,6 +58,15 @@ RIGS = {
     "diameter": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995, 0.002), Rod(diameter=0.02), CELL, ((0.0, 0.0),), 0.0),
     "pivots": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.2, 0.1), (-0.3, 0.0)), 0.0),
     "friction": (Parabola(0.5, 0.5), Parabola(0.503, 0.4995), Rod(), CELL, ((0.0, 0.0),), 0.3),
+    "arc": (Circle(0.4, 0.4, 0.1), Circle(0.41, 0.401, 0.1), Rod(rest_curvature=0.6), CELL, ((0.0, 0.0),), 0.3),
+    "arc in SI": (
+        Parabola(2.5, 0.1),
+        Parabola(2.52, 0.0999, 0.0004),
+        Rod.circular(length=0.2, diameter=0.7e-3, youngs_modulus=206e9, rest_curvature=1.5),
+        WIRE_CELL,
+        ((0.0, 0.0),),
+        0.0,
+    ),
 }
 
 
@@ -104,6 +114,17 @@ def test_against_an_independent_sum(rig):
                 error = SHARE[exactly] * np.abs(loads[:, present]).max(axis=0)
                 slack = (np.abs(values - loads)[:, present] * error + 0.5 * error**2) / sigma**2
                 assert np.all(np.abs(pointwise[k] - expected) <= slack.sum(axis=1) + 1e-9)
+
+
+def test_the_rest_curvature_of_a_rig_is_that_of_the_rod_in_addition():
+    """In both directions; and a straight rod is noticed where the true one is curved."""
+    true, other, rod, cell, _, friction = RIGS["arc"]
+    measured, contours = measured_by("arc"), stack([true, other])
+    stated = RecordLikelihood(measured, cell, friction).log_likelihood(contours)
+    taken_for_straight = RecordLikelihood(with_rod(measured, Rod()), cell)
+    rig = Rig(rest_curvature=rod.rest_curvature, friction=friction)
+    np.testing.assert_array_equal(taken_for_straight.log_likelihood(contours, rig=rig), stated)
+    assert taken_for_straight.log_likelihood(contours, rig=Rig(friction=friction)).max() < stated.max() - 100.0
 
 
 def swept_in(rig):

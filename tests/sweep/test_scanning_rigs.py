@@ -117,7 +117,7 @@ def test_a_rod_that_would_be_stopped_again_is_said_so():
     assert not sweep.clear
     along = np.linspace(0.01, 1.0, 100)
     height = contour.height(along * np.cos(sweep.snap_off.drive_angle))
-    assert np.any(along * np.sin(sweep.snap_off.drive_angle) > height)  # the straight rod would be inside
+    assert np.any(along * np.sin(sweep.snap_off.drive_angle) > height)  # the unloaded rod would be inside
     last = result.record.drive_angle.values[-1]
     assert sweep.snap_off.drive_angle - 0.01 <= last <= sweep.snap_off.drive_angle
     assert result.record.force_y.values[-1] > 0.0

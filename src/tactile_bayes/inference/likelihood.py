@@ -91,7 +91,7 @@ class RecordLikelihood:
         Whether paths are exact to rounding; otherwise they are as accurate as the noise requires, at a fifth of the
         cost.
     is_always_clear : bool
-        Whether the straight rod is clear of every contour after snap-off, so that clearance need not be checked.
+        Whether the unloaded rod is clear of every contour after snap-off, so that clearance need not be checked.
         No load is predicted after snap-off, and contours that are not clear are excluded.
 
     Raises

@@ -76,7 +76,7 @@ class Paths:
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
 
     def is_clear(self) -> Flags:
-        """Return whether the straight rod is clear of the object after snap-off, as far as known; shape (n,)."""
+        """Return whether the unloaded rod is clear of the object after snap-off, as far as known; shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.snap_angle > self.clear_angle)
 

@@ -59,7 +59,7 @@ class SweepEvents:
     transitions : tuple of Event
         Changes of the phase, in their order.
     clear : bool
-        Whether the straight rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
+        Whether the unloaded rod is clear of the object after snap-off. If it is not, the rod comes to rest in another
         contact, which no sweep reaches.
     largest_strain : float
         Largest bending strain of the rod up to snap-off, with a relative error of 1e-4; 0 for a rod without thickness.

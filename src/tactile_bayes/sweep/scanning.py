@@ -187,7 +187,7 @@ def scan(
     Warns
     -----
     ClearanceWarning
-        If the straight rod would cut the object after snap-off: its state is then unknown, and these samples are left
+        If the unloaded rod would cut the object after snap-off: its state is then unknown, and these samples are left
         out.
     StrainWarning
         If the rod is bent beyond its elastic strain, or beyond a strain of 0.1, where the model of a slender, linearly
@@ -263,7 +263,7 @@ def _warn_of(sweep: SweepEvents, rod: Rod) -> None:
     where = f"in the {sweep.direction} sweep from ({sweep.base[0]:g}, {sweep.base[1]:g})"
     if not sweep.clear:
         warnings.warn(
-            f"{where} the rod snaps at {sweep.snap_off.drive_angle:.6g} rad, but straight it would still cut the "
+            f"{where} the rod snaps at {sweep.snap_off.drive_angle:.6g} rad, but unloaded it would still cut the "
             "object: it comes to rest in another contact, which no sweep reaches; the samples after that are left out",
             ClearanceWarning,
             stacklevel=3,

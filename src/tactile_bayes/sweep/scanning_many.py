@@ -56,7 +56,7 @@ def scan_many(
     xr.Dataset
         Over "contour" and "sample": drive_angle, holding_moment, force_x, force_y (0 out of contact), contact_x,
         contact_y, slope_angle, contact_arclength, tip_angle (NaN out of contact), contact_phase. Over "contour":
-        status ("ok", or why the contour cannot be swept), clear (whether the straight rod is clear of it at the end),
+        status ("ok", or why the contour cannot be swept), clear (whether the unloaded rod is clear of it at the end),
         phases ("A-B": first tip, then tangential contact), and first_contact_* and snap_off_* with drive_angle,
         slope_angle, contact_x and contact_y. A contour that cannot be swept has no contact and NaN events.
 
