@@ -195,6 +195,7 @@ REFUSED = [
     ({"rod": {"length": 0.1}}, ["rod needs length [m] and flexural_rigidity [N m²]"]),
     ({"rod": {"length": 0.1, "stiffness": 1.0}}, ["there is no key 'rod.stiffness'"]),
     ({"rod": {"length": {"normal": [0.1, 0.01]}, "flexural_rigidity": 1.0}}, ["rod.length may be negative"]),
+    ({"rod": {"rest_curvature": 4.0}}, ["rest_curvature", "half circle"]),
     ({"rod": {"length": 0.1, "flexural_rigidity": 0.0}}, ["rod.flexural_rigidity may be 0"]),
     ({"rod": {"length": 0.1, "flexural_rigidity": 1.0, "diameter": -1.0}}, ["rod.diameter may be negative"]),
     ({"scan": "all"}, ["scan is 'all'"]),

@@ -18,9 +18,9 @@ scales = st.floats(1e-3, 1e3)
 
 
 @settings(max_examples=15, deadline=None)
-@given(hnp.arrays(float, (6, 5), elements=moderate), scales, scales, scales)
-def test_units_convert_there_and_back(values, length, rigidity, diameter):
-    rod = Rod(length, rigidity, min(diameter, length))
+@given(hnp.arrays(float, (6, 5), elements=moderate), scales, scales, scales, st.floats(-3.0, 3.0))
+def test_units_convert_there_and_back(values, length, rigidity, diameter, turn):
+    rod = Rod(length, rigidity, min(diameter, length), rest_curvature=turn / length)
     assume(not rod.is_dimensionless)
     names = (*CHANNELS, "truth_contact_x", "truth_force_y")
     si = make_record(
@@ -36,7 +36,8 @@ def test_units_convert_there_and_back(values, length, rigidity, diameter):
     assert np.array_equal(dimensionless["base_x"], si["base_x"] / rod.length)
     assert np.array_equal(dimensionless["truth_contact_x"], si["truth_contact_x"] / rod.length)
     assert np.array_equal(dimensionless["drive_angle"], si["drive_angle"])
-    assert rod_of(dimensionless) == Rod(diameter=rod.diameter / length)
+    curvature = rod.rest_curvature / rod.curvature_unit
+    assert rod_of(dimensionless) == Rod(diameter=rod.diameter / length, rest_curvature=curvature)
     assert dimensionless.attrs["load_cell_force_noise"] == 0.5 / rod.force_unit
     assert dimensionless.attrs["load_cell_moment_noise"] == 0.25 / rod.moment_unit
     assert to_dimensionless(dimensionless) is dimensionless
