@@ -1,0 +1,173 @@
+"""The shape of a rod of any rest curvature and rigidity: loaded, at rest, and where it is bent most.
+
+Shapes begin at the pivot. At rest the rod lies in the frame of its base, whose direction is that of x.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.profile import Profile
+from tactile_bayes.mechanics.rises import peak, rise
+from tactile_bayes.mechanics.taylor import (
+    FORWARD,
+    March,
+    State,
+    advance,
+    begin,
+    bending_at,
+    cell_at,
+    moved,
+    rest_curvature_at,
+)
+
+__all__ = ["Bending", "Chord", "chord_along", "largest_bending_along", "reach_along", "rest_along", "shape_along"]
+
+_FARTHEST = 4.0
+"""Arc length up to which a rod is continued beyond its tip [L]."""
+
+_SAMPLES = 16
+"""Points of a step at which the bending is compared."""
+
+
+class Chord(NamedTuple):
+    """Point of a rod at rest, in the frame of its base."""
+
+    arclength: float
+    """Arc length from the pivot [L]."""
+    distance: float
+    """Distance from the pivot [L]."""
+    bearing: float
+    """Direction in which it is seen from the pivot [rad]."""
+    slope: float
+    """Slope of the rod there [rad]."""
+    curvature: float
+    """Rest curvature there [1/L]."""
+
+
+class Bending(NamedTuple):
+    """Largest bending of a rod between pivot and contact."""
+
+    curvature: float
+    """Largest difference of the curvature from the rest curvature [1/L]."""
+    at: float
+    """Arc length at which it is found [L]."""
+    strain: float
+    """Largest such difference times the diameter, over that at the base, of a rod of round cross-section [1/L]."""
+    strain_at: float
+
+
+_AT_REST = State(0.0, 0.0, 0.0, 0.0)
+
+
+@compiled
+def shape_along(
+    profile: Profile,
+    phi0: float,
+    moment: float,
+    fx: float,
+    fy: float,
+    contact: float,
+    arclengths: Floats,
+    x: Floats,
+    y: Floats,
+    work: Floats,
+) -> None:
+    """Write the centreline at increasing arc lengths, for the arc length of the contact: zero if there is none."""
+    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
+    cos, sin = math.cos(beta), math.sin(beta)
+    march = begin(profile, 0.0, FORWARD, State(phi0 - beta, -moment, 0.0, 0.0))
+    x[:] = math.nan
+    y[:] = math.nan
+    for k in range(arclengths.size):
+        if arclengths[k] == 0.0:
+            x[k], y[k] = 0.0, 0.0
+    tip = arclengths[-1]
+    while march.at < tip:
+        before, acting, end = march, force, min(contact, tip)
+        if not before.at < contact:
+            state = before.state
+            before, acting, end = March(before.at, before.cell, State(state.psi, 0.0, state.u, state.v)), 0.0, tip
+        step, march = advance(profile, before, FORWARD, end, acting, work)
+        for k in range(arclengths.size):
+            if before.at < arclengths[k] <= march.at:
+                share = step.share * (arclengths[k] - before.at) / (march.at - before.at)
+                at = moved(before.state, acting, step, share, work)
+                x[k], y[k] = at.u * cos - at.v * sin, at.u * sin + at.v * cos
+
+
+@compiled
+def rest_along(profile: Profile, arclength: float, work: Floats) -> Chord:
+    """Point of the rod at rest at an arc length."""
+    march = begin(profile, 0.0, FORWARD, _AT_REST)
+    while march.at < arclength:
+        _, march = advance(profile, march, FORWARD, arclength, 0.0, work)
+    return _chord(profile, march.at, march.state)
+
+
+@compiled
+def chord_along(profile: Profile, distance: float, work: Floats) -> Chord:
+    """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
+
+    The rod is continued beyond its tip as in `contact_along`."""
+    return _outward(profile, distance, _FARTHEST, work)
+
+
+@compiled
+def reach_along(profile: Profile, work: Floats) -> Chord:
+    """Point of the rod at rest that is farthest from the pivot."""
+    return _outward(profile, math.inf, 1.0, work)
+
+
+@compiled
+def _outward(profile: Profile, distance: float, until: float, work: Floats) -> Chord:
+    march = begin(profile, 0.0, FORWARD, _AT_REST)
+    found, farthest, at = _AT_REST, 0.0, 0.0
+    while march.at < until:
+        before = march
+        step, march = advance(profile, before, FORWARD, until, 0.0, work)
+        x = rise(before.state, 0.0, step, False, distance, work)
+        reaches = x >= 0.0
+        if not reaches:
+            x = peak(before.state, 0.0, step, False, work)
+        end = moved(before.state, 0.0, step, x, work)
+        far = math.hypot(end.u, end.v)
+        if reaches or far > farthest:
+            found, farthest, at = end, far, before.at + x * step.length
+        if reaches:
+            break
+    return _chord(profile, at, found)
+
+
+@compiled
+def _chord(profile: Profile, arclength: float, at: State) -> Chord:
+    curvature = rest_curvature_at(profile, cell_at(profile, arclength, FORWARD), arclength)
+    return Chord(arclength, math.hypot(at.u, at.v), math.atan2(at.v, at.u), at.psi, curvature)
+
+
+@compiled
+def largest_bending_along(
+    profile: Profile, phi0: float, moment: float, fx: float, fy: float, contact: float, work: Floats
+) -> Bending:
+    """Largest bending, to a part in a thousand, for a base wrench and the arc length of its contact."""
+    force, beta = math.sqrt(fx * fx + fy * fy), math.atan2(-fx, fy)
+    march = begin(profile, 0.0, FORWARD, State(phi0 - beta, -moment, 0.0, 0.0))
+    end = min(contact, 1.0)
+    curvature, at, strain, strain_at = 0.0, 0.0, 0.0, 0.0
+    while march.at < end:
+        before = march
+        step, march = advance(profile, before, FORWARD, end, force, work)
+        for k in range(_SAMPLES + 1):
+            x = step.share * k / _SAMPLES
+            here = before.at + x * step.length
+            bending, rigidity = bending_at(step, moved(before.state, force, step, x, work).load, x, work)
+            bent = abs(bending)
+            if bent > curvature:
+                curvature, at = bent, here
+            bent *= math.sqrt(math.sqrt(rigidity))
+            if bent > strain:
+                strain, strain_at = bent, here
+    return Bending(curvature, at, strain, strain_at)
