@@ -35,7 +35,10 @@ class SweepFrame:
     mirrored : ndarray of bool, shape (n,)
         Whether the sweep is a backward one.
     rest_curvature : float or ndarray, shape (n,)
-        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/rod length].
+        Curvature of the unloaded rod in the laboratory frame, > 0 counter-clockwise [1/rod length]; of a rod whose
+        curvature varies along it, what is added to it.
+    taper : float or ndarray, shape (n,)
+        Taper of the rod.
     """
 
     contour: Contour
@@ -45,6 +48,7 @@ class SweepFrame:
     standoff: Parameter
     mirrored: Flags
     rest_curvature: Parameter = 0.0
+    taper: Parameter = 0.0
 
     @property
     def size(self) -> int:

@@ -328,6 +328,7 @@ class RecordLikelihood:
             backward=np.repeat(self._signs < 0.0, count),
             friction_angle=np.tile(np.arctan(rig.friction), segments),
             compliance=np.tile(rig.suspension_compliance * rig.rigidity_scale, segments),
+            taper=np.zeros(segments * count),
             rest_curvature=np.tile(self.rod.rest_curvature / self.rod.curvature_unit + rig.rest_curvature, segments),
             offset=np.broadcast_to(self._misread(rig), (count, segments)).T.flatten(),
             rigidity=np.tile(rig.rigidity_scale, segments),

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.beam import free_end, loaded_part, rest_curvature
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import (
     ANGLE,
@@ -57,7 +58,6 @@ from tactile_bayes.mechanics.leg import (
 )
 from tactile_bayes.mechanics.limits import approach
 from tactile_bayes.mechanics.outline import ends, is_inside, place
-from tactile_bayes.mechanics.pose import pose
 from tactile_bayes.mechanics.reachability import Reachability, SnapOff
 from tactile_bayes.mechanics.readings import (
     Asked,
@@ -252,12 +252,12 @@ def _past(loaded: Loaded, at_knot: Balance, sense: float) -> Balance:
 
 
 @compiled
-def _bent(stop: float, scene: Scene, curves: Curves) -> float:
+def _bent(stop: float, loaded: Loaded, curves: Curves) -> float:
     """Largest change of the rod's curvature up to a position on a leg."""
     for c in range(5):
         for k in range(curves.on.nodes.size):
             curves.values[c, k] = value(curves.series[c], curves.on.nodes[k])
-    return largest_curvature(stop, scene.rest.curvature, scene.rig, curves)
+    return largest_curvature(stop, loaded, curves)
 
 
 @compiled
@@ -282,12 +282,12 @@ def follow_branch(
     """
     rig, work = scene.rig, workspace.leg
     curves = work.curves
-    near = approach(scene.outline, scene.rest, accuracy.first_step)
+    near = approach(scene.outline, scene.beam, accuracy.first_step)
     if near.reach != _TOUCHES:
         return _nothing(near.reach, near.distance, math.nan)
     low, delta = near.low, rig.friction_angle
     loaded = in_phase(scene, near.tip_first)
-    z = first_equilibrium(loaded, scene.rest, near)
+    z = first_equilibrium(loaded, near)
     begin = balance(loaded, z)[0]
     first = begin.drive_angle
     onward_from, nothing = Equilibrium(0.0, 0.0, 1.0), nowhere()
@@ -357,7 +357,7 @@ def follow_branch(
                     rate = value(curves.series[ANGLE + 1], stop)
                     steadiness = min(max(rate * stop / (until.drive_angle - begin_angle), 0.0), 1.0)
                 if wants_states:
-                    bent = _bent(stop, scene, curves)
+                    bent = _bent(stop, loaded, curves)
                     largest = bent if math.isnan(largest) else max(bent, largest)
                 if found.changes.shape[0] > changes + 1 and (
                     not changes or (found.changes[changes - 1, 3] > 0.0) != leg.tip
@@ -431,8 +431,8 @@ def _second_contact(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> flo
     In tangential contact the free end goes on as an arc. It is in the object at once where the contour is less curved
     than the rod, or further on, at its tip. In tip contact it may be the loaded part.
     """
-    outline, curvature = scene.outline, scene.rest.curvature
-    if curvature <= 0.0:
+    outline, beam = scene.outline, scene.beam
+    if beam.varied is None and beam.curvature <= 0.0:
         return math.nan
     low, high = ends(outline)
     for k in range(work.nodes.size):
@@ -440,32 +440,25 @@ def _second_contact(scene: Scene, leg: Leg, stop: float, work: LegCurves) -> flo
             break
         p, q = work.at_nodes[PLACE, k], work.at_nodes[REST, k]
         spot = place(outline, p)
-        if not leg.tip and spot.bend <= curvature * spot.speed:
+        if not leg.tip and spot.bend <= rest_curvature(beam, q) * spot.speed:
             return p
         if not scene.exact and 0 < k < work.nodes.size - 1 and work.nodes[k + 1] <= stop:
             continue
         if leg.tip:
             force = math.hypot(work.at_nodes[1, k], work.at_nodes[2, k])
             for j in range(1, _BODY):
-                of_end = pose(q, j / _BODY, force, curvature)
-                cos, sin = _turned(spot.cos, spot.sin, scene.rig.friction_angle)
-                x, y = -of_end.u * cos + of_end.v * sin, -of_end.u * sin - of_end.v * cos
+                part, delta = loaded_part(beam, q, force, j / _BODY), scene.rig.friction_angle
+                cos = spot.cos * math.cos(delta) - spot.sin * math.sin(delta)
+                sin = spot.sin * math.cos(delta) + spot.cos * math.sin(delta)
+                x, y = -part.u * cos + part.v * sin, -part.u * sin - part.v * cos
                 if y * spot.cos > x * spot.sin and is_inside(outline, spot.x + x, spot.y + y, low, high):
                     return p
         elif q < 1.0:
-            turn = 0.5 * curvature * (1.0 - q)
-            chord = 2.0 * math.sin(turn) / curvature
-            cos, sin = _turned(spot.cos, spot.sin, turn)
-            if is_inside(outline, spot.x + chord * cos, spot.y + chord * sin, low, high):
+            along, across = free_end(beam, q, 1.0)
+            x, y = along * spot.cos - across * spot.sin, along * spot.sin + across * spot.cos
+            if is_inside(outline, spot.x + x, spot.y + y, low, high):
                 return p
     return math.nan
-
-
-@compiled
-def _turned(cos: float, sin: float, angle: float) -> tuple[float, float]:
-    """Cosine and sine of an angle plus another."""
-    other, of_other = math.cos(angle), math.sin(angle)
-    return cos * other - sin * of_other, sin * other + cos * of_other
 
 
 @compiled

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.beam import bending
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.equilibrium import Rig
+from tactile_bayes.mechanics.equilibrium import Loaded
 from tactile_bayes.mechanics.series import Nodes, crossing, nodes_of, value, value_and_slope, weighted
 
 __all__ = [
@@ -177,16 +178,17 @@ def left_of(angle: float, course: Course) -> float:
 
 
 @compiled
-def largest_curvature(stop: float, rest: float, rig: Rig, curves: Curves) -> float:
+def largest_curvature(stop: float, loaded: Loaded, curves: Curves) -> float:
     """Largest change of the rod's curvature from its rest curvature up to a position on a stretch [1/L], from values at
     the nodes."""
     nodes, values, curvature, series = curves.on.nodes, curves.values, curves.bend, curves.series
-    (angle, moment), force_x = value_and_slope(series[ANGLE], series[0], stop), value(series[1], stop)
-    at_stop = _bent(rest, angle - rig.compliance * moment, moment, force_x, value(series[2], stop))
+    angle, moment, rest = value(series[ANGLE], stop), value(series[0], stop), value(series[REST], stop)
+    at_stop = _bent(loaded, angle, moment, value(series[1], stop), value(series[2], stop), rest)
     best, count = 0, 0
     while count < nodes.size and nodes[count] < stop:
-        driven, moment = values[ANGLE, count], values[0, count]
-        curvature[count] = _bent(rest, driven - rig.compliance * moment, moment, values[1, count], values[2, count])
+        curvature[count] = _bent(
+            loaded, values[ANGLE, count], values[0, count], values[1, count], values[2, count], values[REST, count]
+        )
         best = count if curvature[count] > curvature[best] else best
         count += 1
     if best == 0 or best >= count - 1:
@@ -200,14 +202,7 @@ def largest_curvature(stop: float, rest: float, rig: Rig, curves: Curves) -> flo
 
 
 @compiled
-def _bent(rest: float, drive_angle: float, moment: float, force_x: float, force_y: float) -> float:
-    """Largest change of curvature between pivot and contact in a forward contact [1/L].
-
-    It is extreme at the pivot, and where the rod lies across the force, if it does so.
-    """
-    cos, sin = math.cos(drive_angle), math.sin(drive_angle)
-    lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
-    if across >= 0.0:
-        return abs(moment)
-    at_pivot = rest - moment
-    return max(abs(moment), rest + math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever)))
+def _bent(loaded: Loaded, driven: float, moment: float, force_x: float, force_y: float, rest: float) -> float:
+    """Largest change of curvature between pivot and contact [1/L]."""
+    slope = driven - loaded.compliance * moment
+    return bending(loaded.beam, slope, moment, force_x, force_y, 1.0 if loaded.tip else rest)

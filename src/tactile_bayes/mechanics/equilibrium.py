@@ -17,10 +17,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from tactile_bayes.mechanics.beam import Beam, beam_pose
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.limits import Rest
 from tactile_bayes.mechanics.outline import Outline, place
-from tactile_bayes.mechanics.pose import pose_and_slopes
 
 __all__ = [
     "SETTLED",
@@ -60,8 +59,7 @@ class Loaded(NamedTuple):
     """A rod that slides along a contour in one phase."""
 
     outline: Outline
-    curvature: float
-    """Rest curvature [1/L]."""
+    beam: Beam
     friction_angle: float
     compliance: float
     tip: bool
@@ -83,10 +81,10 @@ class Rig(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """All that an equilibrium depends on: one contour in the sweep frame, the rod at rest, and the rig."""
+    """All that an equilibrium depends on: one contour in the sweep frame, the rod, and the rig."""
 
     outline: Outline
-    rest: Rest
+    beam: Beam
     rig: Rig
     exact: bool
     """True if events are computed to rounding."""
@@ -125,7 +123,7 @@ class _Equations(NamedTuple):
 def in_phase(scene: Scene, tip: bool) -> Loaded:
     """Rod in one phase of contact."""
     rig = scene.rig
-    return Loaded(scene.outline, scene.rest.curvature, rig.friction_angle, rig.compliance, tip)
+    return Loaded(scene.outline, scene.beam, rig.friction_angle, rig.compliance, tip)
 
 
 @compiled
@@ -137,7 +135,7 @@ def balance(loaded: Loaded, at: Equilibrium) -> tuple[Balance, _Equations]:
     sin, cos = spot.sin * cos_delta + spot.cos * sin_delta, spot.cos * cos_delta - spot.sin * sin_delta
     along, across = spot.x * cos + spot.y * sin, spot.y * cos - spot.x * sin
     psi1, length = (q, 1.0) if loaded.tip else (-delta, q)
-    here, by_q, by_force = pose_and_slopes(psi1, length, force, loaded.curvature, loaded.tip)
+    here, by_q, by_force = beam_pose(loaded.beam, psi1, length, force, loaded.tip)
     by_u = Equilibrium(spot.speed * cos_delta + spot.bend * across, -by_q.u, -by_force.u)
     by_v = Equilibrium(-spot.speed * sin_delta - spot.bend * along, -by_q.v, -by_force.v)
     moment, compliance = force * along, loaded.compliance

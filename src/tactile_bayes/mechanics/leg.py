@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.beam import chord_to
 from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.curves import ANGLE, REST, Curves, curves_of
 from tactile_bayes.mechanics.equilibrium import Balance, Equilibrium, Loaded, dot, less, settle, times
-from tactile_bayes.mechanics.limits import Approach, Rest, chord_angle
+from tactile_bayes.mechanics.limits import Approach
 from tactile_bayes.mechanics.outline import place
 from tactile_bayes.mechanics.series import value_and_slope, weighted
 from tactile_bayes.numerics import chebyshev
@@ -99,15 +100,14 @@ def _onward(nodes: Floats) -> Floats:
 
 
 @compiled
-def first_equilibrium(loaded: Loaded, rest: Rest, found: Approach) -> Equilibrium:
+def first_equilibrium(loaded: Loaded, found: Approach) -> Equilibrium:
     """Equilibrium without force at first contact."""
     at = place(loaded.outline, found.begin)
-    distance, curvature = math.hypot(at.x, at.y), rest.curvature
-    half = chord_angle(curvature, distance)
+    chord = chord_to(loaded.beam, math.hypot(at.x, at.y))
     if found.tip_first:
-        psi1 = math.atan2(at.y, at.x) + half - math.atan2(at.sin, at.cos) - loaded.friction_angle
+        psi1 = math.atan2(at.y, at.x) + chord.at_point - math.atan2(at.sin, at.cos) - loaded.friction_angle
         return Equilibrium(found.begin, psi1, 0.0)
-    return Equilibrium(found.begin, 2.0 * half / curvature if curvature != 0.0 else distance, 0.0)
+    return Equilibrium(found.begin, chord.arclength, 0.0)
 
 
 @compiled

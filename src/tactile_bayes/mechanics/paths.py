@@ -19,6 +19,7 @@ from tactile_bayes.mechanics.phases import NONE, TANGENTIAL
 from tactile_bayes.mechanics.shapes import shapes_of
 
 if TYPE_CHECKING:
+    from tactile_bayes.mechanics.profile import Profile
     from tactile_bayes.mechanics.sweeps import Shapes, Solutions, Sweeps
 
 __all__ = ["Paths", "States", "trace"]
@@ -72,6 +73,7 @@ class Paths:
     tolerance: Floats | None
     shapes: Shapes
     sweeps: Sweeps
+    profile: Profile | None
     sampled: Floats
     """States at the drive angles given to `trace`, shape (n, k, columns)."""
 
@@ -96,7 +98,11 @@ class Paths:
             Holding moment [EI/L] and forces [EI/L²], with the signs of the laboratory frame.
         """
         sign = np.where(self.sweep_frame.mirrored[:, None, None], [-1.0, -1.0, 1.0], 1.0)
-        return np.asarray(sign * _swept(self.shapes, self.sweeps, self.tolerance, drive_angles).loads)
+        return np.asarray(sign * self._swept(drive_angles).loads)
+
+    def _swept(self, drive_angles: Floats, states: bool = False) -> Solutions:
+        of_rod: dict[str, Any] = {"profile": self.profile, "tolerance": self.tolerance}
+        return _swept(self.shapes, self.sweeps, drive_angles, states=states, **of_rod)
 
     def states(self, index: Index, drive_angles: Floats) -> States:
         """Exact states at drive angles, shape (k,), of contours, shape (k,); NaN and `NONE` out of contact."""
@@ -107,7 +113,7 @@ class Paths:
         rank[order] = np.arange(index.size) - (np.cumsum(count) - count)[index[order]]
         by_contour = np.full((self.sweep_frame.size, int(count.max(initial=0))), np.nan)
         by_contour[index, rank] = angles
-        found = _swept(self.shapes, self.sweeps, self.tolerance, by_contour, states=True)
+        found = self._swept(by_contour, states=True)
         return _as_states(found.states[index, rank])
 
     def loaded_states(self) -> tuple[Index, Index, States]:
@@ -139,7 +145,7 @@ class Paths:
         """
         from tactile_bayes.mechanics.sweeps import solve_events  # numba takes a second to load
 
-        return _as_states(solve_events(self.shapes, self.sweeps, self.changes))
+        return _as_states(solve_events(self.shapes, self.sweeps, self.changes, self.profile))
 
 
 def trace(
@@ -147,6 +153,7 @@ def trace(
     *,
     friction_angle: ArrayLike = 0.0,
     suspension_compliance: ArrayLike = 0.0,
+    profile: Profile | None = None,
     tolerance: Floats | None = None,
     drive_angles: Floats | None = None,
     relative: bool = False,
@@ -162,6 +169,8 @@ def trace(
         Friction angle δ = arctan μ [rad].
     suspension_compliance : float or array_like, shape (n,)
         Turn of the pivot's suspension per holding moment, c in (drive angle) = φ0 + c m0 [rad/(EI/L)].
+    profile : Profile, optional
+        Rod whose rest curvature or rigidity varies along it; by default it is uniform and a circular arc at rest.
     tolerance : ndarray, shape (3,), optional
         Tolerated errors of the loads [EI/L and EI/L²], for likelihoods, which is several times faster; by default
         events are computed to rounding.
@@ -190,11 +199,13 @@ def trace(
         friction_angle=_each(friction_angle, count),
         compliance=_each(compliance, count),
         rest_curvature=_each(sweep_frame.rest_curvature, count),
+        taper=_each(sweep_frame.taper, count),
         offset=np.zeros(count),
         rigidity=np.ones(count),
     )
     angles = np.empty(0) if drive_angles is None else drive_angles
-    solutions = _swept(shapes, sweeps, tolerance, angles, relative, states=True, polished=polished)
+    of_rod: dict[str, Any] = {"profile": profile, "tolerance": tolerance}
+    solutions = _swept(shapes, sweeps, angles, relative, states=True, polished=polished, **of_rod)
     most = int(solutions.phases.max(initial=0))
     changes = np.where(solutions.phases[:, None, None] > 0, solutions.changes[:, : most + 1], np.nan)
     return Paths(
@@ -214,6 +225,7 @@ def trace(
         tolerance=tolerance,
         shapes=shapes,
         sweeps=sweeps,
+        profile=profile,
         sampled=solutions.states,
     )
 
@@ -225,7 +237,6 @@ def _each(values: Any, count: int) -> Floats:
 def _swept(
     shapes: Shapes,
     sweeps: Sweeps,
-    tolerance: Floats | None,
     drive_angles: Floats,
     relative: bool = False,
     **options: Any,
@@ -240,7 +251,7 @@ def _swept(
         each * np.arange(segments + 1), order.ravel(), np.take_along_axis(angles, order, axis=1).ravel(), relative
     )
     sweeps = sweeps._replace(segment=sweeps.contour % segments)
-    return solve_sweeps(shapes, sweeps, asked, (sweeps.contour.size, each), tolerance=tolerance, **options)
+    return solve_sweeps(shapes, sweeps, asked, (sweeps.contour.size, each), **options)
 
 
 def _as_states(columns: Floats) -> States:

@@ -27,15 +27,21 @@ from tactile_bayes.mechanics.taylor import (
     slopes_moved,
 )
 
-__all__ = ["pose_along", "pose_along_and_slopes"]
+__all__ = ["part_along", "pose_along", "pose_along_and_slopes"]
 
 
 @compiled
 def pose_along(profile: Profile, psi1: float, arclength: float, force: float, work: Floats) -> Pose:
     """Pose for ψ1, arc length s1 and force f, in rod lengths and EI(0)/L²."""
+    return part_along(profile, psi1, arclength, 0.0, force, work)
+
+
+@compiled
+def part_along(profile: Profile, psi1: float, arclength: float, until: float, force: float, work: Floats) -> Pose:
+    """Pose of a point between pivot and contact, at an arc length, in place of that of the pivot."""
     march = begin(profile, arclength, BACKWARD, State(psi1, 0.0, 0.0, 0.0))
-    while march.at > 0.0:
-        _, march = advance(profile, march, BACKWARD, 0.0, force, work)
+    while march.at > until:
+        _, march = advance(profile, march, BACKWARD, until, force, work)
     # NaN of the arc length is that of series that overflow.
     state = march.state
     return Pose(state.u, state.v, state.psi - psi1)

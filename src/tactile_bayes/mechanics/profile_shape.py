@@ -24,7 +24,16 @@ from tactile_bayes.mechanics.taylor import (
     rest_curvature_at,
 )
 
-__all__ = ["Bending", "Chord", "chord_along", "largest_bending_along", "reach_along", "rest_along", "shape_along"]
+__all__ = [
+    "Bending",
+    "Chord",
+    "beyond_along",
+    "chord_along",
+    "largest_bending_along",
+    "reach_along",
+    "rest_along",
+    "shape_along",
+]
 
 _FARTHEST = 4.0
 """Arc length up to which a rod is continued beyond its tip [L]."""
@@ -106,6 +115,15 @@ def rest_along(profile: Profile, arclength: float, work: Floats) -> Chord:
     while march.at < arclength:
         _, march = advance(profile, march, FORWARD, arclength, 0.0, work)
     return _chord(profile, march.at, march.state)
+
+
+@compiled
+def beyond_along(profile: Profile, arclength: float, until: float, work: Floats) -> tuple[float, float]:
+    """Point of the rod at rest at an arc length, along the rod at another before it, and to its left."""
+    march = begin(profile, arclength, FORWARD, _AT_REST)
+    while march.at < until:
+        _, march = advance(profile, march, FORWARD, until, 0.0, work)
+    return march.state.u, march.state.v
 
 
 @compiled

@@ -10,14 +10,17 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
+from tactile_bayes.mechanics.beam import Beam, Varied, beam_of
 from tactile_bayes.mechanics.branch import MOST_CHANGES, BranchWorkspace, branch_workspace, follow_branch
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
 from tactile_bayes.mechanics.equilibrium import Equilibrium, Rig, Scene, balance, in_phase
-from tactile_bayes.mechanics.limits import clear_angle, rest_of
+from tactile_bayes.mechanics.limits import clear_angle
 from tactile_bayes.mechanics.outline import Half, Outline, mirrored
+from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, write_state
+from tactile_bayes.mechanics.taylor import workspace
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
@@ -66,7 +69,9 @@ class Sweeps(NamedTuple):
     friction_angle: Floats
     compliance: Floats
     rest_curvature: Floats
-    """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]."""
+    """Rest curvature in the laboratory frame, > 0 counter-clockwise [1/L]; with a profile, what is added to its own."""
+    taper: Floats
+    """Taper, for rods with a profile."""
     offset: Floats
     """Encoder offset in the laboratory frame [rad]."""
     rigidity: Floats
@@ -121,6 +126,10 @@ def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
     return out
 
 
+def _varied(profile: Profile | None) -> Varied | None:
+    return None if profile is None else Varied(profile, workspace())
+
+
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
     """Structured type, so that compiled code takes one array instead of one for each name."""
     kinds = {**dict.fromkeys(_INDICES, np.intp), **dict.fromkeys(_FLAGS, np.bool_), **dict.fromkeys(_CODES, np.int8)}
@@ -160,18 +169,35 @@ def _outline(shapes: Shapes, sweep: Any, table: Floats) -> Outline:
 
 
 @compiled
-def _scene(shapes: Shapes, sweep: Any, exact: bool, table: Floats) -> Scene:
+def _scene(shapes: Shapes, varied: Varied | None, sweep: Any, exact: bool, table: Floats) -> Scene:
     """Contour, rod and rig of a sweep in the sweep frame; the contour's table is written to `table`."""
     sign = -1.0 if sweep.backward else 1.0
     rig = Rig(sweep.friction_angle, sweep.compliance, sign * sweep.offset, sign, sweep.rigidity)
-    return Scene(_outline(shapes, sweep, table), rest_of(sign * sweep.rest_curvature), rig, exact)
+    return Scene(_outline(shapes, sweep, table), _beam(varied, sweep, sign), rig, exact)
+
+
+@compiled
+def _beam(varied: Varied | None, sweep: Any, sign: float) -> Beam:
+    """Rod of a sweep."""
+    if varied is None:
+        return beam_of(sign * sweep.rest_curvature, varied)
+    edges, curvature, rigidity, _, bend, _ = varied.profile
+    of_sweep = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
+    return beam_of(0.0, Varied(of_sweep, varied.work))
 
 
 @cached
-def _solve_events(shapes: Shapes, sweeps: Any, events: Floats, table: Floats, out: Floats) -> None:
+def _solve_events(
+    shapes: Shapes,
+    varied: Varied | None,
+    sweeps: Any,
+    events: Floats,
+    table: Floats,
+    out: Floats,
+) -> None:
     """Write the states of events; see `solve_events`."""
     for i in range(sweeps.size):
-        scene = _scene(shapes, sweeps[i], True, table)
+        scene = _scene(shapes, varied, sweeps[i], True, table)
         for k in range(events.shape[1]):
             out[i, k] = math.nan
             out[i, k, 0] = 0.0
@@ -181,19 +207,21 @@ def _solve_events(shapes: Shapes, sweeps: Any, events: Floats, table: Floats, ou
                 write_state(balance(in_phase(scene, tip), at)[0], tip, scene, out[i, k])
 
 
-def solve_events(shapes: Shapes, sweeps: Sweeps, events: Floats) -> Floats:
+def solve_events(shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profile | None = None) -> Floats:
     """States of events of sweeps, shape (sweeps, k, columns), from their coordinates as in `Found`, (sweeps, k, 4).
 
     The phase is `NONE` and the rest NaN for coordinates that are NaN.
     """
     out = np.empty((*events.shape[:2], STATE_COLUMNS))
-    _solve_events(shapes, _as_sweeps(sweeps), events, np.empty(shapes.tables.shape[1:]), out)
+    table = np.empty(shapes.tables.shape[1:])
+    _solve_events(shapes, _varied(profile), _as_sweeps(sweeps), events, table, out)
     return out
 
 
 @cached
 def _solve(
     shapes: Shapes,
+    varied: Varied | None,
     sweeps: Any,
     segments: Segments,
     exact: bool,
@@ -227,7 +255,7 @@ def _solve(
     count, knots = shapes.knots.shape[1], workspace.knots
     for i in range(sweeps.size):
         sweep, event, c = sweeps[i], events[i], sweeps[i].contour
-        scene = _scene(shapes, sweep, exact, table)
+        scene = _scene(shapes, varied, sweep, exact, table)
         for k in range(count):
             knots[k] = -shapes.knots[c, k] if sweep.backward else shapes.knots[c, count - 1 - k]
         first, last = segments.first[sweep.segment], segments.first[sweep.segment + 1]
@@ -240,7 +268,7 @@ def _solve(
         event.snap_off, event.phases, event.curvature = ends.snap_off, ends.phases, ends.curvature
         event.clear_angle = math.nan
         if asks_clearance and ends.reach == _TOUCHES:
-            event.clear_angle = clear_angle(scene.outline, scene.rest, accuracy.first_step)
+            event.clear_angle = clear_angle(scene.outline, scene.beam, accuracy.first_step)
 
 
 def solve_sweeps(
@@ -249,6 +277,7 @@ def solve_sweeps(
     segments: Segments,
     shape: tuple[int, int],
     *,
+    profile: Profile | None = None,
     tolerance: Floats | None = None,
     states: bool = False,
     polished: bool = True,
@@ -263,6 +292,9 @@ def solve_sweeps(
     segments : Segments
     shape : (int, int)
         Number of contours, and of rows for each.
+    profile : Profile, optional
+        Rod whose rest curvature or rigidity varies along it, the same in all sweeps but for the taper, and for what is
+        added to its rest curvature; by default rods are uniform and of constant rest curvature.
     tolerance : ndarray, shape (3,), optional
         Tolerated errors of moment and forces [EI/L and EI/L²]; by default events are exact, and loads have errors of
         some 1e-8 of the largest.
@@ -286,6 +318,7 @@ def solve_sweeps(
     longest = int(np.diff(segments.first).max(initial=0))
     _solve(
         shapes,
+        _varied(profile),
         sweep,
         segments,
         tolerance is None,

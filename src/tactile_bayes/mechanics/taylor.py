@@ -174,21 +174,21 @@ def _divided(work: Floats, rigid: int, inverse: float, n: int, term: float, colu
 
 
 @compiled
-def _size(work: Floats, n: int) -> float:
-    """Size of the terms of an order; the slope does not vary where nothing bends a rod, and sine and cosine do."""
-    return max(abs(work[n, _RATE]), abs(work[n, _SIN]), abs(work[n, _COS]))
+def _size(work: Floats, n: int, length: float) -> float:
+    """Size of the terms of an order, of an unloaded rod too: its derivatives by the force are those of a loaded one."""
+    return max(abs(work[n, _RATE]), abs(work[n, _SIN]), abs(work[n, _COS]), abs(length * work[n, _QUOTIENT]))
 
 
 @compiled
-def _is_last(work: Floats, n: int, least: int) -> bool:
+def _is_last(work: Floats, n: int, least: int, length: float) -> bool:
     """Return whether the terms have become small."""
-    return n >= least and max(_size(work, n), _size(work, n - 1)) <= _REMAINDER
+    return n >= least and max(_size(work, n, length), _size(work, n - 1, length)) <= _REMAINDER
 
 
 @compiled
-def _share(work: Floats) -> float:
+def _share(work: Floats, length: float) -> float:
     """Share of a step on which the series converge; NaN where they are not finite."""
-    last, before = _size(work, _TERMS - 1), _size(work, _TERMS - 2)
+    last, before = _size(work, _TERMS - 1, length), _size(work, _TERMS - 2, length)
     size = max((last / _REMAINDER) ** (1.0 / (_TERMS - 1)), (before / _REMAINDER) ** (1.0 / (_TERMS - 2)))
     return min(1.0, 1.0 / size) if size < math.inf else math.nan
 
@@ -224,9 +224,9 @@ def series(
         work[n + 1, _U], work[n + 1, _V] = share * length * work[n, _COS], share * length * work[n, _SIN]
         work[n + 1, _SIN], work[n + 1, _COS] = share * cos, -share * sin
         load = force * work[n + 1, _U]
-        if _is_last(work, n, least):
+        if _is_last(work, n, least, length):
             return Step(length, 1.0, n + 1, rigid)
-    return Step(length, _share(work), _TERMS, rigid)
+    return Step(length, _share(work, length), _TERMS, rigid)
 
 
 @compiled
@@ -322,9 +322,9 @@ def slope_series(
         work[n + 1, _PSI_1], work[n + 1, _PSI_S], work[n + 1, _PSI_F] = share * rate_1, share * rate_s, share * rate_f
         work[n + 1, _U_1], work[n + 1, _U_S], work[n + 1, _U_F] = -way * sin_1, -way * sin_s, -way * sin_f
         work[n + 1, _V_F] = way * cos_f
-        if _is_last(work, n, least):
+        if _is_last(work, n, least, length):
             return Step(length, 1.0, n + 1, rigid)
-    return Step(length, _share(work), _TERMS, rigid)
+    return Step(length, _share(work, length), _TERMS, rigid)
 
 
 @compiled

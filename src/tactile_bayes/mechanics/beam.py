@@ -1,0 +1,202 @@
+"""A rod as the forward model sees it: its pose under a force, and its shape at rest.
+
+Uniform rods of constant rest curvature have closed forms (`pose`); all others are integrated (`taylor`). Functions are
+compiled for each of the two: where an argument is None, numba leaves out what an `is None` excludes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.mechanics.pose import Pose, pose, pose_and_slopes
+from tactile_bayes.mechanics.profile import Profile
+from tactile_bayes.mechanics.profile_pose import part_along, pose_along_and_slopes
+from tactile_bayes.mechanics.profile_shape import beyond_along, chord_along, largest_bending_along, rest_along
+from tactile_bayes.mechanics.taylor import FORWARD, cell_at, rest_curvature_at
+
+__all__ = [
+    "Beam",
+    "Chord",
+    "Varied",
+    "beam_of",
+    "beam_pose",
+    "bending",
+    "chord_to",
+    "free_end",
+    "loaded_part",
+    "mirrored_beam",
+    "rest_curvature",
+]
+
+
+_ACROSS = 1e-6
+"""Cosine of the angle of a chord to the rod that counts as zero: the rod goes no farther from the pivot."""
+
+
+class Varied(NamedTuple):
+    """Rest curvature and rigidity along a rod, and a workspace for its series."""
+
+    profile: Profile
+    work: Floats
+
+
+class Beam(NamedTuple):
+    """A rod in the sweep frame."""
+
+    curvature: float
+    """Constant rest curvature [1/L]; 0 for rods with a profile."""
+    reach: float
+    """Distance from pivot to tip at rest [L]."""
+    varied: Varied | None
+    """Properties along the rod; None for uniform rods of constant rest curvature."""
+
+
+class Chord(NamedTuple):
+    """Line from the pivot to a point of the rod at rest."""
+
+    arclength: float
+    """Arc length of the point [L]."""
+    at_base: float
+    """Angle from the rod at the pivot to the chord [rad]."""
+    at_point: float
+    """Angle from the chord to the rod at the point [rad]."""
+    rate: float
+    """Derivative of `at_point` by the length of the chord."""
+
+
+@compiled
+def beam_of(curvature: float, varied: Varied | None) -> Beam:
+    """Uniform rod whose rest shape is an arc of length one, or a rod whose properties vary along it."""
+    if varied is None:
+        half = 0.5 * curvature
+        return Beam(curvature, 1.0 if half == 0.0 else math.sin(half) / half, varied)
+    return Beam(0.0, rest_along(varied.profile, 1.0, varied.work).distance, varied)
+
+
+@compiled
+def mirrored_beam(beam: Beam) -> Beam:
+    """Rod in the frame of the opposite sweep."""
+    return Beam(-beam.curvature, beam.reach, _mirrored(beam.varied))
+
+
+@compiled
+def _mirrored(varied: Varied | None) -> Varied | None:
+    if varied is None:
+        return varied
+    edges, curvature, rigidity, taper, bend, sign = varied.profile
+    return Varied(Profile(edges, curvature, rigidity, taper, bend, -sign), varied.work)
+
+
+@compiled
+def beam_pose(beam: Beam, psi1: float, arclength: float, force: float, tip: bool) -> tuple[Pose, Pose, Pose]:
+    """Pose, and its derivatives by ψ1 in tip contact or by the arc length in tangential contact, and by the force."""
+    return _pose(beam.varied, beam.curvature, psi1, arclength, force, tip)
+
+
+@compiled
+def _pose(
+    varied: Varied | None,
+    curvature: float,
+    psi1: float,
+    arclength: float,
+    force: float,
+    tip: bool,
+) -> tuple[Pose, Pose, Pose]:
+    if varied is None:
+        return pose_and_slopes(psi1, arclength, force, curvature, tip)
+    here, by_psi1, by_arclength, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
+    return here, by_psi1 if tip else by_arclength, by_force
+
+
+@compiled
+def chord_to(beam: Beam, distance: float) -> Chord:
+    """Chord of the rod at rest to its first point at a distance from the pivot."""
+    return _chord(beam.varied, beam.curvature, distance)
+
+
+@compiled
+def _chord(varied: Varied | None, curvature: float, distance: float) -> Chord:
+    if varied is None:
+        sine = min(max(0.5 * curvature * distance, -1.0), 1.0)
+        angle, cos = math.asin(sine), math.sqrt((1.0 - sine) * (1.0 + sine))
+        arclength = distance if curvature == 0.0 else 2.0 * angle / curvature
+        return Chord(arclength, angle, angle, 0.5 * curvature / cos if cos > _ACROSS else 0.0)
+    found = chord_along(varied.profile, distance, varied.work)
+    at_point = found.slope - found.bearing
+    cos = math.cos(at_point)
+    rate = (found.curvature - math.sin(at_point) / distance) / cos if cos > _ACROSS else 0.0
+    return Chord(found.arclength, found.bearing, at_point, rate)
+
+
+@compiled
+def bending(beam: Beam, drive_angle: float, moment: float, force_x: float, force_y: float, arclength: float) -> float:
+    """Largest change of curvature between pivot and contact in a forward contact, times the diameter over that at the
+    base [1/L]."""
+    return _bending(beam.varied, beam.curvature, drive_angle, moment, force_x, force_y, arclength)
+
+
+@compiled
+def _bending(
+    varied: Varied | None,
+    curvature: float,
+    drive_angle: float,
+    moment: float,
+    force_x: float,
+    force_y: float,
+    arclength: float,
+) -> float:
+    if varied is None:
+        # It is extreme at the pivot, and where the rod lies across the force, if it does so.
+        cos, sin = math.cos(drive_angle), math.sin(drive_angle)
+        lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
+        if across >= 0.0:
+            return abs(moment)
+        at_pivot = curvature - moment
+        bent = math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever))
+        return max(abs(moment), curvature + bent)
+    return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work).strain
+
+
+@compiled
+def rest_curvature(beam: Beam, arclength: float) -> float:
+    """Rest curvature at an arc length [1/L]."""
+    return _rest_curvature(beam.varied, beam.curvature, arclength)
+
+
+@compiled
+def _rest_curvature(varied: Varied | None, curvature: float, arclength: float) -> float:
+    if varied is None:
+        return curvature
+    return rest_curvature_at(varied.profile, cell_at(varied.profile, arclength, FORWARD), arclength)
+
+
+@compiled
+def free_end(beam: Beam, arclength: float, share: float) -> tuple[float, float]:
+    """Point of the free end beyond a contact, at a share of its length, along the rod there and to its left [L]."""
+    return _free_end(beam.varied, beam.curvature, arclength, share)
+
+
+@compiled
+def _free_end(varied: Varied | None, curvature: float, arclength: float, share: float) -> tuple[float, float]:
+    length = share * (1.0 - arclength)
+    if varied is None:
+        turn = 0.5 * curvature * length
+        chord = length if turn == 0.0 else length * math.sin(turn) / turn
+        return chord * math.cos(turn), chord * math.sin(turn)
+    return beyond_along(varied.profile, arclength, arclength + length, varied.work)
+
+
+@compiled
+def loaded_part(beam: Beam, psi1: float, force: float, share: float) -> Pose:
+    """Point of a rod in tip contact, at a share of the arc length from the tip, as seen from there as in `pose`."""
+    return _loaded_part(beam.varied, beam.curvature, psi1, force, share)
+
+
+@compiled
+def _loaded_part(varied: Varied | None, curvature: float, psi1: float, force: float, share: float) -> Pose:
+    if varied is None:
+        return pose(psi1, share, force, curvature)
+    return part_along(varied.profile, psi1, 1.0, 1.0 - share, force, varied.work)
