@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_simpson
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_positive
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.along import Along, along
+from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile, profile_of
 
 __all__ = ["LARGEST_STRAIN", "Rod"]
 
@@ -19,13 +24,16 @@ _THICKEST = 1e70
 _MOST_TURN = math.pi
 """Turn between base and tip [rad] up to which every point of an arc is farther from the base than those before it."""
 
+_POINTS = 2001
+"""Points of a rod at rest."""
+
 LARGEST_STRAIN = 0.1
 """Bending strain up to which a rod is slender and its bending moment is proportional to its curvature."""
 
 
 @dataclass(frozen=True)
 class Rod:
-    """A uniform rod, straight or a circular arc.
+    """A rod, straight, curved or tapered.
 
     Without arguments the rod is dimensionless: lengths are in units of the rod's length L, moments of EI/L,
     forces of EI/L² (equation 11 of Merker et al. 2018, doi 10.1155/2018/1613945).
@@ -35,22 +43,30 @@ class Rod:
     length : float
         Length L from the pivot to the tip [m].
     flexural_rigidity : float
-        Young's modulus times second moment of area, EI [N m²].
+        Young's modulus times second moment of area, EI, at the base [N m²].
     diameter : float
         Diameter of a rod of circular cross-section [m]. The rod touches with its surface, half a diameter beside
         its centreline; 0 (the default) stands for a rod without thickness.
     elastic_strain : float, optional
         Largest bending strain without permanent deformation: about 0.002 for mild steel, 0.005 for spring steel, 0.05
         for nitinol. `scan` warns if a rod with a diameter is bent beyond it. Records do not state it.
-    rest_curvature : float
-        Curvature of the unloaded rod [1/m]: it is a circular arc. A positive one bends counter-clockwise from base to
-        tip; the drive angle is the direction at the base.
+    rest_curvature : float, callable or (s, curvature)
+        Curvature of the unloaded rod [1/m]: a number for a circular arc, a function of the arc length s from the base
+        [m] that works on arrays, or arrays of both. A positive one bends counter-clockwise from base to tip; the drive
+        angle is the direction at the base.
+    taper : float
+        The diameter falls linearly to (1 − taper) of that at the base, and the flexural rigidity with its fourth power.
+    rigidity_profile : callable or (s, EI/EI0), optional
+        Flexural rigidity along the rod over that at the base, as a function or arrays like the rest curvature; by
+        default constant. A taper comes on top of it.
 
     Raises
     ------
     ParameterError
         If length or flexural rigidity is not positive and finite, the diameter is negative or larger than the length,
-        the elastic strain is not positive, or the rod at rest is more than a half circle.
+        the elastic strain is not positive, a taper is not from 0 to 0.95, a property along the rod is invalid, or the
+        rod at rest curls back toward its base, as an arc of more than a half circle does. A rod that is tapered, or has
+        a rigidity profile, cannot have a diameter: contact is then on its centreline.
 
     Examples
     --------
@@ -59,13 +75,17 @@ class Rod:
     (0.00012, 0.0012)
     >>> Rod(length=0.1, flexural_rigidity=1.2e-5, rest_curvature=4.0)
     Rod(length=0.1, flexural_rigidity=1.2e-05, diameter=0.0, rest_curvature=4.0)
+    >>> Rod(taper=0.5, rest_curvature=lambda s: 0.4 * s)
+    Rod(length=1.0, flexural_rigidity=1.0, diameter=0.0, rest_curvature=Along(from 0 to 0.4, 1 cells), taper=0.5)
     """
 
     length: float = 1.0
     flexural_rigidity: float = 1.0
     diameter: float = 0.0
     elastic_strain: float | None = None
-    rest_curvature: float = 0.0
+    rest_curvature: Any = 0.0
+    taper: float = 0.0
+    rigidity_profile: Any = None
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -78,9 +98,19 @@ class Rod:
                 f"the rod's diameter is {self.diameter!r} and its length {self.length!r}: a rod is longer than it is "
                 "thick, give both in metres"
             )
-        most = _MOST_TURN / self.length
-        correction = f"give a number [1/m] between ±{most:.4g}, where the rod is a half circle; 0 if it is straight"
-        check_number("the rod's rest_curvature", self.rest_curvature, correction, least=-most, most=most)
+        correction = f"give a number from 0, for none, to {STEEPEST_TAPER}"
+        check_number("the rod's taper", self.taper, correction, least=0.0, most=STEEPEST_TAPER)
+        if self.rigidity_profile is not None:
+            of_rod = along("the rod's rigidity_profile", self.rigidity_profile, self.length, positive=True)
+            uniform = isinstance(of_rod, float) and of_rod == 1.0
+            object.__setattr__(self, "rigidity_profile", None if uniform else of_rod)
+        object.__setattr__(self, "rest_curvature", along("the rod's rest_curvature", self.rest_curvature, self.length))
+        self._refuse_curl()
+        if self.diameter and not self.is_uniform:
+            raise ParameterError(
+                f"the rod has the diameter {self.diameter!r} and is not uniform: contact beside the centreline of a "
+                "tapered rod is not modelled; leave the diameter out, which puts the contact on the centreline"
+            )
         square = float(self.length) * float(self.length)
         if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
             raise ParameterError(
@@ -88,9 +118,29 @@ class Rod:
                 "its unit of force EI/L² is beyond what numbers hold: are they in metres and N m²?"
             )
 
+    def _refuse_curl(self) -> None:
+        """Refuse a rod that is not, all along, farther from its base than before."""
+        if isinstance(self.rest_curvature, float):
+            most = _MOST_TURN / self.length
+            correction = f"give a number [1/m] between ±{most:.4g}, where the rod is a half circle; 0 if it is straight"
+            check_number("the rod's rest_curvature", self.rest_curvature, correction, least=-most, most=most)
+            return
+        s = np.linspace(0.0, self.length, _POINTS)
+        slope = cumulative_simpson(self.rest_curvature(s), x=s, initial=0.0)
+        x, y = (cumulative_simpson(way, x=s, initial=0.0) for way in (np.cos(slope), np.sin(slope)))
+        outward = x * np.cos(slope) + y * np.sin(slope)
+        if np.any(outward[1:] <= 0.0):
+            at = s[1:][outward[1:] <= 0.0][0]
+            raise ParameterError(
+                f"the rod's rest_curvature lets it curl back toward its base from s = {at:.4g} on, of {self.length:.4g}: "
+                "give a curvature [1/m] with which every point is farther from the base than those before"
+            )
+
     def __repr__(self) -> str:
         more = "" if self.elastic_strain is None else f", elastic_strain={self.elastic_strain!r}"
         more += "" if self.rest_curvature == 0.0 else f", rest_curvature={self.rest_curvature!r}"
+        more += "" if self.taper == 0.0 else f", taper={self.taper!r}"
+        more += "" if self.rigidity_profile is None else f", rigidity_profile={self.rigidity_profile!r}"
         return (
             f"Rod(length={self.length!r}, flexural_rigidity={self.flexural_rigidity!r}, "
             f"diameter={self.diameter!r}{more})"
@@ -135,6 +185,42 @@ class Rod:
             check_positive(f"the rod's {name}", value)
         fourth = float(diameter) ** 4 if diameter < _THICKEST else math.inf
         return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain, rest_curvature)
+
+    @property
+    def is_uniform(self) -> bool:
+        """True if the flexural rigidity is constant."""
+        return self.taper == 0.0 and self.rigidity_profile is None
+
+    @property
+    def is_arc(self) -> bool:
+        """True if the rod is uniform and its rest curvature constant: the equations have closed forms."""
+        return self.is_uniform and isinstance(self.rest_curvature, float)
+
+    @property
+    def mean_rest_curvature(self) -> float:
+        """Mean of the rest curvature [1/m]: the turn from base to tip over the length."""
+        curvature = self.rest_curvature
+        return curvature if isinstance(curvature, float) else float(curvature.mean)
+
+    @property
+    def arc_curvature(self) -> float:
+        """Rest curvature of an arc [1/L]; 0 for rods with a `profile`."""
+        return self.rest_curvature / self.curvature_unit if self.is_arc else 0.0
+
+    @cached_property
+    def profile(self) -> Profile | None:
+        """Rest curvature and rigidity along the rod, dimensionless; None for arcs."""
+        if self.is_arc:
+            return None
+        rigidity = 1.0 if self.rigidity_profile is None else self.rigidity_profile
+        given = (
+            (self.rest_curvature, 1.0 / self.curvature_unit),
+            (rigidity, 1.0),
+        )
+        curvature, rigidity = (
+            of.scaled(1.0 / self.length, unit) if isinstance(of, Along) else of * unit for of, unit in given
+        )
+        return profile_of(curvature, rigidity, self.taper)
 
     @property
     def is_dimensionless(self) -> bool:

@@ -1,0 +1,249 @@
+"""A property along a rod, as polynomials on cells."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
+from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator
+
+from tactile_bayes.arrays import Floats
+from tactile_bayes.checks import as_number, as_numbers, check_number, refused
+from tactile_bayes.errors import ParameterError
+from tactile_bayes.numerics import chebyshev
+
+__all__ = ["Along", "GivenAlong", "along"]
+
+_ORDER = 12
+"""Coefficients of the polynomials that represent a function."""
+
+_MISS = 1e-12
+"""Largest error of these, as a share of the largest value."""
+
+_ROUNDING = 1e-15
+"""Size of coefficients that are rounding errors, as a share of the largest."""
+
+_HALVINGS = 10
+_MOST_CELLS = 256
+"""Largest number of halvings of a cell, and of cells of a function."""
+
+_SAME = 1e-9
+"""Share of the length that counts as zero."""
+
+
+@dataclass(frozen=True)
+class Along:
+    """A property along a rod, as polynomials on cells.
+
+    Parameters
+    ----------
+    edges : tuple of float
+        Where cells begin, from 0, the base, and the end of the last, the rod's length [length].
+    coefficients : tuple of tuple of float
+        For each cell, coefficients by powers of the arc length from its beginning.
+    """
+
+    edges: tuple[float, ...]
+    coefficients: tuple[tuple[float, ...], ...]
+
+    def __call__(self, s: ArrayLike) -> Floats:
+        """Return the values at arc lengths of any shape [length]."""
+        s = np.asarray(s, dtype=float)
+        edges, rows = np.array(self.edges), np.array(self.coefficients)
+        cell = np.clip(np.searchsorted(edges, s, side="right") - 1, 0, len(rows) - 1)
+        return np.asarray(
+            np.polynomial.polynomial.polyval(s - edges[cell], np.moveaxis(rows[cell], -1, 0), tensor=False)
+        )
+
+    def __repr__(self) -> str:
+        first, last = self([0.0, self.edges[-1]])
+        return f"Along(from {first:.6g} to {last:.6g}, {len(self.coefficients)} cells)"
+
+    @property
+    def mean(self) -> float:
+        """Mean value."""
+        edges = np.array(self.edges)
+        widths = np.diff(edges)
+        powers = np.arange(1, len(self.coefficients[0]) + 1)
+        integrals = np.array(self.coefficients) * widths[:, None] ** powers / powers
+        return float(integrals.sum() / edges[-1])
+
+    def scaled(self, length: float, value: float) -> Along:
+        """Return the property in other units: arc lengths and values are multiplied by these factors."""
+        powers = length ** -np.arange(len(self.coefficients[0]), dtype=float)
+        rows = value * powers * np.array(self.coefficients)
+        return Along(tuple((length * np.array(self.edges)).tolist()), tuple(map(tuple, rows.tolist())))
+
+    @property
+    def text(self) -> str:
+        """The polynomials as JSON, for an attribute; `along` reads it."""
+        return json.dumps({"edges": self.edges, "coefficients": self.coefficients})
+
+
+GivenAlong: TypeAlias = float | Along | Callable[[Floats], ArrayLike] | tuple[ArrayLike, ArrayLike]
+"""A property of a rod as users give it: a number, a function of s, or arrays (s, values)."""
+
+
+def along(name: str, given: Any, length: float, positive: bool = False) -> float | Along:
+    """Return a property of a rod as a number or as polynomials.
+
+    Tables are interpolated by monotone cubic polynomials (PCHIP): values stay between those of neighbours, so that a
+    rigidity stays positive, and steps do not ring. Functions are interpolated to 1e-12 of their largest value.
+
+    Parameters
+    ----------
+    name : str
+        Name of the property, for messages.
+    given : float, callable, (s, values), Along or str
+        As users give it, or the `text` of polynomials.
+    length : float
+        Length of the rod.
+    positive : bool
+        Whether values have to be positive.
+
+    Raises
+    ------
+    ParameterError
+        If a table is not ordered from base to tip, a function is not smooth or does not work on arrays, or a value is
+        not finite or not positive.
+
+    Examples
+    --------
+    >>> bend = along("rest_curvature", ([0.0, 0.1, 0.2], [0.0, 1.0, 3.0]), 0.2)
+    >>> bend([0.0, 0.1, 0.2]), round(bend.mean, 6)
+    (array([0., 1., 3.]), 1.166667)
+    """
+    number = as_number(given)
+    if number is not None:
+        value = check_number(name, given)
+        _refuse_unless_positive(name, positive, np.zeros(1), np.array([value]))
+        return value
+    if isinstance(given, str):
+        given = _read(name, given)
+    if isinstance(given, Along):
+        if abs(given.edges[-1] - length) > _SAME * length:
+            raise ParameterError(
+                f"{name} is given from s = 0 to {given.edges[-1]:.6g}, and the rod is {length:.6g} long: give it from "
+                "the base to the tip"
+            )
+        return given
+    if callable(given):
+        return _of_function(_Named(given, name, positive), length)
+    return _of_table(name, given, length, positive)
+
+
+def _read(name: str, text: str) -> Along:
+    """Return polynomials from their text."""
+    try:
+        found = json.loads(text)
+        edges = tuple(float(edge) for edge in found["edges"])
+        rows = tuple(tuple(float(c) for c in row) for row in found["coefficients"])
+    except (ValueError, TypeError, KeyError) as error:
+        raise ParameterError(f"{name} is {text[:40]!r}: give a number, or polynomials as JSON") from error
+    whole = np.array([*edges, *(c for row in rows for c in row)])
+    sizes = {len(row) for row in rows}
+    if len(edges) != len(rows) + 1 or len(sizes) != 1 or 0 in sizes or not np.isfinite(whole).all():
+        raise ParameterError(f"{name} has {len(edges)} edges and {len(rows)} cells: its text is incomplete")
+    if edges[0] != 0.0 or not np.all(np.diff(edges) > 0.0):
+        raise ParameterError(f"{name} has the edges {edges[:4]}: they increase from 0, the base")
+    return Along(edges, rows)
+
+
+def _refuse_unless_positive(name: str, positive: bool, s: Floats, values: Floats) -> None:
+    if positive and not np.all(values > 0.0):
+        at = int(np.argmax(~(values > 0.0)))
+        raise ParameterError(f"{name} is {values[at]:.6g} at s = {s[at]:.6g}: a rigidity is positive, EI(s)/EI(0)")
+
+
+def _of_table(name: str, given: Any, length: float, positive: bool) -> Along:
+    correction = "give a number, a function of s, or a pair of arrays (s, values)"
+    try:
+        s, values = given
+    except (TypeError, ValueError):
+        raise refused(name, given, correction) from None
+    s, values = as_numbers(s), as_numbers(values)
+    if s is None or values is None or s.ndim != 1 or s.shape != values.shape or s.size < 2:
+        raise refused(name, given, f"{correction} of the same length, with at least two points")
+    if not (np.isfinite(s).all() and np.isfinite(values).all()):
+        at = int(np.argmin(np.isfinite(s) & np.isfinite(values)))
+        raise ParameterError(f"{name} is {values[at]} at s[{at}] = {s[at]}: leave out points that are not finite")
+    if not np.all(np.diff(s) > 0.0):
+        at = int(np.argmin(np.diff(s) > 0.0))
+        raise ParameterError(
+            f"{name} has s = {s[at]:.6g} before s = {s[at + 1]:.6g}: order the points from base to tip, each once"
+        )
+    if abs(s[0]) > _SAME * length or abs(s[-1] - length) > _SAME * length:
+        raise ParameterError(
+            f"{name} is given from s = {s[0]:.6g} to {s[-1]:.6g}: give it from the base, 0, to the tip, {length:.6g}"
+        )
+    _refuse_unless_positive(name, positive, s, values)
+    s = np.concatenate([[0.0], s[1:-1], [length]])
+    spline = PchipInterpolator(s, values)
+    return Along(tuple(s.tolist()), tuple(map(tuple, spline.c[::-1].T.tolist())))
+
+
+class _Named(NamedTuple):
+    """A function with finite values, and its name for messages."""
+
+    function: Callable[[Floats], ArrayLike]
+    name: str
+    positive: bool
+
+    def __call__(self, s: Floats) -> Floats:
+        try:
+            with np.errstate(all="ignore"):  # values that are not finite are refused below
+                values = np.asarray(self.function(s), dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(
+                f"{self.name} does not work on arrays ({error}): use functions of NumPy, or wrap it with np.vectorize"
+            ) from error
+        if values.shape not in (s.shape, ()):
+            raise ParameterError(
+                f"{self.name} returns shape {values.shape} for s of shape {s.shape}: it must work on arrays, element "
+                "by element (np.vectorize helps)"
+            )
+        values = np.broadcast_to(values, s.shape)
+        if not np.isfinite(values).all():
+            at = int(np.argmin(np.isfinite(values)))
+            raise ParameterError(f"{self.name} is {values[at]} at s = {s[at]:.6g}: it must be finite from base to tip")
+        _refuse_unless_positive(self.name, self.positive, s, values)
+        return values
+
+
+def _of_function(function: _Named, length: float) -> Along:
+    """Polynomials on cells that are halved until they equal a function, at nodes and between them."""
+    probes = chebyshev.nodes(2 * _ORDER + 1)
+    largest = float(np.abs(function(np.linspace(0.0, length, 201))).max())
+    waiting, done = [(0.0, 1.0)], []
+    while waiting:
+        begin, end = waiting.pop()
+        series = chebyshev.coefficients(function(length * (begin + (end - begin) * chebyshev.nodes(_ORDER))))
+        values = function(length * (begin + (end - begin) * probes))
+        miss = np.abs(chebyshev.evaluate(series, probes) - values).max()
+        # A rigidity counts by its inverse: each cell is as accurate as any.
+        if miss <= _MISS * (float(values.min()) if function.positive else largest):
+            done.append((length * begin, _powers(series, length * (end - begin))))
+            continue
+        if end - begin < 0.5**_HALVINGS or len(waiting) + len(done) >= _MOST_CELLS:
+            raise ParameterError(
+                f"{function.name} is not smooth enough at s ≈ {0.5 * length * (begin + end):.3g}: give a smooth "
+                "function, or arrays (s, values) with close points there"
+            )
+        middle = 0.5 * (begin + end)
+        waiting += [(middle, end), (begin, middle)]
+    edges, rows = zip(*done, strict=True)
+    coefficients = np.array(rows)
+    terms = 1 + int(np.flatnonzero(coefficients.any(axis=0)).max(initial=0))
+    return Along((*edges, length), tuple(map(tuple, coefficients[:, :terms].tolist())))
+
+
+def _powers(series: Floats, width: float) -> Floats:
+    """Coefficients by powers of the distance from the beginning of a cell."""
+    kept = Chebyshev(series, domain=[0.0, 1.0]).trim(_ROUNDING * np.abs(series).max())
+    powers = np.asarray(kept.convert(kind=Polynomial).coef, dtype=float)
+    return np.pad(powers, (0, _ORDER - powers.size)) / width ** np.arange(_ORDER)
