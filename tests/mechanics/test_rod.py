@@ -15,9 +15,15 @@ ARC = tb.Rod(0.2, 2.4e-3, 7e-4, rest_curvature=2.5)
 CIRCLE = tb.contours.Circle(0.06, 0.1)
 
 
-@pytest.mark.parametrize("curvature", [math.nan, math.inf, 16.0, -16.0, "bent", None, True])
-def test_a_rest_curvature_that_no_rod_has_is_refused(curvature):
+@pytest.mark.parametrize("curvature", [16.0, -16.0])
+def test_more_than_a_half_circle_is_refused(curvature):
     with refused(ParameterError, "the rod's rest_curvature is", "half circle"):
+        tb.Rod(0.2, 2.4e-3, rest_curvature=curvature)
+
+
+@pytest.mark.parametrize("curvature", [math.nan, math.inf, "bent", None, True])
+def test_what_is_no_rest_curvature_is_refused(curvature):
+    with refused(ParameterError, "the rod's rest_curvature is", "give"):
         tb.Rod(0.2, 2.4e-3, rest_curvature=curvature)
 
 

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import as_number, as_numbers, check_number, refused
@@ -56,9 +56,7 @@ class Along:
         s = np.asarray(s, dtype=float)
         edges, rows = np.array(self.edges), np.array(self.coefficients)
         cell = np.clip(np.searchsorted(edges, s, side="right") - 1, 0, len(rows) - 1)
-        return np.asarray(
-            np.polynomial.polynomial.polyval(s - edges[cell], np.moveaxis(rows[cell], -1, 0), tensor=False)
-        )
+        return np.asarray(polyval(s - edges[cell], np.moveaxis(rows[cell], -1, 0), tensor=False))
 
     def __repr__(self) -> str:
         first, last = self([0.0, self.edges[-1]])
@@ -183,6 +181,8 @@ def _of_table(name: str, given: Any, length: float, positive: bool) -> Along:
         )
     _refuse_unless_positive(name, positive, s, values)
     s = np.concatenate([[0.0], s[1:-1], [length]])
+    from scipy.interpolate import PchipInterpolator  # takes a while to load
+
     spline = PchipInterpolator(s, values)
     return Along(tuple(s.tolist()), tuple(map(tuple, spline.c[::-1].T.tolist())))
 

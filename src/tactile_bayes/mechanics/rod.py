@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_positive
@@ -125,6 +124,8 @@ class Rod:
             correction = f"give a number [1/m] between ±{most:.4g}, where the rod is a half circle; 0 if it is straight"
             check_number("the rod's rest_curvature", self.rest_curvature, correction, least=-most, most=most)
             return
+        from scipy.integrate import cumulative_simpson  # takes a while to load
+
         s = np.linspace(0.0, self.length, _POINTS)
         slope = cumulative_simpson(self.rest_curvature(s), x=s, initial=0.0)
         x, y = (cumulative_simpson(way, x=s, initial=0.0) for way in (np.cos(slope), np.sin(slope)))
@@ -132,8 +133,8 @@ class Rod:
         if np.any(outward[1:] <= 0.0):
             at = s[1:][outward[1:] <= 0.0][0]
             raise ParameterError(
-                f"the rod's rest_curvature lets it curl back toward its base from s = {at:.4g} on, of {self.length:.4g}: "
-                "give a curvature [1/m] with which every point is farther from the base than those before"
+                f"the rod's rest_curvature lets it curl back toward its base from s = {at:.4g} on, and it is "
+                f"{self.length:.4g} long: give a curvature with which it leads away from the base all along"
             )
 
     def __repr__(self) -> str:
@@ -210,8 +211,10 @@ class Rod:
     @cached_property
     def profile(self) -> Profile | None:
         """Rest curvature and rigidity along the rod, dimensionless; None for arcs."""
-        if self.is_arc:
-            return None
+        return None if self.is_arc else self.as_profile()
+
+    def as_profile(self) -> Profile:
+        """Return rest curvature and rigidity along the rod, dimensionless, of an arc too."""
         rigidity = 1.0 if self.rigidity_profile is None else self.rigidity_profile
         given = (
             (self.rest_curvature, 1.0 / self.curvature_unit),

@@ -41,7 +41,7 @@ def sweep_paths(
             f"the contour cuts the base: at x = {base[0]:g} it is at y = {float(np.min(height)):g}, not above the "
             f"pivot at y = {base[1]:g}; raise the contour or lower the pivot"
         )
-    paths = trace(sweep_frame, friction_angle=friction_angle)
+    paths = trace(sweep_frame, friction_angle=friction_angle, profile=rod.profile)
     sweep = f"in a {direction} sweep from the pivot at ({base[0]:g}, {base[1]:g})"
     match Reachability(int(paths.reach[0])):
         case Reachability.TOO_FAR:
@@ -120,7 +120,8 @@ def to_sweep_frame(contour: Contour, base: tuple[float, float], direction: Direc
         rod.length,
         0.5 * rod.diameter,
         np.array([direction == "backward"]),
-        rod.rest_curvature / rod.curvature_unit,
+        rod.arc_curvature,
+        rod.taper,
     )
 
 

@@ -110,10 +110,17 @@ def scan_many(
         rod.length,
         0.5 * rod.diameter,
         backward,
-        rod.rest_curvature / rod.curvature_unit,
+        rod.arc_curvature,
+        rod.taper,
     )
     in_sweep_frame = np.pi - angles if direction == "backward" else angles
-    paths = trace(sweep_frame, friction_angle=friction_angle_of(friction), drive_angles=in_sweep_frame, polished=False)
+    paths = trace(
+        sweep_frame,
+        friction_angle=friction_angle_of(friction),
+        profile=rod.profile,
+        drive_angles=in_sweep_frame,
+        polished=False,
+    )
     units = ManyUnits(rod.length_unit, rod.moment_unit, rod.force_unit)
     system = "dimensionless" if rod.is_dimensionless else "SI"
 
