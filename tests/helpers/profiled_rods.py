@@ -27,7 +27,7 @@ class RodAlong(NamedTuple):
     breaks: tuple[float, ...]
     """Where these are not smooth: an integration stops there."""
     softness: float
-    """Force at its tip that bends it as a unit force bends a uniform rod, inverse."""
+    """Small deflection of the tip under a force across it, over that of a uniform rod."""
 
 
 def rod_along(curvature, rigidity, taper: float) -> RodAlong:

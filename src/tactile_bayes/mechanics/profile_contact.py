@@ -15,12 +15,9 @@ from tactile_bayes.mechanics.pose import Pose
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.profile_pose import pose_along_and_slopes
 from tactile_bayes.mechanics.rises import rise
-from tactile_bayes.mechanics.taylor import FORWARD, State, advance, begin, moved
+from tactile_bayes.mechanics.taylor import FARTHEST, FORWARD, State, advance, begin, moved
 
 __all__ = ["ProfileContact", "contact_along", "contact_along_and_slopes"]
-
-_FARTHEST = 4.0
-"""Arc length up to which a contact is sought [L]."""
 
 
 class ProfileContact(NamedTuple):
@@ -47,9 +44,9 @@ def contact_along(
     # A force without moment passes through the pivot: the rod must bend away from it before it returns.
     if 0.0 < force < math.inf and (moment > 0.0 or (moment == 0.0 and math.cos(start.psi) < 0.0)):
         march = begin(profile, 0.0, FORWARD, start)
-        while march.at < _FARTHEST:
+        while march.at < FARTHEST:
             before = march
-            step, march = advance(profile, before, FORWARD, _FARTHEST, force, work)
+            step, march = advance(profile, before, FORWARD, FARTHEST, force, work)
             x = rise(before.state, force, step, True, 0.0, work)
             if x >= 0.0:
                 end = moved(before.state, force, step, x, work)

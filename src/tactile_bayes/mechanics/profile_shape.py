@@ -13,6 +13,7 @@ from tactile_bayes.mechanics.compiler import compiled
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.rises import peak, rise
 from tactile_bayes.mechanics.taylor import (
+    FARTHEST,
     FORWARD,
     March,
     State,
@@ -34,9 +35,6 @@ __all__ = [
     "rest_along",
     "shape_along",
 ]
-
-_FARTHEST = 4.0
-"""Arc length up to which a rod is continued beyond its tip [L]."""
 
 _SAMPLES = 16
 """Points of a step at which the bending is compared."""
@@ -131,7 +129,7 @@ def chord_along(profile: Profile, distance: float, work: Floats) -> Chord:
     """First point of the rod at rest at a distance from the pivot; the farthest if there is none.
 
     The rod is continued beyond its tip as in `contact_along`."""
-    return _outward(profile, distance, _FARTHEST, work)
+    return _outward(profile, distance, FARTHEST, work)
 
 
 @compiled

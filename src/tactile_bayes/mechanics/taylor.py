@@ -28,6 +28,7 @@ from tactile_bayes.mechanics.profile import Profile
 
 __all__ = [
     "BACKWARD",
+    "FARTHEST",
     "FORWARD",
     "March",
     "Slope",
@@ -53,6 +54,9 @@ _REMAINDER = 1e-15
 
 FORWARD, BACKWARD = 1.0, -1.0
 """Directions: from the pivot, and from the contact."""
+
+FARTHEST = 4.0
+"""Arc length up to which a rod is continued beyond its tip, as it is at its tip [L]."""
 
 _INVERSE = 1.0 / np.arange(1.0, _TERMS + 1.0)
 
