@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 
 import tactile_bayes as tb
 from helpers.refusals import refused
 from tactile_bayes.errors import ContourError, ParameterError
-from tactile_bayes.record import read_record, record_hash, rod_of, write_record
+from tactile_bayes.record import read_record, record_hash, rod_of, to_dimensionless, to_si, write_record
+from tactile_bayes.record.attributes import same_rod
 from tactile_bayes.record.units import with_rod
 
 ARC = tb.Rod(0.2, 2.4e-3, 7e-4, rest_curvature=2.5)
@@ -76,3 +78,77 @@ def test_forward_and_backward_sweeps_of_an_arc_differ():
 def test_where_a_rod_would_touch_twice_a_scan_says_so():
     with refused(ContourError, "touch the contour twice", "in contact at ("):
         tb.scan(tb.contours.Parabola(0.5, 0.5), rod=tb.Rod(rest_curvature=0.9), direction="forward")
+
+
+WHISKERS = {
+    "tapered": tb.Rod(0.2, 2.4e-3, taper=0.5),
+    "function": tb.Rod(0.2, 2.4e-3, rest_curvature=lambda s: -30.0 * s, taper=0.9),
+    "table": tb.Rod(0.2, 2.4e-3, rest_curvature=([0.0, 0.05, 0.2], [0.0, -0.5, -2.0])),
+    "rigidity": tb.Rod(0.2, 2.4e-3, rest_curvature=-1.0, rigidity_profile=lambda s: np.exp(-10.0 * s)),
+}
+
+
+@pytest.mark.parametrize("ending", ["csv", "nc"])
+@pytest.mark.parametrize("name", WHISKERS)
+def test_a_file_states_any_rod(tmp_path, name, ending):
+    rod = WHISKERS[name]
+    record = tb.scan(CIRCLE, rod=rod, drive_step=0.1, direction="forward").record
+    write_record(record, tmp_path / f"rod.{ending}")
+    read = read_record(tmp_path / f"rod.{ending}")
+    assert rod_of(read) == rod
+    assert record_hash(read) == record_hash(record)
+    assert same_rod(rod_of(to_si(to_dimensionless(read), rod)), rod)
+
+
+@pytest.mark.parametrize("name", WHISKERS)
+def test_rods_in_their_own_units_are_swept_alike(name):
+    rod = WHISKERS[name]
+    si = tb.scan(CIRCLE, rod=rod, drive_step=0.1, direction="forward").record
+    own = tb.scan(tb.contours.Circle(0.3, 0.5), rod=rod.in_lengths(), drive_step=0.1, direction="forward").record
+    np.testing.assert_allclose(si["force_x"], rod.force_unit * own["force_x"], atol=1e-8 * rod.force_unit)
+
+
+def test_what_a_rod_says_of_itself():
+    rod = WHISKERS["function"]
+    assert (rod.is_uniform, rod.is_arc, ARC.is_arc, WHISKERS["table"].is_uniform) == (False, False, True, True)
+    assert rod.mean_rest_curvature == pytest.approx(-3.0)
+    assert ARC.mean_rest_curvature == 2.5
+    assert ARC.profile is None
+    assert "taper=0.9" in repr(rod)
+    assert tb.Rod(rigidity_profile=1.0) == tb.Rod()
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"taper": 0.99}, "the rod's taper is 0.99"),
+        ({"taper": -0.1}, "the rod's taper is -0.1"),
+        ({"taper": 0.5, "diameter": 0.01}, "not uniform"),
+        ({"rest_curvature": lambda s: 8.0 * s}, "curl back"),
+        ({"rest_curvature": ([0.0, 0.5], [0.0, 1.0])}, "to the tip, 1"),
+        ({"rigidity_profile": lambda s: 1.0 - 2.0 * s}, "a rigidity is positive"),
+        ({"rest_curvature_deviation": -1.0}, "rest_curvature_deviation"),
+    ],
+)
+def test_rods_that_cannot_be_are_refused(given, named):
+    with refused(ParameterError, named):
+        tb.Rod(**given)
+
+
+@pytest.mark.parametrize("turned", [0.0, 2.0])
+def test_a_traced_rod_is_the_one_that_was_traced(turned):
+    """Wherever and however it lay; its mean curvature within four of the standard deviations that it states."""
+    true = tb.Rod(0.05, 1e-8, rest_curvature=lambda s: 10.0 + 400.0 * s, taper=0.5)
+    s = np.linspace(0.0, 0.05, 40)
+    slope = turned + 10.0 * s + 200.0 * s**2
+    x, y = (cumulative_simpson(way, x=s, initial=0.0) for way in (np.cos(slope), np.sin(slope)))
+    rng = np.random.default_rng(5)
+    found = tb.Rod.from_shape(x + rng.normal(0.2, 2e-5, s.size), y + rng.normal(0.1, 2e-5, s.size), 1e-8, taper=0.5)
+    assert found.length == pytest.approx(0.05, abs=1e-4)
+    off = found.mean_rest_curvature - true.mean_rest_curvature
+    assert 0.0 < found.rest_curvature_deviation < 1.0
+    assert abs(off) < 4.0 * found.rest_curvature_deviation
+    assert found.taper == 0.5
+    own = tb.Rod.from_shape(x, y)
+    assert own.is_dimensionless
+    assert own.mean_rest_curvature == pytest.approx(1.0, abs=1e-3)

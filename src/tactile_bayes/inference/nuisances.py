@@ -128,7 +128,7 @@ class Nuisances:
         """Return the rig of every point, from values by name in the record's units, each of shape (n,)."""
         known: dict[str, Any] = {"friction": self.friction} if "friction" not in self.names else {}
         if "rest_curvature" in self.names:
-            off = values["rest_curvature"] - self.rod.rest_curvature
+            off = values["rest_curvature"] - self.rod.mean_rest_curvature
             known["rest_curvature"] = off / self.units["rest_curvature"]
         return Rig(
             base_shifts=self._base_shifts(values),
@@ -253,7 +253,8 @@ def nuisances_of(
     nuisances = Nuisances(tuple(names), {}, rod, friction, elapsed)
     defaults = {name: _default_prior(name, rod.length if "base" in name else nuisances.units[name]) for name in names}
     if "rest_curvature" in defaults:
-        defaults["rest_curvature"] = stats.norm(rod.rest_curvature, _CURVATURE * rod.curvature_unit)
+        deviation = rod.rest_curvature_deviation or _CURVATURE * rod.curvature_unit
+        defaults["rest_curvature"] = stats.norm(rod.mean_rest_curvature, deviation)
     return replace(nuisances, priors=defaults)
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_positive
@@ -58,6 +59,9 @@ class Rod:
     rigidity_profile : callable or (s, EI/EI0), optional
         Flexural rigidity along the rod over that at the base, as a function or arrays like the rest curvature; by
         default constant. A taper comes on top of it.
+    rest_curvature_deviation : float
+        Standard deviation of the mean rest curvature [1/m], if it was measured (`from_shape`): that of the nuisance
+        parameter `rest_curvature` in its default prior.
 
     Raises
     ------
@@ -85,6 +89,7 @@ class Rod:
     rest_curvature: Any = 0.0
     taper: float = 0.0
     rigidity_profile: Any = None
+    rest_curvature_deviation: float = 0.0
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -104,6 +109,8 @@ class Rod:
             uniform = isinstance(of_rod, float) and of_rod == 1.0
             object.__setattr__(self, "rigidity_profile", None if uniform else of_rod)
         object.__setattr__(self, "rest_curvature", along("the rod's rest_curvature", self.rest_curvature, self.length))
+        correction = "give zero, for an unknown one, or a positive number [1/m]"
+        check_number("the rod's rest_curvature_deviation", self.rest_curvature_deviation, correction, least=0.0)
         self._refuse_curl()
         if self.diameter and not self.is_uniform:
             raise ParameterError(
@@ -141,6 +148,8 @@ class Rod:
         more = "" if self.elastic_strain is None else f", elastic_strain={self.elastic_strain!r}"
         more += "" if self.rest_curvature == 0.0 else f", rest_curvature={self.rest_curvature!r}"
         more += "" if self.taper == 0.0 else f", taper={self.taper!r}"
+        deviation = self.rest_curvature_deviation
+        more += "" if deviation == 0.0 else f", rest_curvature_deviation={deviation!r}"
         more += "" if self.rigidity_profile is None else f", rigidity_profile={self.rigidity_profile!r}"
         return (
             f"Rod(length={self.length!r}, flexural_rigidity={self.flexural_rigidity!r}, "
@@ -187,6 +196,80 @@ class Rod:
         fourth = float(diameter) ** 4 if diameter < _THICKEST else math.inf
         return cls(length, youngs_modulus * math.pi * fourth / 64, diameter, elastic_strain, rest_curvature)
 
+    @classmethod
+    def from_shape(
+        cls,
+        x: ArrayLike,
+        y: ArrayLike,
+        flexural_rigidity: float | None = None,
+        *,
+        scatter: float | None = None,
+        taper: float = 0.0,
+        rigidity_profile: Any = None,
+    ) -> Rod:
+        """Rod whose rest curvature follows from points traced along it while nothing touches it.
+
+        The rest curvature is the polynomial in the arc length that explains the points, with one term more than the
+        Bayesian information criterion chooses (Schwarz 1978, doi 10.1214/aos/1176344136).
+
+        Parameters
+        ----------
+        x, y : array_like, shape (n,)
+            Points in order, from the base to the tip, at least 8 [m]. Where they lie, and how they are turned, does not
+            matter, but the image must not be mirrored: y is to the left of x.
+        flexural_rigidity : float, optional
+            EI at the base [N m²]. By default the rod is dimensionless, and the points are in any unit of length.
+        scatter : float, optional
+            Standard deviation of each coordinate, in the unit of the points; estimated from them by default.
+        taper, rigidity_profile
+            As in `Rod`.
+
+        Returns
+        -------
+        Rod
+            With `rest_curvature_deviation`.
+
+        Raises
+        ------
+        ParameterError
+            As in `Rod`, and if the points are not those of a rod: too few, not in order, turned back, or scattered by
+            more than a twentieth of the length.
+
+        Examples
+        --------
+        >>> angle = np.linspace(0.0, 0.6, 30)
+        >>> whisker = Rod.from_shape(0.05 * np.sin(angle), 0.05 * (1.0 - np.cos(angle)), flexural_rigidity=1e-8)
+        >>> round(whisker.length, 6), round(whisker.mean_rest_curvature, 3)
+        (0.03, 20.0)
+        """
+        from tactile_bayes.mechanics.traced import traced_rod
+
+        traced = traced_rod(x, y, scatter=scatter)
+        length, rigidity = (1.0, 1.0) if flexural_rigidity is None else (traced.length, flexural_rigidity)
+        return cls(
+            length,
+            rigidity,
+            rest_curvature=lambda s: traced.rest_curvature(s / length) / length,
+            taper=taper,
+            rigidity_profile=rigidity_profile,
+            rest_curvature_deviation=traced.deviation_of_mean / length,
+        )
+
+    def in_lengths(self) -> Rod:
+        """Return the rod in its own units, with a length and a flexural rigidity of 1."""
+        curvature, rigidity = (
+            of.scaled(1.0 / self.length, 1.0 / unit) if isinstance(of, Along) else None if of is None else of / unit
+            for of, unit in ((self.rest_curvature, self.curvature_unit), (self.rigidity_profile, 1.0))
+        )
+        return Rod(
+            diameter=self.diameter / self.length_unit,
+            elastic_strain=self.elastic_strain,
+            rest_curvature=curvature,
+            taper=self.taper,
+            rigidity_profile=rigidity,
+            rest_curvature_deviation=self.rest_curvature_deviation / self.curvature_unit,
+        )
+
     @property
     def is_uniform(self) -> bool:
         """True if the flexural rigidity is constant."""
@@ -215,15 +298,8 @@ class Rod:
 
     def as_profile(self) -> Profile:
         """Return rest curvature and rigidity along the rod, dimensionless, of an arc too."""
-        rigidity = 1.0 if self.rigidity_profile is None else self.rigidity_profile
-        given = (
-            (self.rest_curvature, 1.0 / self.curvature_unit),
-            (rigidity, 1.0),
-        )
-        curvature, rigidity = (
-            of.scaled(1.0 / self.length, unit) if isinstance(of, Along) else of * unit for of, unit in given
-        )
-        return profile_of(curvature, rigidity, self.taper)
+        own = self.in_lengths()
+        return profile_of(own.rest_curvature, 1.0 if own.rigidity_profile is None else own.rigidity_profile, own.taper)
 
     @property
     def is_dimensionless(self) -> bool:

@@ -80,6 +80,12 @@ class TracedRod:
         at = chebyshev.polynomials(self.coefficients.size, np.asarray(s, dtype=float))
         return np.asarray(np.sqrt(np.einsum("...i,ij,...j", at, self.covariance, at)))
 
+    @property
+    def deviation_of_mean(self) -> float:
+        """Standard deviation of the mean rest curvature [1/L]."""
+        mean = chebyshev.integral(np.eye(self.coefficients.size)).sum(axis=0)
+        return float(np.sqrt(mean @ self.covariance @ mean))
+
 
 def traced_rod(x: ArrayLike, y: ArrayLike, *, scatter: float | None = None) -> TracedRod:
     """Return the rest curvature of a rod from points traced along it, base first.

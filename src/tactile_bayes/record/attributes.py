@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tactile_bayes.errors import ParameterError
+from tactile_bayes.mechanics.along import Along
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.record.cell import number_in
 from tactile_bayes.record.quantity import unit_of
@@ -23,7 +24,11 @@ _QUANTITY = re.compile(
     r"(?:(?P<brackets>\[[^\[\]]*\])|(?P<unit>[^\W\d].*|°))?"
 )
 
-_CURVATURE = "rod_rest_curvature"
+_SHAPE = ("rest_curvature", "taper", "rigidity_profile", "rest_curvature_deviation")
+"""What makes a rod another than a straight, uniform one."""
+
+_POINTS, _SAME = 101, 1e-9
+"""Points at which properties along rods are compared, and the difference over the largest value that counts as zero."""
 
 _SIGNED = ("cell_bias_h", "cell_bias_f", "_gain_", "_correlation_", "_lever_", "_offset", "_backlash")
 
@@ -32,6 +37,7 @@ __all__ = [
     "completed_attributes",
     "no_entry",
     "rod_attributes",
+    "rod_shape_attributes",
     "same_rod",
     "stated_frame",
     "stated_rod",
@@ -39,10 +45,16 @@ __all__ = [
 ]
 
 
-def rod_attributes(rod: Rod) -> dict[str, float]:
-    """Convert a rod to attributes of a record, a rest curvature only if there is one; `stated_rod` is the inverse."""
+def rod_attributes(rod: Rod) -> dict[str, Any]:
+    """Convert a rod to attributes of a record, with `rod_shape_attributes`; `stated_rod` is the inverse."""
     attrs = {"rod_length": rod.length, "rod_flexural_rigidity": rod.flexural_rigidity, "rod_diameter": rod.diameter}
-    return attrs | ({_CURVATURE: rod.rest_curvature} if rod.rest_curvature else {})
+    return attrs | rod_shape_attributes(rod)
+
+
+def rod_shape_attributes(rod: Rod) -> dict[str, Any]:
+    """Return in what a rod differs from a straight, uniform one: numbers, or polynomials as text."""
+    values = {f"rod_{name}": getattr(rod, name) for name in _SHAPE}
+    return {name: v.text if isinstance(v, Along) else v for name, v in values.items() if v not in (0.0, None)}
 
 
 def without_rod(attrs: Mapping[str, Any]) -> dict[str, Any]:
@@ -68,9 +80,13 @@ def stated_rod(attrs: Mapping[str, Any], source: Source) -> Rod:
         )
     length = _quantity("rod_length", attrs["rod_length"], source)
     rigidity = _quantity("rod_flexural_rigidity", attrs["rod_flexural_rigidity"], source)
-    diameter, curvature = (_quantity(name, attrs.get(name, 0.0), source) for name in ("rod_diameter", _CURVATURE))
+    diameter = _quantity("rod_diameter", attrs.get("rod_diameter", 0.0), source)
+    shape = {name: attrs[f"rod_{name}"] for name in _SHAPE if f"rod_{name}" in attrs}
+    for name, value in shape.items():
+        if not (isinstance(value, str) and value.lstrip().startswith("{")):
+            shape[name] = _quantity(f"rod_{name}", value, source)
     try:
-        rod = Rod(length, rigidity, diameter, rest_curvature=curvature)
+        rod = Rod(length, rigidity, diameter, **shape)
     except ParameterError as error:
         raise source.error(str(error)) from error
     if units == "dimensionless" and not rod.is_dimensionless:
@@ -94,10 +110,18 @@ def stated_frame(attrs: Mapping[str, Any], source: Source) -> Frame:
 
 def same_rod(one: Rod, other: Rod) -> bool:
     """Return whether two rods are equal up to the rounding of a few operations."""
-    of_one, of_other = rod_attributes(one), rod_attributes(other)
-    return of_one.keys() == of_other.keys() and all(
-        math.isclose(value, of_other[name], rel_tol=1e-12) for name, value in of_one.items()
-    )
+    names = ("length", "flexural_rigidity", "diameter", *_SHAPE)
+    return all(_alike(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def _alike(one: float | Along | None, other: float | Along | None) -> bool:
+    if isinstance(one, Along) and isinstance(other, Along):
+        shares = np.linspace(0.0, 1.0, _POINTS)
+        values = one(shares * one.edges[-1]), other(shares * other.edges[-1])
+        return bool(np.allclose(*values, rtol=0.0, atol=_SAME * np.abs(values[0]).max()))
+    if isinstance(one, float | int) and isinstance(other, float | int):
+        return math.isclose(one, other, rel_tol=1e-12)
+    return one is other
 
 
 def completed_attributes(

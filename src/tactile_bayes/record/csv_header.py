@@ -21,7 +21,7 @@ __all__ = ["FORMAT", "KINDS", "Header", "cells_in", "column_line", "header_line"
 FORMAT = 1
 KINDS = {"i": "integer", "f": "number", "U": "text", "O": "text"}
 _DELIMITERS = ",;\t"
-_SEARCHED, _LONGEST = 50, 10_000
+_SEARCHED, _LONGEST = 50, 100_000
 """Number of lines, and of bytes of each, that are inspected ahead of reading."""
 
 _NAME = r"[\w.\-]+"
@@ -72,7 +72,7 @@ class Header:
 
 def header_line(name: str, value: str | float, units: str) -> str:
     """Format an attribute of a record in the given units as a line of a header."""
-    unit = _attribute_unit(name, units)
+    unit = "1" if isinstance(value, str) else _attribute_unit(name, units)
     return f"# {_quoted(name, _NAME)}: {_header_text(value)}{'' if unit == '1' else f' [{unit}]'}\n"
 
 
@@ -162,10 +162,15 @@ def _lines(file: BinaryIO, source: Source) -> Iterator[str]:
         yield text
 
 
+def _is_number(stated: tuple[int, str] | None) -> bool:
+    """Return whether a header line states a number, and not polynomials along the rod."""
+    return stated is not None and not stated[1].startswith("{")
+
+
 def _stated_attributes(stated: Mapping[str, tuple[int, str]], source: Source) -> dict[str, str | int | float]:
     """Parse the values of header lines; known quantities are converted, and a unit of one of them means SI."""
     attrs = {key: _header_value(text) for key, (_, text) in stated.items()}
-    matches = {key: _QUANTITY.fullmatch(stated[key][1]) for key in ATTRIBUTE_UNITS if key in stated}
+    matches = {key: _QUANTITY.fullmatch(stated[key][1]) for key in ATTRIBUTE_UNITS if _is_number(stated.get(key))}
     if "units" not in attrs and any(
         match is not None and match["unit"] is not None and ATTRIBUTE_UNITS[key] not in ("1", "rad")
         for key, match in matches.items()

@@ -7,6 +7,7 @@ import hashlib
 import numpy as np
 import xarray as xr
 
+from tactile_bayes.record.attributes import rod_shape_attributes
 from tactile_bayes.record.frame import frame_of
 from tactile_bayes.record.schema import COLUMNS, MEASURED
 from tactile_bayes.record.units import rod_of
@@ -53,8 +54,8 @@ def record_hash(record: xr.Dataset) -> str:
     rod = rod_of(record)
     add(str(record.attrs["units"]).encode())
     add(np.array([rod.length, rod.flexural_rigidity, rod.diameter], dtype="<f8").tobytes())
-    if rod.rest_curvature:  # straight rods do not state it
-        add(np.array([rod.rest_curvature], dtype="<f8").tobytes())
+    for name, value in rod_shape_attributes(rod).items():  # straight, uniform rods have none
+        add(f"{name} {value!r}".encode())
     if frame_of(record) != "fixed":  # older records do not state it
         add(frame_of(record).encode())
     for name in MEASURED:

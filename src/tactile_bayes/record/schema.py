@@ -164,6 +164,9 @@ ATTRIBUTE_UNITS: Mapping[str, str] = MappingProxyType(
         "rod_flexural_rigidity": "N m²",
         "rod_diameter": "m",
         "rod_rest_curvature": "1/m",
+        "rod_rest_curvature_deviation": "1/m",
+        "rod_taper": "1",
+        "rod_rigidity_profile": "1",
         **{f"load_cell_{name}": unit for name, unit in LOAD_CELL_UNITS.items()},
     }
 )

@@ -141,19 +141,13 @@ def to_si(record: xr.Dataset, rod: Rod) -> xr.Dataset:
                 f"the record is SI already, with {stated}; for what {rod} would have given, make it dimensionless first"
             )
         return record
-    in_lengths = _in_lengths(rod)
+    in_lengths = rod.in_lengths()
     if not same_rod(stated, in_lengths):
         raise RecordError(
             f"the record was made with {stated} (in rod lengths), but {rod} is {in_lengths} in these: give a rod of "
-            f"diameter {stated.diameter * rod.length_unit!r} m and rest curvature "
-            f"{stated.rest_curvature * rod.curvature_unit!r} 1/m"
+            f"diameter {stated.diameter * rod.length_unit!r} m, and of the same shape"
         )
     return _converted(record, rod, "SI")
-
-
-def _in_lengths(rod: Rod) -> Rod:
-    """Return the rod in its own units."""
-    return Rod(diameter=rod.diameter / rod.length_unit, rest_curvature=rod.rest_curvature / rod.curvature_unit)
 
 
 def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
@@ -172,7 +166,7 @@ def _converted(record: xr.Dataset, rod: Rod, units: str) -> xr.Dataset:
         name = f"load_cell_{entry}"
         if name in converted.attrs and unit in scales:
             converted.attrs[name] = convert(converted.attrs[name], scales[unit])
-    converted.attrs |= {"units": units, **rod_attributes(rod if units == "SI" else _in_lengths(rod))}
+    converted.attrs |= {"units": units, **rod_attributes(rod if units == "SI" else rod.in_lengths())}
     return validate(converted)
 
 
