@@ -94,13 +94,13 @@ def _contents(found: Inspection, origins: Mapping[str, str]) -> list[str]:
     if record.attrs["units"] == "SI":
         of_rod = [f"L = {quantity(rod.length, 'm')}", f"EI = {rod.flexural_rigidity:.4g} N m²"]
         of_rod += [f"diameter {quantity(rod.diameter, 'm')}"] if rod.diameter else []
-        of_rod += [f"rest curvature {rod.rest_curvature:.4g} 1/m"] if rod.rest_curvature else []
+        of_rod += rod.shape_in_words("1/m")
         of_rod += [f"EI/L = {quantity(rod.moment_unit, 'N m')}", f"EI/L² = {quantity(rod.force_unit, 'N')}"]
         units = f"SI, rod: {', '.join(of_rod)}"
     else:
         assumed = ", which the file does not state" if record.attrs.get("units_source") == "assumed" else ""
         units = f"dimensionless, in units of the rod{assumed}"
-        units += f", of rest curvature {rod.rest_curvature:.4g}/L" if rod.rest_curvature else ""
+        units = ", ".join([units, *rod.shape_in_words("1/L")])
     axes = "fixed, along x and y" if frame_of(record) == "fixed" else "turning with the drive, along the rod and across"
     taken = [f"{name} = {origins[name]}" if name in origins else name for name in MEASURED]
     others = [str(name) for name in record.data_vars if name not in MEASURED]

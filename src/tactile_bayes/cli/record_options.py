@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from tactile_bayes.cli.numbers import assigned
-from tactile_bayes.cli.rig_options import RestCurvature, rod_asked
+from tactile_bayes.cli.rig_options import RodOptions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +22,7 @@ Record = Annotated[Path, typer.Argument(help="Record, .csv or .nc.")]
 
 
 @dataclass(frozen=True)
-class RecordOptions:
+class RecordOptions(RodOptions):
     """Options for reading a file, and for parts of the rig that it does not state."""
 
     column: Annotated[
@@ -38,10 +38,6 @@ class RecordOptions:
             "--split-sweeps", help="Find sweeps and directions by the turns of the drive, if not in the file."
         ),
     ] = False
-    length: Annotated[float | None, typer.Option(help="Rod length [m], for SI files that do not state it.")] = None
-    flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], likewise.")] = None
-    diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0
-    rest_curvature: RestCurvature = 0.0
     force_noise: Annotated[
         float | None,
         typer.Option(
@@ -71,16 +67,21 @@ class RecordOptions:
         RecordError
             If the file holds no record.
         """
-        from tactile_bayes.record import read_record
+        from tactile_bayes.record import read_record, rod_of
+        from tactile_bayes.record.units import with_rod
 
+        # A shape without a length belongs to the rod that the file states.
+        completes = bool(self.shape) and self.length is None and self.rod_shape is None
         record = read_record(
             path,
             columns=self.origins,
             split_sweeps=self.split_sweeps,
-            rod=rod_asked(self.length, self.flexural_rigidity, self.diameter, self.rest_curvature),
+            rod=None if completes else self.rod,
             missing=self.missing or (),
             load_cell_frame=self.load_cell_frame,
         )
+        if completes:
+            record = with_rod(record, replace(rod_of(record), **self.shape))
         cell = self._load_cell(record)
         if record.attrs.get("units_source") == "assumed":
             typer.echo(

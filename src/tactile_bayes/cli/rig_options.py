@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tactile_bayes.cli.numbers import numbers_asked
 
 if TYPE_CHECKING:
+    from tactile_bayes.arrays import Floats
     from tactile_bayes.load_cell import LoadCell
     from tactile_bayes.mechanics.rod import Rod
 
-__all__ = ["Friction", "NoiseOptions", "RestCurvature", "RigOptions", "RodOptions", "UnknownOptions", "rod_asked"]
-
-RestCurvature = Annotated[
-    float,
-    typer.Option(
-        help="Curvature of the unloaded rod [1/m, or 1/L], an arc; > 0 counter-clockwise from base to tip.",
-    ),
-]
+__all__ = ["Friction", "NoiseOptions", "RigOptions", "RodOptions", "UnknownOptions"]
 
 Friction = Annotated[float, typer.Option(help="Coulomb's coefficient, known.", min=0.0, max=0.84)]
 
@@ -60,16 +55,56 @@ class RodOptions:
     """A simulated rod."""
 
     length: Annotated[
-        float | None, typer.Option(help="Rod length [m]; by default everything is dimensionless, in units of the rod.")
+        float | None,
+        typer.Option(help="Rod length [m], if no file states it; by default all is in units of the rod."),
     ] = None
     flexural_rigidity: Annotated[float | None, typer.Option(help="EI [N m²], with --length.")] = None
     diameter: Annotated[float, typer.Option(help="Rod diameter [m], likewise.")] = 0.0
-    rest_curvature: RestCurvature = 0.0
+    rest_curvature: Annotated[
+        float,
+        typer.Option(help="Curvature of the unloaded rod, an arc [1/m, or 1/L]; > 0 counter-clockwise from the base."),
+    ] = 0.0
+    taper: Annotated[
+        float, typer.Option(help="Part by which the diameter of a tapered rod has fallen at its tip, 0 to 0.95.")
+    ] = 0.0
+    rod_shape: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV file with columns x and y [m], points traced along the unloaded rod from its base: its length "
+            "and rest curvature, in place of --length and --rest-curvature."
+        ),
+    ] = None
 
     @property
     def rod(self) -> Rod | None:
-        """The rod, or None if no option gives one."""
-        return rod_asked(self.length, self.flexural_rigidity, self.diameter, self.rest_curvature)
+        """The rod, or None if no option gives one.
+
+        Raises
+        ------
+        ParameterError
+            If options of the rod are missing, or contradict each other.
+        """
+        from tactile_bayes.errors import ParameterError
+        from tactile_bayes.mechanics.rod import Rod
+
+        if self.rod_shape is not None:
+            if self.length is not None or self.rest_curvature or self.diameter:
+                raise ParameterError("--rod-shape gives length and rest curvature: leave out the options of these")
+            x, y = points_in(self.rod_shape)
+            return Rod.from_shape(x, y, self.flexural_rigidity, taper=self.taper)
+        if (self.length is None) != (self.flexural_rigidity is None):
+            raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
+        if self.diameter and self.length is None:
+            raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
+        if self.length is None or self.flexural_rigidity is None:
+            return Rod(**self.shape) if self.shape else None
+        return Rod(self.length, self.flexural_rigidity, self.diameter, **self.shape)
+
+    @property
+    def shape(self) -> dict[str, Any]:
+        """In what the options make the rod another than a straight, uniform one."""
+        given = {"rest_curvature": self.rest_curvature, "taper": self.taper}
+        return {name: value for name, value in given.items() if value}
 
 
 @dataclass(frozen=True)
@@ -121,23 +156,34 @@ class UnknownOptions:
         return [] if self.as_stated else list(self.nuisance or STANDARD)
 
 
-def rod_asked(
-    length: float | None, flexural_rigidity: float | None, diameter: float, rest_curvature: float
-) -> Rod | None:
-    """Return the rod, or None if no option gives one.
+def points_in(path: Path) -> tuple[Floats, Floats]:
+    """Return the columns x and y of a CSV file with points.
 
     Raises
     ------
     ParameterError
-        If an option of the rod is missing.
+        If the file cannot be read, has no such columns, or a value is no number.
     """
-    from tactile_bayes.errors import ParameterError
-    from tactile_bayes.mechanics.rod import Rod
+    import csv
 
-    if (length is None) != (flexural_rigidity is None):
-        raise ParameterError("--length and --flexural-rigidity go together: give both, or neither")
-    if diameter and length is None:
-        raise ParameterError("--diameter needs --length and --flexural-rigidity beside it: give all three")
-    if length is None or flexural_rigidity is None:
-        return Rod(rest_curvature=rest_curvature) if rest_curvature else None
-    return Rod(length, flexural_rigidity, diameter, rest_curvature=rest_curvature)
+    import numpy as np
+
+    from tactile_bayes.errors import ParameterError
+    from tactile_bayes.record.cell import number_in
+
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ParameterError(f"{path}: the points cannot be read ({error})") from error
+    columns = []
+    for name in ("x", "y"):
+        values = [number_in(row.get(name) or "") for row in rows]
+        if not values or None in values:
+            at = values.index(None) + 1 if values else 0
+            raise ParameterError(
+                f"{path}: point {at} has no number in column {name!r}: write a line 'x,y', then a point in each line, "
+                "in metres, with decimal points"
+            )
+        columns.append(np.array(values, dtype=float))
+    return columns[0], columns[1]

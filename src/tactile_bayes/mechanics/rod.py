@@ -270,6 +270,20 @@ class Rod:
             rest_curvature_deviation=self.rest_curvature_deviation / self.curvature_unit,
         )
 
+    def shape_in_words(self, unit: str) -> list[str]:
+        """Return in what the rod differs from a straight, uniform one, given the unit of curvatures."""
+        words = []
+        if isinstance(self.rest_curvature, Along):
+            ends = self.rest_curvature([0.0, self.length])
+            words.append(f"rest curvature {ends[0]:.4g} {unit} at the base to {ends[1]:.4g} {unit} at the tip")
+        elif self.rest_curvature:
+            words.append(f"rest curvature {self.rest_curvature:.4g} {unit}")
+        if self.taper:
+            words.append(f"taper {self.taper:.4g}")
+        if isinstance(self.rigidity_profile, Along):
+            words.append(f"rigidity at the tip {float(self.rigidity_profile(self.length)):.4g} of that at the base")
+        return words
+
     @property
     def is_uniform(self) -> bool:
         """True if the flexural rigidity is constant."""
