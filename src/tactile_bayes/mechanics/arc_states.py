@@ -33,8 +33,8 @@ __all__ = ["MOST_LOAD", "NOWHERE", "Found", "Start", "State", "arc_contact", "ar
 MOST_LOAD = 1e6
 """Largest load f s1² and square of the bend κ0 s1: a rod would make a hundred turns."""
 
-_CLOSE = 2e-3
-"""Spread of the arguments of Carlson's R_F for which five terms of its series are exact."""
+_CLOSE = 0.012
+"""Spread of the arguments of Carlson's R_F for which eight terms of its series (DLMF 19.36.1) are exact."""
 
 _MOST_STEPS = 200
 
@@ -103,8 +103,10 @@ def _halved(s: float, c: float, d: float, x: float, y: float, gap: float) -> tup
 @compiled
 def _argument(s: float, c: float, d: float, x: float, y: float, gap: float) -> float:
     """Argument of Jacobi's functions, within one swing or half a rotation, from their values."""
-    for _ in range(2):
+    double = 1.0
+    while s < 0.0 or c < 0.0 or d < 0.0:
         s, c, d = _halved(s, c, d, x, y, gap)
+        double *= 2.0
     p, q, r = c * c, d * d, 1.0
     for _ in range(30):
         c, d, z = math.sqrt(p), math.sqrt(q), math.sqrt(r)
@@ -115,7 +117,9 @@ def _argument(s: float, c: float, d: float, x: float, y: float, gap: float) -> f
         if max(abs(a), abs(b), abs(a + b)) < _CLOSE:
             break
     e2, e3 = a * b - (a + b) * (a + b), -a * b * (a + b)
-    return 4.0 * s / math.sqrt(mean) * (1.0 + e2 * (e2 / 24.0 - 3.0 / 44.0 * e3 - 0.1) + e3 / 14.0)
+    series = 1.0 + e2 * (e2 * (1.0 / 24.0 - 5.0 / 208.0 * e2 + e3 / 16.0) - 3.0 / 44.0 * e3 - 0.1)
+    series += e3 * (1.0 / 14.0 + 3.0 / 104.0 * e3)
+    return double * s / math.sqrt(mean) * series
 
 
 @compiled

@@ -209,8 +209,5 @@ def _bent(rest: float, drive_angle: float, moment: float, force_x: float, force_
     lever, across = force_x * cos + force_y * sin, force_y * cos - force_x * sin
     if across >= 0.0:
         return abs(moment)
-    at_pivot, force = rest - moment, math.hypot(force_x, force_y)
-    squared = at_pivot * at_pivot - 2.0 * (force + lever)
-    if at_pivot > 0.0 and squared > 0.0:  # the curvature keeps its sign, and the rod lies across in the opposite sense
-        return max(abs(moment), rest - math.sqrt(squared))
-    return max(abs(moment), rest + math.sqrt(at_pivot * at_pivot + 2.0 * (force - lever)))
+    at_pivot = rest - moment
+    return max(abs(moment), rest + math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever)))

@@ -39,12 +39,14 @@ class Rod:
     elastic_strain : float, optional
         Largest bending strain without permanent deformation: about 0.002 for mild steel, 0.005 for spring steel, 0.05
         for nitinol. `scan` warns if a rod with a diameter is bent beyond it. Records do not state it.
+    rest_curvature : float
+        Curvature of the unloaded rod, a circular arc; > 0 counter-clockwise from base to tip [1/m].
 
     Raises
     ------
     ParameterError
         If length or flexural rigidity is not positive and finite, the diameter is negative or larger than the length,
-        or the elastic strain is not positive.
+        the elastic strain is not positive, or the rest curvature is not finite.
 
     Examples
     --------
@@ -57,6 +59,7 @@ class Rod:
     flexural_rigidity: float = 1.0
     diameter: float = 0.0
     elastic_strain: float | None = None
+    rest_curvature: float = 0.0
 
     def __post_init__(self) -> None:
         for name, unit in (("length", "m"), ("flexural_rigidity", "N m²")):
@@ -69,6 +72,7 @@ class Rod:
                 f"the rod's diameter is {self.diameter!r} and its length {self.length!r}: a rod is longer than it is "
                 "thick, give both in metres"
             )
+        check_number("the rod's rest_curvature", self.rest_curvature, "give a number [1/m], 0 if it is straight")
         square = float(self.length) * float(self.length)
         if not (square > 0.0 and 0.0 < float(self.flexural_rigidity) / square < math.inf):
             raise ParameterError(
