@@ -7,7 +7,8 @@ straight, or a circular arc of any rest curvature; all is a closed form, except 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -196,7 +197,7 @@ def _states(
     phase: ArrayLike,
 ) -> tuple[NDArray[np.int8], Floats]:
     """Phases, and columns of states, of contacts mirrored to forward ones."""
-    from tactile_bayes.mechanics.states import wrenches  # numba takes a second to load
+    from tactile_bayes.mechanics.states import arc_wrenches, wrenches  # numba takes a second to load
     from tactile_bayes.mechanics.tables import tables, workspace
 
     _refuse_friction(np.asarray(delta, dtype=float))
@@ -205,8 +206,29 @@ def _states(
     shape = given[0].shape
     columns = np.stack([column.ravel() for column in given[:5]], axis=-1).astype(float)
     found, out = given[5].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
-    wrenches(columns, tables(), workspace(), found, out)
+    _solve(wrenches, arc_wrenches, columns, (tables(), workspace()), (found, out))
     return found.reshape(shape), np.ascontiguousarray(out.T).reshape(9, *shape)
+
+
+def _solve(
+    straight: Callable[..., None],
+    arcs: Callable[..., None],
+    columns: Floats,
+    known: tuple[object, ...],
+    results: tuple[NDArray[Any], ...],
+) -> None:
+    """Write results for rows of columns, of which the last is the rest curvature; arcs take another function, which is
+    compiled when there are some.
+    """
+    curved = columns[:, -1] != 0.0
+    for function, rows in ((straight, ~curved), (arcs, curved)):
+        if rows.all() and rows.size:
+            function(columns, *known, *results)
+        elif rows.any():
+            parts = [result[rows] for result in results]
+            function(columns[rows], *known, *parts)
+            for result, part in zip(results, parts, strict=True):
+                result[rows] = part
 
 
 def contact_from_wrench(
@@ -260,14 +282,15 @@ def contact_from_wrench(
         side = np.where(moment < 0.0, -1.0, 1.0)
     delta = np.asarray(friction_angle, dtype=float)
     _refuse_friction(delta)
-    from tactile_bayes.mechanics.states import contacts  # numba takes a second to load
+    from tactile_bayes.mechanics.states import arc_contacts, contacts  # numba takes a second to load
 
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
     phi0 = np.where(mirrored, np.pi - np.asarray(drive_angle), drive_angle)
     given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta, sign * rest_curvature)
     out = np.empty((given[0].size, 6))
-    contacts(np.stack([column.ravel() for column in given], axis=-1).astype(float), out)
+    columns = np.stack([column.ravel() for column in given], axis=-1).astype(float)
+    _solve(contacts, arc_contacts, columns, (), (out,))
     x, y, slope_angle, arclength, tip_angle, modulus = np.ascontiguousarray(out.T).reshape(6, *given[0].shape)
     tip_angle = np.where(mirrored, np.pi - tip_angle, tip_angle)
     return Contact(sign * x, y, sign * slope_angle, arclength, tip_angle, modulus)

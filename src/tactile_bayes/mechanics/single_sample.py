@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats, Index
+from tactile_bayes.mechanics.arc_states import Found, arc_contact
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.contact_map import contact_state, moved
 from tactile_bayes.mechanics.fitting import RawFit, Reading
@@ -180,7 +181,7 @@ def raw_fits(
         angle, moment = reading.drive_angle[i], reading.loads[i, 0]
         force_x, force_y = reading.loads[i, 1], reading.loads[i, 2]
         bent = curvature[i]
-        found = contact(angle, moment, force_x, force_y, delta[i], bent)
+        found = _contact(angle, moment, force_x, force_y, delta[i], bent)
         for k in range(4):
             out.place[i, k] = found[k]
             for p in range(4):
@@ -212,9 +213,16 @@ def raw_fits(
             x_off, y_off = -found.x, -found.y
             for sign in (1.0, -1.0):
                 a, m, fx, fy = sign * errors[k, 0], sign * errors[k, 1], sign * errors[k, 2], sign * errors[k, 3]
-                aside = contact(angle + a, moment + m, force_x + fx, force_y + fy, delta[i], bent)
+                aside = _contact(angle + a, moment + m, force_x + fx, force_y + fy, delta[i], bent)
                 x_off, y_off = x_off + 0.5 * aside.x, y_off + 0.5 * aside.y
             out.bend[i] = _bent(out.bend[i], x_off, y_off, out.covariance, i)
+
+
+@compiled
+def _contact(angle: float, moment: float, force_x: float, force_y: float, delta: float, curvature: float) -> Found:
+    if curvature == 0.0:
+        return contact(angle, moment, force_x, force_y, delta)
+    return arc_contact(angle, moment, force_x, force_y, delta, curvature)
 
 
 @compiled

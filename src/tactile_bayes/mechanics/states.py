@@ -37,7 +37,7 @@ from tactile_bayes.mechanics.tables import (
     series,
 )
 
-__all__ = ["contact", "contacts", "wrenches"]
+__all__ = ["arc_contacts", "arc_wrenches", "contact", "contacts", "wrenches"]
 
 _BEYOND = 1e-12
 """Angle by which rounding may turn a chord beyond the line of force through the pivot [rad]."""
@@ -114,8 +114,8 @@ def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArra
 
     Parameters
     ----------
-    columns : ndarray, shape (n, 5)
-        Contact point, slope angle, friction angle, rest curvature.
+    columns : ndarray, shape (n, 4)
+        Contact point, slope angle, friction angle.
     phase : ndarray, shape (n,)
         Known phases; a phase that is `NONE` is determined and stored.
     out : ndarray, shape (n, 9)
@@ -123,14 +123,11 @@ def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArra
     """
     prepared = math.nan
     for i in range(columns.shape[0]):
-        x, y, alpha, delta, curvature = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4]
-        out[i] = math.nan
-        if curvature != 0.0:
-            phase[i] = _arc_states(x, y, alpha, delta, curvature, known, workspace, phase[i], out[i])
-            continue
+        x, y, alpha, delta = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
         if delta != prepared:
             prepare(known, delta, workspace)
             prepared = delta
+        out[i] = math.nan
         if phase[i] != TIP:
             length, arc, by_chi = _tangential(x, y, alpha, delta, workspace)
             out[i, 8] = length
@@ -143,35 +140,28 @@ def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArra
             phase[i] = NONE if math.isnan(ending.arclength) else TIP
 
 
-@compiled
-def _arc_states(
-    x: float,
-    y: float,
-    alpha: float,
-    delta: float,
-    curvature: float,
-    known: Tables,
-    workspace: Workspace,
-    phase: int,
-    out: Floats,
-) -> int:
-    """Write the state of an arc, as `wrenches`, and return its phase."""
-    sin, cos = math.sin(alpha + delta), math.cos(alpha + delta)
-    u, v = x * cos + y * sin, y * cos - x * sin
-    if phase != TIP:
-        lying = arc_state(x, y, alpha, delta, curvature, False, unloaded_arc(u, v, delta))
-        out[8] = lying.arclength
-        if phase == TANGENTIAL or lying.arclength <= 1.0:
-            _store(lying, out)
-            return TANGENTIAL
-    straight = _tip_state(x, y, alpha, delta, known, workspace)
-    psi1 = straight.tip_angle - alpha - delta
-    start = Start(0.0, psi1, math.hypot(straight.force_x, straight.force_y))
-    ending = arc_state(x, y, alpha, delta, curvature, True, start)
-    if phase == NONE and not ending.tip_angle >= alpha:
-        return NONE
-    _store(ending, out)
-    return NONE if math.isnan(ending.arclength) else TIP
+@cached
+def arc_wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArray[np.int8], out: Floats) -> None:
+    """Write states of arcs as `wrenches` does; the rest curvature is the last column."""
+    for i in range(columns.shape[0]):
+        x, y, alpha, delta, curvature = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4]
+        sin, cos = math.sin(alpha + delta), math.cos(alpha + delta)
+        u, v = x * cos + y * sin, y * cos - x * sin
+        out[i] = math.nan
+        if phase[i] != TIP:
+            lying = arc_state(x, y, alpha, delta, curvature, False, unloaded_arc(u, v, delta))
+            out[i, 8] = lying.arclength
+            if phase[i] == TANGENTIAL or lying.arclength <= 1.0:
+                _store(lying, out[i])
+                phase[i] = TANGENTIAL
+                continue
+        straight = _tip_state(x, y, alpha, delta, known, workspace)
+        psi1 = straight.tip_angle - alpha - delta
+        start = Start(0.0, psi1, math.hypot(straight.force_x, straight.force_y))
+        ending = arc_state(x, y, alpha, delta, curvature, True, start)
+        if phase[i] == TIP or ending.tip_angle >= alpha:
+            _store(ending, out[i])
+        phase[i] = NONE if math.isnan(out[i, 4]) else TIP
 
 
 @compiled
@@ -181,10 +171,8 @@ def _store(state: State, out: Floats) -> None:
 
 
 @compiled
-def contact(phi0: float, moment: float, fx: float, fy: float, delta: float, curvature: float) -> Found:
+def contact(phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
     """Contact that follows from a base wrench, without integration or root search; see `contact_from_wrench`."""
-    if curvature != 0.0:
-        return arc_contact(phi0, moment, fx, fy, delta, curvature)
     force, modulus = math.sqrt(fx * fx + fy * fy), math.nan
     root = math.sqrt(force)
     beta = math.atan2(-fx, fy)
@@ -219,12 +207,22 @@ def contacts(columns: Floats, out: Floats) -> None:
 
     Parameters
     ----------
-    columns : ndarray, shape (n, 6)
-        Drive angle, holding moment and support reaction, friction angle, rest curvature.
+    columns : ndarray, shape (n, 5)
+        Drive angle, holding moment and support reaction, friction angle.
     out : ndarray, shape (n, 6)
         As `Contact`.
     """
     for i in range(columns.shape[0]):
-        found = contact(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4], columns[i, 5])
+        found = contact(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
+        for k in range(6):
+            out[i, k] = found[k]
+
+
+@cached
+def arc_contacts(columns: Floats, out: Floats) -> None:
+    """Write contacts of arcs as `contacts` does; the rest curvature is the last column."""
+    for i in range(columns.shape[0]):
+        wrench = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
+        found = arc_contact(*wrench, columns[i, 4], columns[i, 5])
         for k in range(6):
             out[i, k] = found[k]
