@@ -14,8 +14,8 @@ subtraction theorem (DLMF 22.8.1 to 22.8.3); with E = κ0²/4 + f sin²A1 cos²A
 
 Then s1 is an elliptic integral in Carlson's form. Nothing of this is singular where the force vanishes, or where the
 parameter m = x/y is one. The contact is the first point at which the bending moment vanishes with κ' = f cos ψ > 0. If
-m0 > 0 the moment vanishes nowhere before. If the line of force has passed the pivot, m0 < 0 and cos ψ0 < 0, as for rods
-whose rest curvature is that of a load, it vanishes once.
+m0 > 0 the moment vanishes nowhere before. If the line of force has passed the pivot, m0 < 0 and cos ψ0 < 0, as happens
+to rods that are curved at rest as a load curves them, it vanishes once before.
 
 A contact determines its wrench by continuation in the rest curvature, along which the force is positive.
 """
@@ -39,7 +39,7 @@ _CLOSE = 0.012
 _MOST_STEPS = 200
 
 _LEAST_STEP = 1e-9
-"""Share of a continuation in whose place it ends."""
+"""Share of a continuation below which it ends."""
 
 _NEAR, _SHRINKS = 0.05, 0.25
 """Largest first step of a Newton search in a continuation, and largest ratio of its steps."""
@@ -92,19 +92,22 @@ def _halved(s: float, c: float, d: float, x: float, y: float, gap: float) -> tup
         ratio, fall = -gap / (d - c), (1.0 - c) / x
         return math.sqrt(fall / (1.0 + d)), s * math.sqrt(ratio / (1.0 + d)), math.sqrt(ratio * fall)
     rest_c, rest_d = 1.0 + c, 1.0 + d
-    sign = math.copysign(1.0, s)
-    return (
-        abs(s) / math.sqrt(rest_c * rest_d),
-        math.sqrt((c + d) / rest_d),
-        sign * math.sqrt((c + d) / rest_c),
-    )
+    half = math.sqrt((c + d) / rest_c)
+    return abs(s) / math.sqrt(rest_c * rest_d), math.sqrt((c + d) / rest_d), half if s > 0.0 else -half
+
+
+@compiled
+def _is_moderate(arclength: float, force: float, curvature: float) -> bool:
+    """True if a pose can be computed."""
+    bend = curvature * arclength
+    return force * arclength * arclength < MOST_LOAD and bend * bend < MOST_LOAD and arclength * arclength < MOST_LOAD
 
 
 @compiled
 def _argument(s: float, c: float, d: float, x: float, y: float, gap: float) -> float:
     """Argument of Jacobi's functions, within one swing or half a rotation, from their values."""
     double = 1.0
-    while s < 0.0 or c < 0.0 or d < 0.0:
+    while (s < 0.0 or c < 0.0 or d < 0.0) and double < 16.0:
         s, c, d = _halved(s, c, d, x, y, gap)
         double *= 2.0
     p, q, r = c * c, d * d, 1.0
@@ -159,11 +162,12 @@ def arc_contact(phi0: float, moment: float, fx: float, fy: float, delta: float, 
         force,
         gap,
     )
+    if not _is_moderate(arclength, force, curvature):
+        return Found(math.nan, math.nan, math.nan, math.nan, math.nan, modulus)
     here = pose(0.5 * math.pi - 2.0 * math.atan2(sin1, cos1), arclength, force, curvature)
     u, v = moment / force, here.v
-    return Found(
-        (u * fy + v * fx) / force, (v * fy - u * fx) / force, beta - delta, arclength, phi0 - here.turn, modulus
-    )
+    x, y = (u * fy + v * fx) / force, (v * fy - u * fx) / force
+    return Found(x, y, beta - delta, arclength, phi0 - here.turn, modulus)
 
 
 class Start(NamedTuple):
@@ -184,7 +188,7 @@ def unloaded_arc(u: float, v: float, delta: float) -> Start:
 
 
 class _Slopes(NamedTuple):
-    """Pose at a point, and the inverse of its derivatives by (q, f)."""
+    """Pose at a point, its derivatives by (q, f), and their determinant."""
 
     here: Pose
     by_q: Pose
@@ -210,7 +214,7 @@ def _step(at: _Slopes, du: float, dv: float) -> tuple[float, float]:
 def _settled(u: float, v: float, delta: float, curvature: float, tip: bool, q: float, force: float) -> Start:
     """State near a guess by Newton's method; NaN if its steps are large or do not shrink fast."""
     before = _NEAR / _SHRINKS
-    while 0.0 < force < MOST_LOAD and curvature * curvature < MOST_LOAD and abs(q) < _MOST_STEPS:
+    while force > 0.0 and _is_moderate(1.0 if tip else q, force, curvature):
         at = _slopes(q, force, curvature, delta, tip)
         dq, df = _step(at, u - at.here.u, v - at.here.v)
         size = max(abs(dq), abs(df) / (1.0 + force))
@@ -229,6 +233,8 @@ def _continued(u: float, v: float, delta: float, curvature: float, tip: bool, st
     The start may be somewhat off the contact: it is left behind at the same time.
     """
     at, way, step = start, 0.0, 1.0
+    if not _is_moderate(1.0 if tip else at.q, at.force, at.curvature):
+        return Start(math.nan, math.nan, math.nan)
     here = _slopes(start.q, start.force, start.curvature, delta, tip)
     from_u, from_v, change = here.here.u, here.here.v, curvature - start.curvature
     for _ in range(_MOST_STEPS):
@@ -273,5 +279,5 @@ def arc_state(x: float, y: float, alpha: float, delta: float, curvature: float, 
     dq, df = _step(at, u, v)
     by_distance = 0.5 * (by_q * dq + at.by_force.turn * df) / (u * u + v * v)
     tip_angle = beta + psi1
-    turn = tip_angle + at.here.turn
-    return State(turn, force * u, -force * sin, force * cos, arclength, tip_angle, by_slope, by_distance)
+    drive_angle = tip_angle + at.here.turn
+    return State(drive_angle, force * u, -force * sin, force * cos, arclength, tip_angle, by_slope, by_distance)
