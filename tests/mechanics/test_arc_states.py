@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from helpers import integrated_step2
+from helpers.arc_sweeps import loaded_states
 from helpers.integration import ATOL, RTOL
 from tactile_bayes.contours import Circle, Parabola, PowerLaw
-from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.mechanics.centreline import rod_shape
 from tactile_bayes.mechanics.contact_coordinates import (
     DRIVE_ANGLE,
@@ -22,7 +22,6 @@ from tactile_bayes.mechanics.elastica import (
     tangential_arclength,
     wrench_from_contact,
 )
-from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
 
 CURVATURES = (-2.0, -0.7, -0.05, 0.05, 0.7, 2.0)
@@ -207,12 +206,8 @@ def test_step2_gives_the_contacts_of_a_sweep_back(contour, curvature, backward, 
     rng, count = np.random.default_rng(5), 20
     sizes, q, x_c = np.exp(rng.normal(0.0, 0.5, count)), rng.uniform(0.2, 0.8, count), rng.normal(0.0, 0.15, count)
     shape = contour(sizes, 1.6, q, x_c) if contour is PowerLaw else contour(sizes, q, x_c)
-    frame = SweepFrame(
-        shape.broadcast_to((count,)), np.zeros(count), np.zeros(count), 1.0, 0.0, np.full(count, backward)
-    )
     angles, delta = np.linspace(-1.0, 4.5, 56), np.arctan(friction)
-    paths = trace(frame, friction_angle=delta, rest_curvature=curvature, drive_angles=angles)
-    _, _, states = paths.loaded_states()
+    _, states = loaded_states(shape, np.full(count, backward), curvature, friction, angles)
     wrench, own = states.wrench, -curvature if backward else curvature
     loads = wrench.drive_angle, wrench.holding_moment, wrench.force_x, wrench.force_y
     found = contact_from_wrench(*loads, delta, side=1, rest_curvature=own)

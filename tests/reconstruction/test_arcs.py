@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from helpers.arc_sweeps import loaded_states
 from tactile_bayes.contours import Parabola
-from tactile_bayes.contours.sweep_frame import SweepFrame
 from tactile_bayes.inference.contact_posterior import infer_contacts
 from tactile_bayes.load_cell import LoadCell
-from tactile_bayes.mechanics.paths import trace
 from tactile_bayes.mechanics.phases import PHASE_NAMES
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction import reconstruct, samples, samples_of
@@ -34,11 +33,8 @@ def swept(curvature: float, units: str = "dimensionless") -> Swept:
     """Loaded samples of a double sweep along a parabola, with friction."""
     plain = UNITS[units]
     rod = Rod(plain.length, plain.flexural_rigidity, rest_curvature=curvature / plain.length)
-    contour, zero = Parabola([0.5, 0.5], 0.5), np.zeros(2)
-    frame = SweepFrame(contour, zero, zero, 1.0, 0.0, np.array([False, True]))
     angles = np.linspace(-0.5, 4.0, 120)
-    paths = trace(frame, friction_angle=np.arctan(FRICTION), rest_curvature=curvature, drive_angles=angles)
-    sweep, _, states = paths.loaded_states()
+    sweep, states = loaded_states(Parabola(0.5, 0.5), [False, True], curvature, FRICTION, angles)
     sign, wrench = np.where(sweep == 1, -1.0, 1.0), states.wrench
     forces = np.stack([sign * wrench.force_x, wrench.force_y]) * rod.force_unit
     columns = {
