@@ -213,8 +213,8 @@ def test_step2_gives_the_contacts_of_a_sweep_back(contour, curvature, backward, 
     found = contact_from_wrench(*loads, delta, side=1, rest_curvature=own)
     right = np.array([states.x, states.y, states.slope_angle, wrench.contact_arclength])
     usual = wrench.tip_angle - states.slope_angle - delta < 0.5 * np.pi
-    assert usual.mean() > 0.97
-    assert usual.sum() > 200
+    assert usual.mean() > 0.9
+    assert usual.sum() > 100
     np.testing.assert_allclose(np.array(found[:4])[:, usual], right[:, usual], atol=1e-9)
 
 
