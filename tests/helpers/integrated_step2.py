@@ -21,6 +21,8 @@ _LONGEST, _STRIDE = 12.0, 0.05
 
 Complex = NDArray[np.complex128]
 Function = Callable[[Complex, NDArray[np.float64]], Complex]
+Curvature = NDArray[np.float64] | float
+"""Of the unloaded rod; the moment at the base is its difference from the curvature there."""
 
 
 def _along(state: Complex, fx: Complex, fy: Complex) -> Complex:
@@ -49,37 +51,42 @@ def _complex_hypot(a: Complex, b: Complex) -> Complex:
     return np.sqrt(a * a + b * b)
 
 
-def step2(wrench: Complex, friction_angle: NDArray[np.float64]) -> Complex:
+def step2(wrench: Complex, friction_angle: NDArray[np.float64], rest_curvature: Curvature = 0.0) -> Complex:
     """Contact point, slope angle and arc length, shape (n, 4), from drive angle, moment and forces, shape (n, 4)."""
     phi0, moment, fx, fy = np.asarray(wrench, dtype=complex).T
     force = _complex_hypot(fx, fy)
     zero = np.zeros_like(phi0)
-    start = np.stack([zero, zero, phi0, -moment])
-    length = _first_zero(start.real, fx.real, fy.real).astype(complex)
+    start = np.stack([zero, zero, phi0, rest_curvature - moment])
+    length = _first_zero(start.real, fx.real, fy.real, rest_curvature).astype(complex)
     for _ in range(5):  # four for the real parts, one for the imaginary ones
         _, _, phi, kappa = bent_rod(start, length, fx, fy)
-        length = length - kappa / (fy * np.cos(phi) - fx * np.sin(phi))
+        length = length - (kappa - rest_curvature) / (fy * np.cos(phi) - fx * np.sin(phi))
     x, y, _, kappa = bent_rod(start, length, fx, fy)
-    assert np.max(np.abs(kappa) / np.maximum(np.abs(moment), 1e-3 * np.sqrt(np.abs(force)))) < 1e-10
+    assert np.max(np.abs(kappa - rest_curvature) / np.maximum(np.abs(moment), 1e-3 * np.sqrt(np.abs(force)))) < 1e-10
     beta = 2.0 * np.arctan(-fx / (force + fy))
     return np.stack([x, y, beta - friction_angle, length], axis=-1)
 
 
-def _first_zero(start: NDArray[np.float64], fx: NDArray[np.float64], fy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Arc length at which the curvature first changes its sign, roughly."""
+def _first_zero(
+    start: NDArray[np.float64], fx: NDArray[np.float64], fy: NDArray[np.float64], rest_curvature: Curvature
+) -> NDArray[np.float64]:
+    """Arc length at which the bending moment first changes its sign, roughly."""
     stride = _STRIDE / np.sqrt(np.hypot(fx, fy))
     zero, state = np.full(fx.size, np.nan), start
     for number in range(int(_LONGEST / _STRIDE)):
         new = _advanced(state, stride, fx, fy)
-        crossed = np.isnan(zero) & (np.sign(new[3]) != np.sign(start[3]))
-        share = state[3] / (state[3] - new[3])
+        before, after = state[3] - rest_curvature, new[3] - rest_curvature
+        crossed = np.isnan(zero) & (np.sign(after) != np.sign(start[3] - rest_curvature))
+        share = before / (before - after)
         zero[crossed] = ((number + share) * stride)[crossed]
         state = new
     assert np.isfinite(zero).all(), "the curvature has no zero"
     return zero
 
 
-def touched(coordinates: Complex, friction_angle: NDArray[np.float64]) -> tuple[Complex, Complex]:
+def touched(
+    coordinates: Complex, friction_angle: NDArray[np.float64], rest_curvature: Curvature = 0.0
+) -> tuple[Complex, Complex]:
     """Loads, shape (n, 3), and place, shape (n, 4), from force, ψ1, arc length and drive angle, shape (n, 4).
 
     The rod is integrated from the contact back to the pivot, the direction of the force being along the y axis, and
@@ -87,11 +94,11 @@ def touched(coordinates: Complex, friction_angle: NDArray[np.float64]) -> tuple[
     """
     force, psi1, arclength, drive_angle = np.asarray(coordinates, dtype=complex).T
     zero = np.zeros_like(force)
-    end = bent_rod(np.stack([zero, zero, psi1, zero]), -arclength, zero, force)
+    end = bent_rod(np.stack([zero, zero, psi1, zero + rest_curvature]), -arclength, zero, force)
     beta = drive_angle - end[2]
     cos, sin = np.cos(beta), np.sin(beta)
     x, y = -end[0] * cos + end[1] * sin, -end[0] * sin - end[1] * cos
-    loads = np.stack([-end[3], -force * sin, force * cos], axis=-1)
+    loads = np.stack([rest_curvature - end[3], -force * sin, force * cos], axis=-1)
     return loads, np.stack([x, y, beta - friction_angle, arclength], axis=-1)
 
 

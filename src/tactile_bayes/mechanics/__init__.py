@@ -4,8 +4,8 @@
 and contour) → `leg` and `branch` (one rod along one contour, from first contact to snap-off) → `readings` and `sweeps`
 (loads and states at drive angles, of many of them). All of this is scalar code that numba compiles, for any strictly
 convex contour, with friction and compliance, in both directions. `curves.Accuracy` decides whether it is exact or as
-accurate as noise requires. `elastica` (single states of a straight rod, and Step 2: `arc`, `chord`, `tables` and
-`states`) and `paths` are its interface for arrays; they load numba when they are called.
+accurate as noise requires. `elastica` (single states, and Step 2: `arc`, `chord`, `tables` and `states` for straight
+rods, `arc_states` for circular arcs) and `paths` are its interface for arrays; they load numba when they are called.
 
 Another rod enters as another `pose`. Another drive enters where `branch` compares states with drive angles: no other
 place knows that the base turns about a pivot.

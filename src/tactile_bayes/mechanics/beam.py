@@ -155,6 +155,9 @@ def _bending(
         if across >= 0.0:
             return abs(moment)
         at_pivot = curvature - moment
+        before = at_pivot * at_pivot - 2.0 * (math.hypot(force_x, force_y) + lever)
+        if at_pivot > 0.0 and before > 0.0:  # the curvature keeps its sign
+            return max(abs(moment), curvature - math.sqrt(before))
         bent = math.sqrt(at_pivot * at_pivot + 2.0 * (math.hypot(force_x, force_y) - lever))
         return max(abs(moment), curvature + bent)
     return largest_bending_along(varied.profile, drive_angle, moment, force_x, force_y, arclength, varied.work).strain

@@ -1,15 +1,14 @@
 """The shape of the deformed rod from its base wrench, in closed form.
 
 Quantities are dimensionless and relative to the pivot, as in `elastica`. Between pivot and contact the rod is a piece
-of elastica (`arc`): its amplitude at arc length s is χ = am(√f (s1 − s) | m), and the chord from there to the
-contact is (F − C, S)/√f along and across the direction at the contact. Beyond the contact the rod is straight.
+of elastica, and its point at arc length s is the pivot of a rod of length s1 − s with the same contact (`pose`). Beyond
+the contact it has its rest curvature.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ellipj
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
@@ -26,6 +25,7 @@ def rod_shape(
     *,
     points: int = 101,
     side: ArrayLike | None = None,
+    rest_curvature: ArrayLike = 0.0,
 ) -> tuple[Floats, Floats]:
     """Centreline of the rod from pivot to tip: x' = cos φ, y' = sin φ, φ'' = f cos(φ − β) (equation 27).
 
@@ -40,12 +40,15 @@ def rod_shape(
         polygonal.
     side : array_like of +1 or −1, optional
         +1 for contacts of a forward sweep, −1 for those of a backward one; by default the sign of the holding moment.
+    rest_curvature : array_like
+        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
 
     Returns
     -------
     x, y : ndarray, shape (..., points)
-        Coordinates relative to the pivot [L]. Where the force is zero or the wrench NaN, the rod is not loaded and
-        straight. Where the curvature has no zero, no contact makes such a wrench, and the coordinates are NaN.
+        Coordinates relative to the pivot [L]. Where the force is zero or the wrench NaN, the rod is not loaded and has
+        its rest shape. Where the bending moment has no zero, no contact makes such a wrench, and the coordinates are
+        NaN.
 
     Raises
     ------
@@ -60,42 +63,51 @@ def rod_shape(
     >>> x.round(3), y.round(3)
     (array([ 0.   , -0.203, -0.221, -0.042,  0.2  ]), array([0.   , 0.135, 0.375, 0.541, 0.6  ]))
     """
-    from tactile_bayes.mechanics.contact_map import chords  # numba takes a second to load
+    from tactile_bayes.mechanics.pose import write_poses  # numba takes a second to load
 
     if points < 2:
         raise ParameterError(f"points is {points!r}: a rod is drawn with at least 2 points, pivot and tip")
     moment = np.asarray(holding_moment, dtype=float)
     if side is None:
         side = np.where(moment < 0.0, -1.0, 1.0)
-    states = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (drive_angle, moment, force_x, force_y, side)))
+    given = drive_angle, moment, force_x, force_y, side, rest_curvature
+    states = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in given))
     shape = states[0].shape
-    phi0, moment, fx, fy, sign = (a.ravel() for a in states)
-    mirrored = sign < 0.0
-    phi0 = np.where(mirrored, np.pi - phi0, phi0)
-    moment, fx = sign * moment, sign * fx
+    phi0, moment, fx, fy, sign, curvature = (a.ravel() for a in states)
+    sign = np.where(sign < 0.0, -1.0, 1.0)
+    phi0 = np.where(sign < 0.0, np.pi - phi0, phi0)
+    moment, fx, curvature = sign * moment, sign * fx, sign * curvature
 
     s = np.linspace(0.0, 1.0, points)
     force = np.hypot(fx, fy)
-    x, y = np.cos(phi0)[:, None] * s, np.sin(phi0)[:, None] * s
+    x, y = _unloaded(phi0[:, None], s, curvature[:, None])
     loaded = (force > 0.0) & np.isfinite(moment)
-    contact = contact_from_wrench(phi0, moment, fx, fy, side=1.0)
-    # A force at the pivot itself, without moment, leaves the rod straight too: there is a modulus, but no arc.
+    contact = contact_from_wrench(phi0, moment, fx, fy, side=1.0, rest_curvature=curvature)
+    # A force at the pivot itself, without moment, leaves the rod in its rest shape too: it has a modulus, but no arc.
     bent = loaded & (contact.contact_arclength > 0.0)
-    impossible = loaded & ~(contact.modulus < 1.0)
+    impossible = loaded & ~bent & ~(contact.modulus < 1.0)
     x[impossible] = y[impossible] = np.nan
 
-    root = np.sqrt(force[bent])[:, None]
-    m = contact.modulus[bent][:, None]
-    s1, tip_angle = contact.contact_arclength[bent][:, None], contact.tip_angle[bent][:, None]
-    left = np.maximum(s1 - s, 0.0)
-    chi = ellipj(root * left, m)[3]
-    chord = np.empty((2, chi.size))
-    chords(chi.ravel(), np.broadcast_to(m, chi.shape).ravel(), chord)
-    shortfall, offset = chord.reshape(2, *chi.shape) / root
+    beta, s1, tip_angle = (
+        a[bent][:, None] for a in (contact.slope_angle, contact.contact_arclength, contact.tip_angle)
+    )
+    curvature, force = curvature[bent][:, None], force[bent][:, None]
     # The pivot is the first point, of arc length 0.
-    along, across = s - (shortfall[:, :1] - shortfall), offset[:, :1] - offset
-    cos, sin = np.cos(tip_angle), np.sin(tip_angle)
-    x[bent] = along * cos - across * sin
-    y[bent] = along * sin + across * cos
+    columns = np.broadcast_arrays(tip_angle - beta, np.maximum(s1 - s, 0.0), force, curvature)
+    pose = np.empty((2, columns[0].size))
+    write_poses(np.stack([a.ravel() for a in columns], axis=-1), pose)
+    u, v = pose.reshape(2, *columns[0].shape)
+    u, v = u[:, :1] - u, v[:, :1] - v
+    cos, sin = np.cos(beta), np.sin(beta)
+    beyond_x, beyond_y = _unloaded(tip_angle, np.maximum(s - s1, 0.0), curvature)
+    x[bent] = u * cos - v * sin + beyond_x
+    y[bent] = u * sin + v * cos + beyond_y
     full = (*shape, points)
-    return (np.where(mirrored, -1.0, 1.0)[:, None] * x).reshape(full), y.reshape(full)
+    return (sign[:, None] * x).reshape(full), y.reshape(full)
+
+
+def _unloaded(angle: Floats, arclength: Floats, curvature: Floats) -> tuple[Floats, Floats]:
+    """Points of arcs from the origin, where they have the slope `angle`."""
+    half = 0.5 * curvature * arclength
+    chord = arclength * np.sinc(half / np.pi)
+    return chord * np.cos(angle + half), chord * np.sin(angle + half)

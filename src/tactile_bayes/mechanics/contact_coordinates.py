@@ -1,9 +1,10 @@
 """Contact coordinates: contact force, direction at the contact, arc length, drive angle.
 
-A forward contact of a uniform rod with given friction has four coordinates: the contact force f, ψ1 = φ(s1) − β at the
-contact, the arc length s1, and the drive angle φ0. Base wrench and contact point are closed forms in them. Not all four
-are free: in tip contact s1 = 1 and ψ1 > −δ, in tangential contact ψ1 = −δ and s1 < 1. A contact therefore has three
-degrees of freedom, and the two phases are two sheets that meet in the edge s1 = 1, ψ1 = −δ.
+A forward contact of a uniform rod with given friction and constant rest curvature has four coordinates: the contact
+force f, ψ1 = φ(s1) − β at the contact, the arc length s1, and the drive angle φ0. Base wrench and contact point are
+closed forms in them. Not all four are free: in tip contact s1 = 1 and ψ1 > −δ, in tangential contact ψ1 = −δ and
+s1 < 1. A contact therefore has three degrees of freedom, and the two phases are two sheets that meet in the edge
+s1 = 1, ψ1 = −δ.
 
 Quantities are dimensionless and relative to the pivot; contacts are forward ones.
 """
@@ -59,7 +60,9 @@ class ContactStateSlopes(NamedTuple):
     """Shape (n, 4, 4)."""
 
 
-def contact_states(coordinates: Floats, friction_angle: Floats | float = 0.0) -> ContactStates:
+def contact_states(
+    coordinates: Floats, friction_angle: Floats | float = 0.0, rest_curvature: Floats | float = 0.0
+) -> ContactStates:
     """Base wrench and place of contacts with given coordinates.
 
     Parameters
@@ -68,6 +71,8 @@ def contact_states(coordinates: Floats, friction_angle: Floats | float = 0.0) ->
         Contact force f > 0 [EI/L²], ψ1 ∈ (−π/2, π/2) [rad], arc length s1 > 0 [L], and slope φ0 at the pivot [rad].
     friction_angle : ndarray, shape (n,), or float
         Friction angle δ = arctan μ [rad].
+    rest_curvature : ndarray, shape (n,), or float
+        Curvature κ0 of the unloaded rod, mirrored like the contact [1/L].
 
     Examples
     --------
@@ -75,36 +80,36 @@ def contact_states(coordinates: Floats, friction_angle: Floats | float = 0.0) ->
     >>> rod.place.round(4).ravel()
     array([0.1457, 0.9536, 0.8156, 1.    ])
     """
-    return _contact_states(coordinates, friction_angle, 0)[0]
+    return _contact_states(coordinates, friction_angle, rest_curvature, 0)[0]
 
 
 def contact_states_and_slopes(
-    coordinates: Floats, friction_angle: Floats | float = 0.0
+    coordinates: Floats, friction_angle: Floats | float = 0.0, rest_curvature: Floats | float = 0.0
 ) -> tuple[ContactStates, ContactStateSlopes]:
     """Contacts with given coordinates, and their derivatives by the coordinates; see `contact_states`."""
-    return _contact_states(coordinates, friction_angle, len(coordinates))
+    return _contact_states(coordinates, friction_angle, rest_curvature, len(coordinates))
 
 
 def _contact_states(
-    coordinates: Floats, friction_angle: Floats | float, slopes: int
+    coordinates: Floats, friction_angle: Floats | float, rest_curvature: Floats | float, slopes: int
 ) -> tuple[ContactStates, ContactStateSlopes]:
     from tactile_bayes.mechanics.contact_map import write_contact_states  # numba takes a second to load
 
     count = len(coordinates)
     coordinates = np.ascontiguousarray(coordinates, dtype=float)
-    delta = np.array(np.broadcast_to(friction_angle, (count,)), dtype=float)
+    delta, curvature = (np.array(np.broadcast_to(a, (count,)), dtype=float) for a in (friction_angle, rest_curvature))
     loads, place, volumes = np.empty((3, count)), np.empty((4, count)), np.empty((2, count))
     by = ContactStateSlopes(np.empty((slopes, 3, 4)), np.empty((slopes, 4, 4)))
-    write_contact_states(coordinates, delta, loads, place, volumes, *by, *contact_workspace())
+    write_contact_states(coordinates, delta, curvature, loads, place, volumes, *by, contact_workspace())
     return ContactStates(loads, place, *volumes), by
 
 
-def contact_workspace() -> tuple[Floats, Floats]:
-    """Arrays for `contact_map.contact_state` to write to."""
-    return np.empty((5, 6)), np.empty(20)
+def contact_workspace() -> Floats:
+    """Array for `contact_map.contact_state` to write to."""
+    return np.empty((5, 6))
 
 
-def place_by_wrench(coordinates: Floats) -> Floats:
+def place_by_wrench(coordinates: Floats, rest_curvature: Floats | float = 0.0) -> Floats:
     """Derivatives of `PLACE` by drive angle and loads, shape (n, 4, 4): those of Step 2, in closed form.
 
     Examples
@@ -115,5 +120,6 @@ def place_by_wrench(coordinates: Floats) -> Floats:
     from tactile_bayes.mechanics.contact_map import wrench_slopes  # numba takes a second to load
 
     slopes = np.empty((len(coordinates), 4, 4))
-    wrench_slopes(np.ascontiguousarray(coordinates, dtype=float), *contact_workspace(), slopes)
+    curvature = np.array(np.broadcast_to(rest_curvature, len(coordinates)), dtype=float)
+    wrench_slopes(np.ascontiguousarray(coordinates, dtype=float), curvature, contact_workspace(), slopes)
     return slopes

@@ -1,12 +1,14 @@
-"""The exact rod for arrays: contact → base wrench and base wrench → contact, in closed form (`states`).
+"""The exact rod for arrays: contact → base wrench and base wrench → contact (`states`, `arc_states`).
 
 Quantities are dimensionless (length L, moment EI/L, force EI/L²), relative to the pivot, and broadcast. The formulas
-hold for forward contacts (holding moment ≥ 0); `side=-1` mirrors a backward contact in and out.
+hold for forward contacts (holding moment ≥ 0); `side=-1` mirrors a backward contact in and out. The unloaded rod is
+straight, or a circular arc of any rest curvature; all is a closed form, except for the wrench of an arc.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,7 +50,8 @@ class Wrench(NamedTuple):
     by_slope: Floats
     """∂φ0/∂α at a fixed contact point; by rotation of the whole, ∂φ0/∂(polar angle of the point) = 1 − by_slope."""
     by_distance: Floats
-    """∂φ0/∂(r²) at a fixed direction of the contact and α, r its distance from the pivot; 0 in tangential contact."""
+    """∂φ0/∂(r²) at a fixed direction of the contact and α, r its distance from the pivot; 0 in tangential contact of a
+    straight rod."""
     tangential_arclength: Floats
     """Arc length that tangential contact at this point would take [L]; above 1 the rod is too short for it."""
 
@@ -66,7 +69,7 @@ class Contact(NamedTuple):
     tip_angle: Floats
     """Slope φ(s1) of the rod at the contact [rad]."""
     modulus: Floats
-    """Parameter m of the elliptic integrals; the curvature has a zero if and only if m < 1."""
+    """Parameter m of the elliptic integrals; the curvature of the whole elastica has a zero if and only if m < 1."""
 
 
 def _refuse_friction(friction_angle: Floats) -> None:
@@ -81,19 +84,25 @@ def _refuse_friction(friction_angle: Floats) -> None:
 
 
 def tangential_arclength(
-    contact_x: ArrayLike, contact_y: ArrayLike, slope_angle: ArrayLike, friction_angle: ArrayLike = 0.0
+    contact_x: ArrayLike,
+    contact_y: ArrayLike,
+    slope_angle: ArrayLike,
+    friction_angle: ArrayLike = 0.0,
+    *,
+    rest_curvature: ArrayLike = 0.0,
 ) -> Floats:
     """Arc length [L] that tangential contact of a forward sweep takes; above 1 only the tip can touch there.
 
     Parameters
     ----------
-    contact_x, contact_y, slope_angle, friction_angle : array_like
+    contact_x, contact_y, slope_angle, friction_angle, rest_curvature : array_like
         As in `wrench_from_contact`.
 
     Returns
     -------
     array
-        Of the broadcast shape; NaN where the contour faces away from the pivot.
+        Of the broadcast shape; NaN where the contour faces away from the pivot, and where the rod is curved away from
+        the contour so much that it lies along it at this point without any force, or never.
 
     Raises
     ------
@@ -105,8 +114,7 @@ def tangential_arclength(
     >>> tangential_arclength(0.2, 0.6, [0.1, 0.2]).round(6)
     array([1.053211, 0.976104])
     """
-    phase = np.full(np.broadcast_shapes(*map(np.shape, (contact_x, contact_y, slope_angle, friction_angle))), NONE)
-    return _states(contact_x, contact_y, slope_angle, friction_angle, 1.0, phase)[1][8]
+    return _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, 1.0, NONE)[1][8]
 
 
 def wrench_from_contact(
@@ -117,10 +125,15 @@ def wrench_from_contact(
     *,
     side: ArrayLike = 1,
     phase: ArrayLike | None = None,
+    rest_curvature: ArrayLike = 0.0,
 ) -> Wrench:
     """Base wrench of a rod that touches a contour at a given point: Step 1 for one state.
 
-    Equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form.
+    Equations 19 and 20 of Merker et al. 2018, doi 10.1155/2018/1613945, solved in closed form for a straight rod.
+
+    A rod with rest curvature may have two equilibria with the same contact: one in which the load bends it as it bends
+    a straight rod, and one in which a small load has only straightened it. The first is returned, that is continued
+    from the straight rod's, or in tangential contact from the arc that lies along the contour without force.
 
     Parameters
     ----------
@@ -134,12 +147,15 @@ def wrench_from_contact(
         +1 for a contact of a forward sweep, −1 for a contact of a backward sweep, its mirror image.
     phase : array_like of `TIP` or `TANGENTIAL`, optional
         The phase, if it is known; then only this one is computed, without a check.
+    rest_curvature : array_like
+        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
 
     Returns
     -------
     Wrench
         Arrays of the broadcast shape. The phase is `TANGENTIAL` where an arc length s1 ≤ 1 suffices, else `TIP` where
-        the point is within reach. It is `NONE`, and the rest is NaN, beyond reach and where the contour faces away.
+        the point is within reach. It is `NONE`, and the rest is NaN, beyond reach, where the contour faces away, and
+        where the continuation to the rest curvature ends because there is no equilibrium or the force is not positive.
 
     Raises
     ------
@@ -153,7 +169,7 @@ def wrench_from_contact(
     (array([1, 2], dtype=int8), array([2.901776, 2.923367]))
     """
     known = NONE if phase is None else phase
-    found, columns = _states(contact_x, contact_y, slope_angle, friction_angle, side, known)
+    found, columns = _states(contact_x, contact_y, slope_angle, friction_angle, rest_curvature, side, known)
     drive_angle, moment, force_x, force_y, arclength, tip_angle, by_slope, by_distance, tangential = columns
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
@@ -172,20 +188,47 @@ def wrench_from_contact(
 
 
 def _states(
-    x: ArrayLike, y: ArrayLike, alpha: ArrayLike, delta: ArrayLike, side: ArrayLike, phase: ArrayLike
+    x: ArrayLike,
+    y: ArrayLike,
+    alpha: ArrayLike,
+    delta: ArrayLike,
+    curvature: ArrayLike,
+    side: ArrayLike,
+    phase: ArrayLike,
 ) -> tuple[NDArray[np.int8], Floats]:
     """Phases, and columns of states, of contacts mirrored to forward ones."""
-    from tactile_bayes.mechanics.states import wrenches  # numba takes a second to load
+    from tactile_bayes.mechanics.states import arc_wrenches, wrenches  # numba takes a second to load
     from tactile_bayes.mechanics.tables import tables, workspace
 
     _refuse_friction(np.asarray(delta, dtype=float))
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
-    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, phase)
+    given = np.broadcast_arrays(sign * x, y, sign * alpha, delta, sign * curvature, phase)
     shape = given[0].shape
-    columns = np.stack([column.ravel() for column in given[:4]], axis=-1).astype(float)
-    found, out = given[4].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
-    wrenches(columns, tables(), workspace(), found, out)
+    columns = np.stack([column.ravel() for column in given[:5]], axis=-1).astype(float)
+    found, out = given[5].astype(np.int8).ravel(), np.empty((columns.shape[0], 9))
+    _solve(wrenches, arc_wrenches, columns, (tables(), workspace()), (found, out))
     return found.reshape(shape), np.ascontiguousarray(out.T).reshape(9, *shape)
+
+
+def _solve(
+    straight: Callable[..., None],
+    arcs: Callable[..., None],
+    columns: Floats,
+    known: tuple[object, ...],
+    results: tuple[NDArray[Any], ...],
+) -> None:
+    """Write results for rows of columns, of which the last is the rest curvature; arcs take another function, which is
+    compiled when there are some.
+    """
+    curved = columns[:, -1] != 0.0
+    for function, rows in ((straight, ~curved), (arcs, curved)):
+        if rows.all() and rows.size:
+            function(columns, *known, *results)
+        elif rows.any():
+            parts = [result[rows] for result in results]
+            function(columns[rows], *known, *parts)
+            for result, part in zip(results, parts, strict=True):
+                result[rows] = part
 
 
 def contact_from_wrench(
@@ -196,11 +239,13 @@ def contact_from_wrench(
     friction_angle: ArrayLike = 0.0,
     *,
     side: ArrayLike | None = None,
+    rest_curvature: ArrayLike = 0.0,
 ) -> Contact:
     """Contact that follows from a base wrench: Step 2 for one state, without integration or root search.
 
     Equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945, gives the direction of the force. Slope and curvature
-    at the pivot then determine the elastica, and the contact is its first point of zero curvature (equation 27).
+    at the pivot then determine the elastica, and the contact is its first point of zero curvature (equation 27), or of
+    the rest curvature.
 
     Parameters
     ----------
@@ -209,12 +254,16 @@ def contact_from_wrench(
     friction_angle : array_like
         Friction angle δ = arctan μ, at most 0.7 [rad].
     side : array_like of +1 or −1, optional
-        +1 for contacts of a forward sweep, −1 for those of a backward one; by default the sign of the holding moment.
+        +1 for contacts of a forward sweep, −1 for those of a backward one; by default the sign of the holding moment,
+        which the force can only have reversed on a rod with a large rest curvature.
+    rest_curvature : array_like
+        Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
 
     Returns
     -------
     Contact
-        Arrays of the broadcast shape; NaN where there is no force or the curvature has no zero (`modulus` ≥ 1).
+        Arrays of the broadcast shape; NaN where there is no force or no point without bending moment (in a straight
+        rod, `modulus` ≥ 1).
 
     Raises
     ------
@@ -233,29 +282,32 @@ def contact_from_wrench(
         side = np.where(moment < 0.0, -1.0, 1.0)
     delta = np.asarray(friction_angle, dtype=float)
     _refuse_friction(delta)
-    from tactile_bayes.mechanics.states import contacts  # numba takes a second to load
+    from tactile_bayes.mechanics.states import arc_contacts, contacts  # numba takes a second to load
 
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
     phi0 = np.where(mirrored, np.pi - np.asarray(drive_angle), drive_angle)
-    given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta)
+    given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta, sign * rest_curvature)
     out = np.empty((given[0].size, 6))
-    contacts(np.stack([column.ravel() for column in given], axis=-1).astype(float), out)
+    columns = np.stack([column.ravel() for column in given], axis=-1).astype(float)
+    _solve(contacts, arc_contacts, columns, (), (out,))
     x, y, slope_angle, arclength, tip_angle, modulus = np.ascontiguousarray(out.T).reshape(6, *given[0].shape)
     tip_angle = np.where(mirrored, np.pi - tip_angle, tip_angle)
     return Contact(sign * x, y, sign * slope_angle, arclength, tip_angle, modulus)
 
 
-def largest_curvature(wrench: Wrench) -> Floats:
-    """Largest curvature of the rod between pivot and contact [1/L].
+def largest_curvature(wrench: Wrench, rest_curvature: ArrayLike = 0.0) -> Floats:
+    """Largest change of the rod's curvature from its rest curvature, between pivot and contact [1/L].
 
-    It is the largest bending moment in EI/L. Along the rod κ²/2 = f (sin ψ − sin ψ1), which is greatest where ψ = π/2
-    if the rod passes that direction, else at the pivot, where it is the holding moment.
+    It is the largest bending moment in EI/L. Along the rod κ²/2 − f sin ψ is constant, so that κ is least where the rod
+    lies across the force, if it does so, else at the pivot, where the moment is the holding moment.
 
     Parameters
     ----------
     wrench : Wrench
         Base wrenches, of any shape.
+    rest_curvature : array_like
+        As in `wrench_from_contact`.
 
     Returns
     -------
@@ -270,6 +322,12 @@ def largest_curvature(wrench: Wrench) -> Floats:
     """
     cos, sin = np.cos(wrench.drive_angle), np.sin(wrench.drive_angle)
     along, across = wrench.force_x * cos + wrench.force_y * sin, wrench.force_y * cos - wrench.force_x * sin
-    inflated = 2.0 * (np.hypot(wrench.force_x, wrench.force_y) - along)
-    bent_round = np.where(wrench.holding_moment < 0.0, -across, across) < 0.0
-    return np.sqrt(wrench.holding_moment**2 + np.where(bent_round, inflated, 0.0))
+    sign, force = np.where(wrench.holding_moment < 0.0, -1.0, 1.0), np.hypot(wrench.force_x, wrench.force_y)
+    moment, rest = sign * wrench.holding_moment, sign * np.asarray(rest_curvature)
+    at_pivot = rest - moment
+    # The rod lies across the force in its sense or, if its curvature keeps the other sign, in the opposite one.
+    squared = at_pivot**2 - 2.0 * (force + along)
+    inflated = rest + np.sqrt(at_pivot**2 + 2.0 * (force - along))
+    with np.errstate(invalid="ignore"):
+        inflated = np.where((at_pivot > 0.0) & (squared > 0.0), rest - np.sqrt(squared), inflated)
+    return np.where(sign * across < 0.0, np.maximum(moment, inflated), moment)

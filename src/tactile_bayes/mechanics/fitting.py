@@ -96,18 +96,18 @@ class RawFit(NamedTuple):
     standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,)."""
 
 
-def raw_contacts(reading: Reading, delta: Floats) -> RawFit:
-    """Contacts of n samples by Step 2, with friction angles of shape (n,)."""
+def raw_contacts(reading: Reading, delta: Floats, rest_curvature: Floats | float = 0.0) -> RawFit:
+    """Contacts of n samples by Step 2, with friction angles and rest curvatures of shape (n,)."""
     from tactile_bayes.mechanics.single_sample import raw_fits  # numba takes a second to load
 
     count = delta.size
     fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
     workspace = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
-    raw_fits(plain(reading), np.array(delta), fit, *workspace, *contact_workspace())
+    raw_fits(plain(reading), np.array(delta), _each(rest_curvature, count), fit, *workspace, contact_workspace())
     return fit
 
 
-def fit_contacts(reading: Reading, friction_angle: Floats) -> ContactFit:
+def fit_contacts(reading: Reading, friction_angle: Floats, rest_curvature: Floats | float = 0.0) -> ContactFit:
     """Find the most likely contacts of samples.
 
     Parameters
@@ -116,17 +116,19 @@ def fit_contacts(reading: Reading, friction_angle: Floats) -> ContactFit:
         n samples.
     friction_angle : ndarray, shape (n,)
         Friction angle δ = arctan μ [rad].
+    rest_curvature : ndarray, shape (n,), or float
+        Curvature of the unloaded rod, mirrored like the sample [1/L].
     """
     size = reading.drive_angle.size
-    blocks = []
+    curvature, blocks = _each(rest_curvature, size), []
     for begin in range(0, max(size, 1), _BLOCK):
         part = slice(begin, begin + _BLOCK)
-        blocks.append(_fit_block(reading.take(part), friction_angle[part]))
+        blocks.append(_fit_block(reading.take(part), friction_angle[part], curvature[part]))
     return ContactFit(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
 
 
-def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
-    target = _Target(reading, delta)
+def _fit_block(reading: Reading, delta: Floats, curvature: Floats) -> ContactFit:
+    target = _Target(reading, delta, curvature)
     tip, lying = _Descent(target, TIP), _Descent(target, TANGENTIAL)
     everyone = np.arange(delta.size)
     for descent in (tip, lying):
@@ -149,7 +151,7 @@ def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
         clearance = np.where(ends, coordinates[:, PSI1] + delta, 1.0 - coordinates[:, ARCLENGTH]) / spread
     where = np.flatnonzero(at_edge)
     if where.size:
-        edge = _Descent(_Target(reading.take(where), delta[where]), None)
+        edge = _Descent(_Target(reading.take(where), delta[where], curvature[where]), None)
         edge.go(np.arange(where.size), _SETTLED, _MOST_STEPS)
         coordinates[where], misfit[where], clearance[where] = edge.z, edge.misfit, 0.0
     phase = np.where(ends, np.int8(TIP), np.int8(TANGENTIAL))
@@ -158,7 +160,7 @@ def _fit_block(reading: Reading, delta: Floats) -> ContactFit:
     return ContactFit(coordinates, covariance, misfit, phase, at_edge, clearance, rival)
 
 
-def fit_sheet(reading: Reading, delta: Floats, phase: int | None) -> SheetFit:
+def fit_sheet(reading: Reading, delta: Floats, phase: int | None, rest_curvature: Floats | float = 0.0) -> SheetFit:
     """Find the best contact of one phase, beyond its edge too, or on the edge (None).
 
     Parameters
@@ -168,8 +170,10 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None) -> SheetFit:
     delta : ndarray, shape (n,)
         Friction angle δ = arctan μ [rad].
     phase : TIP, TANGENTIAL or None
+    rest_curvature : ndarray, shape (n,), or float
+        As in `fit_contacts`.
     """
-    descent = _Descent(_Target(reading, delta), phase)
+    descent = _Descent(_Target(reading, delta, _each(rest_curvature, delta.size)), phase)
     descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
     return SheetFit(descent.z, descent.covariance(), descent.misfit)
 
@@ -196,7 +200,7 @@ class _Descent:
         if phase is None:
             coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
         else:
-            arclength, psi1 = _raw_start(reading, delta)
+            arclength, psi1 = _raw_start(reading, delta, self._target.curvature)
             if phase == TIP:
                 spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
                 coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
@@ -225,10 +229,8 @@ class _Descent:
         from tactile_bayes.mechanics.single_sample import Workspace, descents  # numba takes a second to load
 
         count, target = len(self._free), self._target
-        workspace = Workspace(
-            np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), *contact_workspace()
-        )
-        known = target.reading, target.whitening, who, np.array(self._free)
+        workspace = Workspace(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), contact_workspace())
+        known = target.reading, target.curvature, target.whitening, who, np.array(self._free)
         descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, workspace)
 
     def misfit_before(self, delta: Floats) -> Floats:
@@ -260,9 +262,10 @@ def _inverse(matrix: Floats) -> Floats:
 class _Target:
     """Samples, and the weights of deviations from them."""
 
-    def __init__(self, reading: Reading, delta: Floats) -> None:
+    def __init__(self, reading: Reading, delta: Floats, curvature: Floats) -> None:
         self.reading = plain(reading)
         self.delta = delta
+        self.curvature = curvature
         self.is_exact = not np.any(reading.angle_deviation)
         self.whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
 
@@ -272,9 +275,14 @@ def plain(reading: Reading) -> Reading:
     return Reading(*(np.array(column, dtype=float, order="C") for column in reading))
 
 
-def _raw_start(reading: Reading, delta: Floats) -> tuple[Floats, Floats]:
+def _each(values: Floats | float, count: int) -> Floats:
+    return np.array(np.broadcast_to(values, (count,)), dtype=float)
+
+
+def _raw_start(reading: Reading, delta: Floats, curvature: Floats) -> tuple[Floats, Floats]:
     """Arc length and ψ1 by raw Step 2; where the moment has the wrong sign, with a small one of the right sign."""
     moment, force_x, force_y = reading.loads.T
     least = _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
-    raw = contact_from_wrench(reading.drive_angle, np.maximum(moment, least), force_x, force_y, delta, side=1.0)
+    wrench = reading.drive_angle, np.maximum(moment, least), force_x, force_y
+    raw = contact_from_wrench(*wrench, delta, side=1.0, rest_curvature=curvature)
     return raw.contact_arclength, raw.tip_angle - raw.slope_angle - delta

@@ -25,10 +25,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tactile_bayes.mechanics.compiler import compiled
+from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.jacobi import Jacobi, jacobi, jacobi_and_slopes
 
-__all__ = ["Pose", "pose", "pose_and_slopes"]
+__all__ = ["Pose", "by_arclength", "pose", "pose_and_slopes", "write_poses"]
 
 
 class Pose(NamedTuple):
@@ -111,9 +112,14 @@ def pose_and_slopes(
     by_force = _by_load(start, at, by_x, by_y, parts, arclength)
     if tip:
         return here, _by_psi1(start, at, by_x, parts, arclength), by_force
-    # A longer rod goes on beyond the pivot, straight ahead.
-    psi0 = psi1 + turn
-    return here, Pose(math.cos(psi0), math.sin(psi0), force * here.u - curvature), by_force
+    return here, by_arclength(psi1, force, curvature, here), by_force
+
+
+@compiled
+def by_arclength(psi1: float, force: float, curvature: float, here: Pose) -> Pose:
+    """Derivative of a pose by the arc length: a longer rod goes on beyond the pivot, straight ahead."""
+    psi0 = psi1 + here.turn
+    return Pose(math.cos(psi0), math.sin(psi0), force * here.u - curvature)
 
 
 @compiled
@@ -175,3 +181,11 @@ def _scaled(
     cos_by = (cos_by + parts.cos_turn * shrink) * parts.inverse
     turn_by = -2.0 * (parts.cos_turn * sin_by - parts.sin_turn * cos_by)
     return Pose(scale * arclength * u_by, scale * arclength * v_by, scale * turn_by)
+
+
+@cached
+def write_poses(columns: Floats, out: Floats) -> None:
+    """Write u and v, shape (2, n), for rows of ψ1, arc length, force and rest curvature, shape (n, 4)."""
+    for i in range(columns.shape[0]):
+        here = pose(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3])
+        out[0, i], out[1, i] = here.u, here.v

@@ -9,7 +9,6 @@ angle δ. With ψ = φ − β the rod obeys κ' = f cos ψ and κ(s1) = 0 (equat
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from tactile_bayes.mechanics.arc import (
     chord_deficit_rate,
     chord_direction_rate,
 )
+from tactile_bayes.mechanics.arc_states import NOWHERE, Found, Start, State, arc_contact, arc_state, unloaded_arc
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
@@ -37,35 +37,12 @@ from tactile_bayes.mechanics.tables import (
     series,
 )
 
-__all__ = [
-    "Found",
-    "State",
-    "contact",
-    "contacts",
-    "wrenches",
-]
+__all__ = ["arc_contacts", "arc_wrenches", "contact", "contacts", "wrenches"]
 
 _BEYOND = 1e-12
 """Angle by which rounding may turn a chord beyond the line of force through the pivot [rad]."""
 
 _NO_ARC = Arc(math.nan, math.nan, math.nan, math.nan)
-
-
-class State(NamedTuple):
-    """Base wrench of a contact and its derivatives; NaN where the rod cannot make the contact."""
-
-    drive_angle: float
-    holding_moment: float
-    force_x: float
-    force_y: float
-    arclength: float
-    tip_angle: float
-    by_slope: float
-    by_distance: float
-    """As in `Wrench`."""
-
-
-_NOWHERE = State(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled
@@ -106,7 +83,7 @@ def _tip_state(x: float, y: float, alpha: float, delta: float, known: Tables, wo
     larger, smaller = max(abs(x), abs(y)), min(abs(x), abs(y))
     deficit2 = (1.0 - larger) * (1.0 + larger) - smaller * smaller
     if not deficit2 >= 0.0:
-        return _NOWHERE
+        return NOWHERE
     beta = alpha + delta
     sin, cos = math.sin(beta), math.cos(beta)
     u, v = x * cos + y * sin, y * cos - x * sin
@@ -163,21 +140,34 @@ def wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArra
             phase[i] = NONE if math.isnan(ending.arclength) else TIP
 
 
+@cached
+def arc_wrenches(columns: Floats, known: Tables, workspace: Workspace, phase: NDArray[np.int8], out: Floats) -> None:
+    """Write states of arcs as `wrenches` does; the rest curvature is the last column."""
+    for i in range(columns.shape[0]):
+        x, y, alpha, delta, curvature = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4]
+        sin, cos = math.sin(alpha + delta), math.cos(alpha + delta)
+        u, v = x * cos + y * sin, y * cos - x * sin
+        out[i] = math.nan
+        if phase[i] != TIP:
+            lying = arc_state(x, y, alpha, delta, curvature, False, unloaded_arc(u, v, delta))
+            out[i, 8] = lying.arclength
+            if phase[i] == TANGENTIAL or lying.arclength <= 1.0:
+                _store(lying, out[i])
+                phase[i] = TANGENTIAL
+                continue
+        straight = _tip_state(x, y, alpha, delta, known, workspace)
+        psi1 = straight.tip_angle - alpha - delta
+        start = Start(0.0, psi1, math.hypot(straight.force_x, straight.force_y))
+        ending = arc_state(x, y, alpha, delta, curvature, True, start)
+        if phase[i] == TIP or ending.tip_angle >= alpha:
+            _store(ending, out[i])
+        phase[i] = NONE if math.isnan(out[i, 4]) else TIP
+
+
 @compiled
 def _store(state: State, out: Floats) -> None:
     for k in range(8):
         out[k] = state[k]
-
-
-class Found(NamedTuple):
-    """Contact that follows from a base wrench, mirrored to a forward one; NaN where there is none. See `Contact`."""
-
-    x: float
-    y: float
-    slope_angle: float
-    arclength: float
-    tip_angle: float
-    modulus: float
 
 
 @compiled
@@ -224,5 +214,15 @@ def contacts(columns: Floats, out: Floats) -> None:
     """
     for i in range(columns.shape[0]):
         found = contact(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
+        for k in range(6):
+            out[i, k] = found[k]
+
+
+@cached
+def arc_contacts(columns: Floats, out: Floats) -> None:
+    """Write contacts of arcs as `contacts` does; the rest curvature is the last column."""
+    for i in range(columns.shape[0]):
+        wrench = columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3]
+        found = arc_contact(*wrench, columns[i, 4], columns[i, 5])
         for k in range(6):
             out[i, k] = found[k]

@@ -60,6 +60,8 @@ class _Forward(NamedTuple):
     """Derivatives of the loads by the drive angle, for a load cell that turns with the drive, shape (n, 3)."""
     covariance: Floats
     """Covariance of the readings, shape (n, 3, 3)."""
+    rest_curvature: Floats
+    """Curvature of the unloaded rod in the sweep frame [1/L], shape (n,)."""
 
     def take(self, where: Index) -> _Forward:
         """Return some of the contacts."""
@@ -188,13 +190,14 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
         axis=-1,
     )
     leaning = side[:, None] * signs * leaning
-    whole = _Forward(side, coordinates, tip, slope, from_readings, leaning, cell.covariance(in_cell))
+    curvature = side * rod.rest_curvature * rod.length
+    whole = _Forward(side, coordinates, tip, slope, from_readings, leaning, cell.covariance(in_cell), curvature)
     return whole.take(chosen)
 
 
 def _raw(contacts: _Forward) -> Floats:
     """Return derivatives of (x, y, slope angle, arc length) by the four readings, of raw Step 2, shape (n, 4, 4)."""
-    by_angle_and_loads = place_by_wrench(contacts.coordinates)
+    by_angle_and_loads = place_by_wrench(contacts.coordinates, contacts.rest_curvature)
     by_loads = by_angle_and_loads[:, :, 1:]
     by_angle = by_angle_and_loads[:, :, :1] + by_loads @ contacts.leaning[:, :, None]
     return np.concatenate([by_loads @ contacts.from_readings, by_angle * contacts.side[:, None, None]], axis=2)
@@ -202,7 +205,7 @@ def _raw(contacts: _Forward) -> Floats:
 
 def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Floats:
     """Return the same derivatives of the most likely contact on the surface of its phase, shape (n, 4, 4)."""
-    _, slopes = contact_states_and_slopes(contacts.coordinates, delta)
+    _, slopes = contact_states_and_slopes(contacts.coordinates, delta, contacts.rest_curvature)
     from_readings = contacts.from_readings
     covariance = from_readings @ contacts.covariance @ np.swapaxes(from_readings, 1, 2)
     whiten = np.linalg.inv(np.linalg.cholesky(covariance))

@@ -53,8 +53,9 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)
     if where.size:
         reading = samples.reading.take(where)
-        fit = fit_contacts(reading, delta[where])
-        rod, slopes = contact_states_and_slopes(fit.coordinates, delta[where])
+        given = delta[where], samples.rest_curvature[where]
+        fit = fit_contacts(reading, *given)
+        rod, slopes = contact_states_and_slopes(fit.coordinates, *given)
         found = np.isfinite(fit.misfit) & np.isfinite(rod.place).all(axis=0)
         by = slopes.place
         with np.errstate(over="ignore", invalid="ignore"):
@@ -68,7 +69,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
             # Near the limits: the line of force through the pivot, or a vertical contour.
             bent |= rod.loads[0] < np.sqrt(reading.covariance[:, 0, 0])
             bent |= np.abs(rod.place[2]) > 0.49 * np.pi
-        bent |= bends_too_much(place[where], covariance[where], _aside(fit, delta[where]))
+        bent |= bends_too_much(place[where], covariance[where], _aside(fit, *given))
         kinds = (~found, fit.misfit > _MISFIT, fit.clearance < _CLEARANCE, fit.rival < _RIVAL, bent)
         status[where] = np.select(kinds, (NO_ZERO, NO_FIT, AT_EDGE, EITHER_PHASE, NONLINEAR), OK)
     return Estimate(place, covariance, phase, status, misfit, distance)
@@ -94,7 +95,7 @@ def refuse_without_noise(samples: Samples) -> None:
         )
 
 
-def _aside(fit: ContactFit, delta: Floats) -> list[tuple[Floats, Floats]]:
+def _aside(fit: ContactFit, delta: Floats, curvature: Floats) -> list[tuple[Floats, Floats]]:
     """Contacts one standard deviation aside, along the axes of the covariance."""
     scale = np.sqrt(np.diagonal(fit.covariance, axis1=1, axis2=2))
     scale = np.where((scale > 0.0) & np.isfinite(scale), scale, 1.0)
@@ -105,6 +106,7 @@ def _aside(fit: ContactFit, delta: Floats) -> list[tuple[Floats, Floats]]:
     for k in range(4):
         step = scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
         if np.any(variances[:, k] > 1e-9):
-            more, less = (contact_states(fit.coordinates + sign * step, delta).place.T for sign in (1.0, -1.0))
+            both = fit.coordinates + step, fit.coordinates - step
+            more, less = (contact_states(aside, delta, curvature).place.T for aside in both)
             pairs.append((more, less))
     return pairs

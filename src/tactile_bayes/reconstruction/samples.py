@@ -34,6 +34,8 @@ class Samples(NamedTuple):
     """Readings corrected for known errors, with forces along the axes of the laboratory."""
     side: Floats
     """+1, or −1 where a sample is mirrored, shape (n,)."""
+    rest_curvature: Floats
+    """Curvature of the unloaded rod, mirrored with the sample, shape (n,)."""
     loaded: Flags
     cut_off: Flags
     """True if a channel is at the end of its range."""
@@ -45,6 +47,7 @@ class Samples(NamedTuple):
         return self._replace(
             reading=self.reading.take(where),
             side=self.side[where],
+            rest_curvature=self.rest_curvature[where],
             loaded=self.loaded[where],
             cut_off=self.cut_off[where],
         )
@@ -114,7 +117,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         side[:, None] * signs * leaning,
         np.broadcast_to(covariance, (angle.size, 3, 3)),
     )
-    return Samples(rod, reading, side, loaded, cut_off, has_noise)
+    return Samples(rod, reading, side, side * rod.rest_curvature * rod.length, loaded, cut_off, has_noise)
 
 
 def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> Flags:

@@ -14,7 +14,6 @@ from tactile_bayes.checks import check_choice, check_number, check_optional, ref
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.contact_coordinates import PLACE
 from tactile_bayes.mechanics.elastica import MAX_FRICTION_ANGLE
-from tactile_bayes.mechanics.fitting import Reading
 from tactile_bayes.mechanics.phases import PHASE_NAMES, TANGENTIAL
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction.constrained import are_weighed, constrained_estimate
@@ -97,8 +96,9 @@ def reconstruct(
         within 3 standard deviations; the probability is NaN if samples share errors. A value near 0 means that rod,
         friction or frame are wrong or the noise is larger than stated; near 1, that it is smaller. In tangential
         contact the force along the rod at the pivot follows from the moment, fAx cos φ0 + fAy sin φ0 = m0²/2 (− f sin δ
-        with the friction angle δ). The weighted mean of the difference over such samples, in standard errors, is
-        axial_score: it is standard normal if the model holds, and far below zero with unstated friction.
+        with the friction angle δ, − κ0 m0 with the rest curvature κ0). The weighted mean of the difference over such
+        samples, in standard errors, is axial_score: it is standard normal if the model holds, and far below zero with
+        unstated friction.
 
         status is one of
 
@@ -281,21 +281,23 @@ def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float
     shared = cell.drift is not None or any(cell.bias_uncertainty)
     probability = np.nan if shared or not count else float(chdtrc(count, total))
     lying = np.flatnonzero(clear & (estimate.phase == TANGENTIAL))
-    score = np.nan if shared or not lying.size else _axial_score(samples.take(lying).reading, friction)
+    score = np.nan if shared or not lying.size else _axial_score(samples.take(lying), friction)
     return {"misfit_sum": total, "misfit_samples": count, "misfit_probability": probability, "axial_score": score}
 
 
-def _axial_score(reading: Reading, friction: float) -> float:
+def _axial_score(samples: Samples, friction: float) -> float:
     """Mean difference, over tangential contacts, of the force along the rod at the pivot and its value from the moment,
     over its standard error.
     """
+    reading, rest = samples.reading, samples.rest_curvature
     moment, force_x, force_y = reading.loads.T
     cos, sin = np.cos(reading.drive_angle), np.sin(reading.drive_angle)
     force = np.hypot(force_x, force_y)
     drag = friction / np.hypot(1.0, friction)
     moment_variance = reading.covariance[:, 0, 0]
     surplus = force_x * cos + force_y * sin + drag * force - 0.5 * (moment**2 - moment_variance)
-    slopes = np.stack([-moment, cos + drag * force_x / force, sin + drag * force_y / force], axis=1)
+    surplus += rest * moment
+    slopes = np.stack([rest - moment, cos + drag * force_x / force, sin + drag * force_y / force], axis=1)
     by_angle = force_y * cos - force_x * sin + np.sum(slopes * reading.leaning, axis=1)
     variance = np.einsum("ni,nij,nj->n", slopes, reading.covariance, slopes)
     variance += (by_angle * reading.angle_deviation) ** 2

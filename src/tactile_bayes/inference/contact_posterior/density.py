@@ -12,7 +12,14 @@ from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import shown
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.load_cell import LoneSamples
-from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_states
+from tactile_bayes.mechanics.contact_coordinates import (
+    ARCLENGTH,
+    DRIVE_ANGLE,
+    FORCE,
+    PSI1,
+    ContactStates,
+    contact_states,
+)
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
@@ -92,7 +99,7 @@ class ContactDensity:
         shape = coordinates.shape[:-1]
         flat = coordinates.reshape(-1, 4)
         tip = phase.reshape(-1) == TIP
-        rod = contact_states(flat, self.delta)
+        rod = self._states(coordinates)
         reading, side = self.samples.reading, self.samples.side
         moment, force_x, force_y = rod.loads.reshape(3, *shape)
         loads = np.stack([side * moment, side * force_x, force_y], axis=-1)
@@ -104,7 +111,7 @@ class ContactDensity:
         with np.errstate(divide="ignore", invalid="ignore"):
             volume = np.log(np.where(tip, rod.volume_tip, rod.volume_tangential))
             possible = (flat[:, PSI1] >= -self.delta) & (arclength <= 1.0) & (np.abs(alpha) < 0.5 * np.pi)
-            possible &= (rod.loads[0] >= 0.0) & np.isfinite(volume)
+            possible &= np.isfinite(volume)
             density = volume.reshape(shape) + self._readings.log_density(loads) + self._log_prior(rod.place, shape)
             if self.has_free_angle:
                 off = (angle - reading.drive_angle) / reading.angle_deviation
@@ -114,8 +121,13 @@ class ContactDensity:
 
     def contacts(self, coordinates: Floats) -> Floats:
         """Return contacts from coordinates, shape (..., n, 4), in the form of `to_lab_frame`."""
-        contact = contact_states(coordinates.reshape(-1, 4), self.delta).place
+        contact = self._states(coordinates).place
         return self.to_lab_frame(contact.reshape(4, *coordinates.shape[:-1]))
+
+    def _states(self, coordinates: Floats) -> ContactStates:
+        """Return contacts from coordinates, shape (..., n, 4), one after the other."""
+        curvature = np.broadcast_to(self.samples.rest_curvature, coordinates.shape[:-1])
+        return contact_states(coordinates.reshape(-1, 4), self.delta, curvature.ravel())
 
     def to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""
