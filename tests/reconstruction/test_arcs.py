@@ -72,9 +72,9 @@ def test_the_rest_curvature_is_mirrored_with_its_sample(with_rest_curvature):
     made = swept(0.4, "SI")
     with_rest_curvature(made.rod)
     found = samples_of(made.record, LoadCell())
-    np.testing.assert_allclose(found.rest_curvature, 0.4 * found.side, rtol=1e-15)
+    np.testing.assert_allclose(found.rods.curvature, 0.4 * found.side, rtol=1e-15)
     some = found.take(np.array([0, found.side.size - 1]))
-    np.testing.assert_allclose(some.rest_curvature, [0.4, -0.4], rtol=1e-15)
+    np.testing.assert_allclose(some.rods.curvature, [0.4, -0.4], rtol=1e-15)
 
 
 @pytest.mark.parametrize("units", UNITS)

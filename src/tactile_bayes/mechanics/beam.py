@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.compiler import compiled
-from tactile_bayes.mechanics.pose import Pose, pose, pose_and_slopes
+from tactile_bayes.mechanics.pose import Pose, by_arclength, pose, pose_and_slopes
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.profile_pose import part_along, pose_along_and_slopes
 from tactile_bayes.mechanics.profile_shape import beyond_along, chord_along, largest_bending_along, rest_along
-from tactile_bayes.mechanics.taylor import FORWARD, cell_at, rest_curvature_at
+from tactile_bayes.mechanics.taylor import FORWARD, cell_at, rest_curvature_at, workspace
 
 __all__ = [
     "Beam",
@@ -28,7 +28,10 @@ __all__ = [
     "free_end",
     "loaded_part",
     "mirrored_beam",
+    "mirrored_by",
     "rest_curvature",
+    "varied_of",
+    "whole_pose",
 ]
 
 
@@ -65,6 +68,20 @@ class Chord(NamedTuple):
     """Angle from the chord to the rod at the point [rad]."""
     rate: float
     """Derivative of `at_point` by the length of the chord."""
+
+
+def varied_of(profile: Profile | None) -> Varied | None:
+    """Profile with a workspace, if there is one."""
+    return None if profile is None else Varied(profile, workspace())
+
+
+@compiled
+def mirrored_by(curvature: float, varied: Varied | None) -> Beam:
+    """Rod of a contact, as in `Rods`."""
+    if varied is None:
+        return Beam(curvature, 1.0, varied)
+    edges, bent, rigidity, taper, bend, _ = varied.profile
+    return Beam(0.0, 1.0, Varied(Profile(edges, bent, rigidity, taper, bend, curvature), varied.work))
 
 
 @compiled
@@ -109,6 +126,22 @@ def _pose(
         return pose_and_slopes(psi1, arclength, force, curvature, tip)
     here, by_psi1, by_arclength, by_force = pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
     return here, by_psi1 if tip else by_arclength, by_force
+
+
+@compiled
+def whole_pose(beam: Beam, psi1: float, arclength: float, force: float) -> tuple[Pose, Pose, Pose, Pose]:
+    """Pose, and its derivatives by ψ1, by the arc length and by the force."""
+    return _whole_pose(beam.varied, beam.curvature, psi1, arclength, force)
+
+
+@compiled
+def _whole_pose(
+    varied: Varied | None, curvature: float, psi1: float, arclength: float, force: float
+) -> tuple[Pose, Pose, Pose, Pose]:
+    if varied is None:
+        here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, curvature, True)
+        return here, by_psi1, by_arclength(psi1, force, curvature, here), by_force
+    return pose_along_and_slopes(varied.profile, psi1, arclength, force, varied.work)
 
 
 @compiled

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.elastica import contact_from_wrench
+from tactile_bayes.mechanics.profile import Profile, Rods
 
 __all__ = ["rod_shape"]
 
@@ -26,6 +27,7 @@ def rod_shape(
     points: int = 101,
     side: ArrayLike | None = None,
     rest_curvature: ArrayLike = 0.0,
+    rods: Rods | None = None,
 ) -> tuple[Floats, Floats]:
     """Centreline of the rod from pivot to tip: x' = cos φ, y' = sin φ, φ'' = f cos(φ − β) (equation 27).
 
@@ -42,6 +44,8 @@ def rod_shape(
         +1 for contacts of a forward sweep, −1 for those of a backward one; by default the sign of the holding moment.
     rest_curvature : array_like
         Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
+    rods : Rods, optional
+        Rods in place of arcs, mirrored to those of forward contacts.
 
     Returns
     -------
@@ -77,8 +81,13 @@ def rod_shape(
     sign = np.where(sign < 0.0, -1.0, 1.0)
     phi0 = np.where(sign < 0.0, np.pi - phi0, phi0)
     moment, fx, curvature = sign * moment, sign * fx, sign * curvature
+    if rods is not None:
+        curvature = np.broadcast_to(rods.curvature, shape).ravel()
 
-    s = np.linspace(0.0, 1.0, points)
+    s, full = np.linspace(0.0, 1.0, points), (*shape, points)
+    if rods is not None and rods.profile is not None:
+        x, y = _along(np.stack([phi0, moment, fx, fy, curvature], axis=-1), rods.profile, s)
+        return (sign[:, None] * x).reshape(full), y.reshape(full)
     force = np.hypot(fx, fy)
     x, y = _unloaded(phi0[:, None], s, curvature[:, None])
     loaded = (force > 0.0) & np.isfinite(moment)
@@ -102,8 +111,18 @@ def rod_shape(
     beyond_x, beyond_y = _unloaded(tip_angle, np.maximum(s - s1, 0.0), curvature)
     x[bent] = u * cos - v * sin + beyond_x
     y[bent] = u * sin + v * cos + beyond_y
-    full = (*shape, points)
     return (sign[:, None] * x).reshape(full), y.reshape(full)
+
+
+def _along(wrenches: Floats, profile: Profile, s: Floats) -> tuple[Floats, Floats]:
+    """Points of a rod that varies along its length, from wrenches mirrored to forward ones and the side."""
+    from tactile_bayes.mechanics.beam import Varied  # numba takes a second to load
+    from tactile_bayes.mechanics.states import profile_shapes
+    from tactile_bayes.mechanics.taylor import workspace
+
+    x, y = np.empty((2, len(wrenches), s.size))
+    profile_shapes(wrenches, Varied(profile, workspace()), s, x, y)
+    return x, y
 
 
 def _unloaded(angle: Floats, arclength: Floats, curvature: Floats) -> tuple[Floats, Floats]:

@@ -14,8 +14,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tactile_bayes.arrays import Floats
+from tactile_bayes.mechanics.profile import Rods, rods_of
 
 __all__ = [
     "ARCLENGTH",
@@ -61,7 +63,7 @@ class ContactStateSlopes(NamedTuple):
 
 
 def contact_states(
-    coordinates: Floats, friction_angle: Floats | float = 0.0, rest_curvature: Floats | float = 0.0
+    coordinates: Floats, friction_angle: Floats | float = 0.0, rods: Rods | ArrayLike = 0.0
 ) -> ContactStates:
     """Base wrench and place of contacts with given coordinates.
 
@@ -71,8 +73,8 @@ def contact_states(
         Contact force f > 0 [EI/L²], ψ1 ∈ (−π/2, π/2) [rad], arc length s1 > 0 [L], and slope φ0 at the pivot [rad].
     friction_angle : ndarray, shape (n,), or float
         Friction angle δ = arctan μ [rad].
-    rest_curvature : ndarray, shape (n,), or float
-        Curvature κ0 of the unloaded rod, mirrored like the contact [1/L].
+    rods : Rods or array_like, shape (n,)
+        Rods, or the rest curvatures κ0 of arcs, mirrored like the contacts [1/L].
 
     Examples
     --------
@@ -80,27 +82,31 @@ def contact_states(
     >>> rod.place.round(4).ravel()
     array([0.1457, 0.9536, 0.8156, 1.    ])
     """
-    return _contact_states(coordinates, friction_angle, rest_curvature, 0)[0]
+    return _contact_states(coordinates, friction_angle, rods, 0)[0]
 
 
 def contact_states_and_slopes(
-    coordinates: Floats, friction_angle: Floats | float = 0.0, rest_curvature: Floats | float = 0.0
+    coordinates: Floats, friction_angle: Floats | float = 0.0, rods: Rods | ArrayLike = 0.0
 ) -> tuple[ContactStates, ContactStateSlopes]:
     """Contacts with given coordinates, and their derivatives by the coordinates; see `contact_states`."""
-    return _contact_states(coordinates, friction_angle, rest_curvature, len(coordinates))
+    return _contact_states(coordinates, friction_angle, rods, len(coordinates))
 
 
 def _contact_states(
-    coordinates: Floats, friction_angle: Floats | float, rest_curvature: Floats | float, slopes: int
+    coordinates: Floats, friction_angle: Floats | float, rods: Rods | ArrayLike, slopes: int
 ) -> tuple[ContactStates, ContactStateSlopes]:
-    from tactile_bayes.mechanics.contact_map import write_contact_states  # numba takes a second to load
+    from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
+    from tactile_bayes.mechanics.contact_map import write_contact_states
 
     count = len(coordinates)
     coordinates = np.ascontiguousarray(coordinates, dtype=float)
-    delta, curvature = (np.array(np.broadcast_to(a, (count,)), dtype=float) for a in (friction_angle, rest_curvature))
+    delta = np.array(np.broadcast_to(friction_angle, (count,)), dtype=float)
+    curvature, profile = rods_of(rods, count)
     loads, place, volumes = np.empty((3, count)), np.empty((4, count)), np.empty((2, count))
     by = ContactStateSlopes(np.empty((slopes, 3, 4)), np.empty((slopes, 4, 4)))
-    write_contact_states(coordinates, delta, curvature, loads, place, volumes, *by, contact_workspace())
+    write_contact_states(
+        coordinates, delta, curvature, varied_of(profile), loads, place, volumes, *by, contact_workspace()
+    )
     return ContactStates(loads, place, *volumes), by
 
 
@@ -109,7 +115,7 @@ def contact_workspace() -> Floats:
     return np.empty((5, 6))
 
 
-def place_by_wrench(coordinates: Floats, rest_curvature: Floats | float = 0.0) -> Floats:
+def place_by_wrench(coordinates: Floats, rods: Rods | ArrayLike = 0.0) -> Floats:
     """Derivatives of `PLACE` by drive angle and loads, shape (n, 4, 4): those of Step 2, in closed form.
 
     Examples
@@ -117,9 +123,11 @@ def place_by_wrench(coordinates: Floats, rest_curvature: Floats | float = 0.0) -
     >>> place_by_wrench(np.array([[2.0, 0.3, 0.9, 2.0]]))[0, 3].round(3)  # of the arc length
     array([ 0.419,  0.361,  0.416, -0.031])
     """
-    from tactile_bayes.mechanics.contact_map import wrench_slopes  # numba takes a second to load
+    from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
+    from tactile_bayes.mechanics.contact_map import wrench_slopes
 
     slopes = np.empty((len(coordinates), 4, 4))
-    curvature = np.array(np.broadcast_to(rest_curvature, len(coordinates)), dtype=float)
-    wrench_slopes(np.ascontiguousarray(coordinates, dtype=float), curvature, contact_workspace(), slopes)
+    curvature, profile = rods_of(rods, len(coordinates))
+    coordinates = np.ascontiguousarray(coordinates, dtype=float)
+    wrench_slopes(coordinates, curvature, varied_of(profile), contact_workspace(), slopes)
     return slopes

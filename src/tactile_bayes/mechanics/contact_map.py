@@ -12,13 +12,18 @@ from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats
 from tactile_bayes.mechanics.arc_states import MOST_LOAD
+from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by, whole_pose
 from tactile_bayes.mechanics.compiler import cached, compiled
-from tactile_bayes.mechanics.pose import Pose, by_arclength, pose_and_slopes
+from tactile_bayes.mechanics.pose import Pose
 
 __all__ = ["contact_state", "moved", "wrench_slopes", "write_contact_states"]
 
 _MEANS = 20
 """Steps of the arithmetic–geometric mean: more than enough."""
+
+
+_MOST_INTEGRATED = 1e3
+"""Largest load f s1² of a rod that is integrated."""
 
 
 class Bend(NamedTuple):
@@ -57,27 +62,27 @@ def _column(bend: Pose, beta: float, growth: float, cos: float, sin: float, by: 
 
 
 @compiled
-def contact_state(z: Floats, i: int, curvature: float, by: Floats) -> Bend:
+def contact_state(z: Floats, i: int, beam: Beam, by: Floats) -> Bend:
     """Write one contact, NaN if there is none.
 
     Parameters
     ----------
     z : ndarray, shape (n, 4)
         Coordinates as in `contact_states`; row i is used.
-    curvature : float
-        Rest curvature [1/L].
+    beam : Beam
     by : ndarray, shape (5, 6)
         Result: moment and force at the base, contact point, and direction β of the force; then their derivatives by
         each coordinate.
     """
     force, psi1, arclength, drive_angle = z[i, 0], z[i, 1], z[i, 2], z[i, 3]
+    curvature, is_arc = beam.curvature, beam.varied is None
     half, load = 0.5 * curvature * arclength, force * arclength * arclength
     possible = abs(psi1) < 0.5 * math.pi and arclength > 0.0 and force > 0.0
-    if possible and load < MOST_LOAD and half * half < MOST_LOAD:
-        possible = _is_first(half * half + load * math.sin(0.25 * math.pi - 0.5 * psi1) ** 2, load)
-        here, by_psi1, by_force = pose_and_slopes(psi1, arclength, force, curvature, True)
-        longer = by_arclength(psi1, force, curvature, here)
-        if possible and (here.u >= 0.0 or (longer.u < 0.0 and curvature != 0.0)):
+    if possible and load < (MOST_LOAD if is_arc else _MOST_INTEGRATED) and half * half < MOST_LOAD:
+        if is_arc:
+            possible = _is_first(half * half + load * math.sin(0.25 * math.pi - 0.5 * psi1) ** 2, load)
+        here, by_psi1, longer, by_force = whole_pose(beam, psi1, arclength, force)
+        if possible and (here.u >= 0.0 or (longer.u < 0.0 and is_arc and curvature != 0.0)):
             beta = drive_angle - psi1 - here.turn
             cos, sin = math.cos(beta), math.sin(beta)
             x, y = here.u * cos - here.v * sin, here.u * sin + here.v * cos
@@ -100,7 +105,7 @@ def contact_state(z: Floats, i: int, curvature: float, by: Floats) -> Bend:
 def moved(
     z: Floats,
     i: int,
-    curvature: float,
+    beam: Beam,
     bend: Bend,
     by: Floats,
     angle: float,
@@ -112,19 +117,27 @@ def moved(
 
     With ψ0 = φ0 − β (equation 26 of Merker et al. 2018, doi 10.1155/2018/1613945) and the curvature κ = κ0 − m0 at the
     pivot, sin ψ1 = sin ψ0 + (κ0² − κ²)/(2 f). The arc length follows from the changes of ψ0 and of the lever u = m0/f
-    that remain; each of them alone would be 0/0 in some rods.
+    that remain; each of them alone would be 0/0 in some rods. Rods that vary along their length have no first integral:
+    the changes of ψ0 and u together determine those of ψ1 and the arc length.
     """
     force, psi1 = z[i, 0], z[i, 1]
     here, by_force, by_psi1, longer = bend
-    at_pivot, cos0, cos1 = curvature - by[0, 0], longer.u, math.cos(psi1)
     growth = (by[0, 1] * fx + by[0, 2] * fy) / (force * force)
     beta = (by[0, 1] * fy - by[0, 2] * fx) / (force * force)
     psi0, df = angle - beta, growth * force
     du = moment / force - here.u * growth
-    shift = (cos0 * psi0 + at_pivot * moment / force + 0.5 * here.u * (by[0, 0] - 2.0 * curvature) * growth) / cos1
-    turned = psi0 - (1.0 + by_psi1.turn) * shift - by_force.turn * df
-    levered = du - by_psi1.u * shift - by_force.u * df
-    by_length = (longer.turn * turned + force * cos0 * levered) / (at_pivot * at_pivot + force * cos0 * cos0)
+    if beam.varied is None:
+        curvature = beam.curvature
+        at_pivot, cos0, cos1 = curvature - by[0, 0], longer.u, math.cos(psi1)
+        shift = (cos0 * psi0 + at_pivot * moment / force + 0.5 * here.u * (by[0, 0] - 2.0 * curvature) * growth) / cos1
+        turned = psi0 - (1.0 + by_psi1.turn) * shift - by_force.turn * df
+        levered = du - by_psi1.u * shift - by_force.u * df
+        by_length = (longer.turn * turned + force * cos0 * levered) / (at_pivot * at_pivot + force * cos0 * cos0)
+    else:
+        turned, levered, turning = psi0 - by_force.turn * df, du - by_force.u * df, 1.0 + by_psi1.turn
+        det = turning * longer.u - longer.turn * by_psi1.u
+        shift = (turned * longer.u - longer.turn * levered) / det
+        by_length = (turning * levered - by_psi1.u * turned) / det
     return (
         by[1, 3] * df + by[2, 3] * shift + by[3, 3] * by_length + by[4, 3] * angle,
         by[1, 4] * df + by[2, 4] * shift + by[3, 4] * by_length + by[4, 4] * angle,
@@ -138,6 +151,7 @@ def write_contact_states(
     coordinates: Floats,
     delta: Floats,
     curvature: Floats,
+    varied: Varied | None,
     loads: Floats,
     place: Floats,
     volumes: Floats,
@@ -153,8 +167,8 @@ def write_contact_states(
         As in `contact_states`.
     delta : ndarray, shape (n,)
         Friction angle [rad].
-    curvature : ndarray, shape (n,)
-        Rest curvature [1/L].
+    curvature, varied
+        As in `Rods`.
     loads, place, volumes : ndarray, shapes (3, n), (4, n) and (2, n)
         As in `ContactStates`.
     loads_by, place_by : ndarray, shapes (n, 3, 4) and (n, 4, 4), or without rows
@@ -163,7 +177,7 @@ def write_contact_states(
         As in `contact_state`.
     """
     for i in range(delta.size):
-        _, by_force, by_psi1, longer = contact_state(coordinates, i, curvature[i], by)
+        _, by_force, by_psi1, longer = contact_state(coordinates, i, mirrored_by(curvature[i], varied), by)
         for k in range(3):
             loads[k, i] = by[0, k]
         place[0, i], place[1, i], place[2, i], place[3, i] = by[0, 3], by[0, 4], by[0, 5] - delta[i], coordinates[i, 2]
@@ -178,13 +192,13 @@ def write_contact_states(
 
 
 @cached
-def wrench_slopes(coordinates: Floats, curvature: Floats, by: Floats, out: Floats) -> None:
+def wrench_slopes(coordinates: Floats, curvature: Floats, varied: Varied | None, by: Floats, out: Floats) -> None:
     """Write the derivatives of places by drive angle and loads, shape (n, 4, 4)."""
     for i in range(coordinates.shape[0]):
-        bent = curvature[i]
-        bend = contact_state(coordinates, i, bent, by)
+        beam = mirrored_by(curvature[i], varied)
+        bend = contact_state(coordinates, i, beam, by)
         for c in range(4):
             errors = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3)
-            change = moved(coordinates, i, bent, bend, by, *errors)
+            change = moved(coordinates, i, beam, bend, by, *errors)
             for k in range(4):
                 out[i, k, c] = change[k]

@@ -16,12 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.phases import NONE
+from tactile_bayes.mechanics.profile import Profile, Rods
 
 __all__ = [
     "MAX_FRICTION_ANGLE",
     "Contact",
     "Wrench",
     "contact_from_wrench",
+    "forward_contacts",
     "largest_curvature",
     "tangential_arclength",
     "wrench_from_contact",
@@ -240,6 +242,7 @@ def contact_from_wrench(
     *,
     side: ArrayLike | None = None,
     rest_curvature: ArrayLike = 0.0,
+    profile: Profile | None = None,
 ) -> Contact:
     """Contact that follows from a base wrench: Step 2 for one state, without integration or root search.
 
@@ -258,6 +261,8 @@ def contact_from_wrench(
         which the force can only have reversed on a rod with a large rest curvature.
     rest_curvature : array_like
         Curvature of the unloaded rod in the laboratory frame, a circular arc; > 0 counter-clockwise [1/L].
+    profile : Profile, optional
+        Rod whose rest curvature or rigidity varies along it, in place of an arc; it is integrated up to its contact.
 
     Returns
     -------
@@ -282,18 +287,43 @@ def contact_from_wrench(
         side = np.where(moment < 0.0, -1.0, 1.0)
     delta = np.asarray(friction_angle, dtype=float)
     _refuse_friction(delta)
-    from tactile_bayes.mechanics.states import arc_contacts, contacts  # numba takes a second to load
-
     sign = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
     mirrored = sign < 0.0
     phi0 = np.where(mirrored, np.pi - np.asarray(drive_angle), drive_angle)
-    given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta, sign * rest_curvature)
-    out = np.empty((given[0].size, 6))
-    columns = np.stack([column.ravel() for column in given], axis=-1).astype(float)
-    _solve(contacts, arc_contacts, columns, (), (out,))
-    x, y, slope_angle, arclength, tip_angle, modulus = np.ascontiguousarray(out.T).reshape(6, *given[0].shape)
+    of_rods = sign * rest_curvature if profile is None else sign
+    given = np.broadcast_arrays(phi0, sign * moment, sign * force_x, force_y, delta, of_rods)
+    *wrench, of_rods = (column.ravel() for column in given)
+    found = forward_contacts(np.stack(wrench, axis=-1).astype(float), Rods(of_rods.astype(float), profile))
+    x, y, slope_angle, arclength, tip_angle, modulus = found.reshape(6, *given[0].shape)
     tip_angle = np.where(mirrored, np.pi - tip_angle, tip_angle)
     return Contact(sign * x, y, sign * slope_angle, arclength, tip_angle, modulus)
+
+
+def forward_contacts(wrenches: Floats, rods: Rods) -> Floats:
+    """Contacts that follow from base wrenches, mirrored to forward ones.
+
+    Parameters
+    ----------
+    wrenches : ndarray, shape (n, 5)
+        Drive angle, holding moment and support reaction, friction angle.
+    rods : Rods
+        n rods, mirrored with the wrenches.
+
+    Returns
+    -------
+    ndarray, shape (6, n)
+        As `Contact`.
+    """
+    from tactile_bayes.mechanics.beam import Varied  # numba takes a second to load
+    from tactile_bayes.mechanics.states import arc_contacts, contacts, profile_contacts
+    from tactile_bayes.mechanics.taylor import workspace
+
+    columns, out = np.column_stack([wrenches, rods.curvature]), np.empty((len(wrenches), 6))
+    if rods.profile is None:
+        _solve(contacts, arc_contacts, columns, (), (out,))
+    else:
+        profile_contacts(columns, Varied(rods.profile, workspace()), out)
+    return np.ascontiguousarray(out.T)
 
 
 def largest_curvature(wrench: Wrench, rest_curvature: ArrayLike = 0.0) -> Floats:

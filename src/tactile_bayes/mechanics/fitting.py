@@ -11,12 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.mechanics.contact_coordinates import ARCLENGTH, DRIVE_ANGLE, FORCE, PSI1, contact_workspace
-from tactile_bayes.mechanics.elastica import contact_from_wrench
+from tactile_bayes.mechanics.elastica import forward_contacts
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.profile import Rods, rods_of
 
 __all__ = ["ContactFit", "RawFit", "Reading", "SheetFit", "fit_contacts", "fit_sheet", "plain", "raw_contacts"]
 
@@ -96,18 +97,21 @@ class RawFit(NamedTuple):
     standard deviation to either side; the largest of all axes, NaN where there is no such contact, shape (n,)."""
 
 
-def raw_contacts(reading: Reading, delta: Floats, rest_curvature: Floats | float = 0.0) -> RawFit:
-    """Contacts of n samples by Step 2, with friction angles and rest curvatures of shape (n,)."""
-    from tactile_bayes.mechanics.single_sample import raw_fits  # numba takes a second to load
+def raw_contacts(reading: Reading, delta: Floats, rods: Rods | ArrayLike = 0.0) -> RawFit:
+    """Contacts of n samples by Step 2, with friction angles and rods, or rest curvatures of arcs, of shape (n,)."""
+    from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
+    from tactile_bayes.mechanics.single_sample import raw_fits
 
     count = delta.size
     fit = RawFit(np.empty((count, 4)), np.empty(count), np.empty((count, 4, 4)), np.empty(count))
     workspace = np.empty((1, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3)), np.empty((3, 3))
-    raw_fits(plain(reading), np.array(delta), _each(rest_curvature, count), fit, *workspace, contact_workspace())
+    curvature, profile = rods_of(rods, count)
+    known = plain(reading), np.array(delta), curvature, varied_of(profile)
+    raw_fits(*known, fit, *workspace, contact_workspace())
     return fit
 
 
-def fit_contacts(reading: Reading, friction_angle: Floats, rest_curvature: Floats | float = 0.0) -> ContactFit:
+def fit_contacts(reading: Reading, friction_angle: Floats, rods: Rods | ArrayLike = 0.0) -> ContactFit:
     """Find the most likely contacts of samples.
 
     Parameters
@@ -116,19 +120,19 @@ def fit_contacts(reading: Reading, friction_angle: Floats, rest_curvature: Float
         n samples.
     friction_angle : ndarray, shape (n,)
         Friction angle δ = arctan μ [rad].
-    rest_curvature : ndarray, shape (n,), or float
-        Curvature of the unloaded rod, mirrored like the sample [1/L].
+    rods : Rods or array_like, shape (n,)
+        Rods, or the rest curvatures of arcs, mirrored like the samples [1/L].
     """
     size = reading.drive_angle.size
-    curvature, blocks = _each(rest_curvature, size), []
+    each, blocks = rods_of(rods, size), []
     for begin in range(0, max(size, 1), _BLOCK):
         part = slice(begin, begin + _BLOCK)
-        blocks.append(_fit_block(reading.take(part), friction_angle[part], curvature[part]))
+        blocks.append(_fit_block(reading.take(part), friction_angle[part], each.take(part)))
     return ContactFit(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
 
 
-def _fit_block(reading: Reading, delta: Floats, curvature: Floats) -> ContactFit:
-    target = _Target(reading, delta, curvature)
+def _fit_block(reading: Reading, delta: Floats, rods: Rods) -> ContactFit:
+    target = _Target(reading, delta, rods)
     tip, lying = _Descent(target, TIP), _Descent(target, TANGENTIAL)
     everyone = np.arange(delta.size)
     for descent in (tip, lying):
@@ -151,7 +155,7 @@ def _fit_block(reading: Reading, delta: Floats, curvature: Floats) -> ContactFit
         clearance = np.where(ends, coordinates[:, PSI1] + delta, 1.0 - coordinates[:, ARCLENGTH]) / spread
     where = np.flatnonzero(at_edge)
     if where.size:
-        edge = _Descent(_Target(reading.take(where), delta[where], curvature[where]), None)
+        edge = _Descent(_Target(reading.take(where), delta[where], rods.take(where)), None)
         edge.go(np.arange(where.size), _SETTLED, _MOST_STEPS)
         coordinates[where], misfit[where], clearance[where] = edge.z, edge.misfit, 0.0
     phase = np.where(ends, np.int8(TIP), np.int8(TANGENTIAL))
@@ -160,7 +164,7 @@ def _fit_block(reading: Reading, delta: Floats, curvature: Floats) -> ContactFit
     return ContactFit(coordinates, covariance, misfit, phase, at_edge, clearance, rival)
 
 
-def fit_sheet(reading: Reading, delta: Floats, phase: int | None, rest_curvature: Floats | float = 0.0) -> SheetFit:
+def fit_sheet(reading: Reading, delta: Floats, phase: int | None, rods: Rods | ArrayLike = 0.0) -> SheetFit:
     """Find the best contact of one phase, beyond its edge too, or on the edge (None).
 
     Parameters
@@ -170,10 +174,10 @@ def fit_sheet(reading: Reading, delta: Floats, phase: int | None, rest_curvature
     delta : ndarray, shape (n,)
         Friction angle δ = arctan μ [rad].
     phase : TIP, TANGENTIAL or None
-    rest_curvature : ndarray, shape (n,), or float
+    rods : Rods or array_like, shape (n,)
         As in `fit_contacts`.
     """
-    descent = _Descent(_Target(reading, delta, _each(rest_curvature, delta.size)), phase)
+    descent = _Descent(_Target(reading, delta, rods_of(rods, delta.size)), phase)
     descent.go(np.arange(delta.size), _SETTLED, _MOST_STEPS)
     return SheetFit(descent.z, descent.covariance(), descent.misfit)
 
@@ -200,7 +204,7 @@ class _Descent:
         if phase is None:
             coordinate, options = FORCE, [force * share for share in (1.0, 0.5, 2.0)]
         else:
-            arclength, psi1 = _raw_start(reading, delta, self._target.curvature)
+            arclength, psi1 = _raw_start(reading, delta, self._target.rods)
             if phase == TIP:
                 spread = [share * (0.5 * np.pi + delta) - delta for share in _STARTS]
                 coordinate, options = PSI1, [np.clip(psi1, -delta, 1.4), *spread]
@@ -226,11 +230,13 @@ class _Descent:
 
     def go(self, who: Index, gain: float, most_steps: int) -> None:
         """Descend with the samples `who` until the gain that the next step promises is small."""
-        from tactile_bayes.mechanics.single_sample import Workspace, descents  # numba takes a second to load
+        from tactile_bayes.mechanics.beam import varied_of  # numba takes a second to load
+        from tactile_bayes.mechanics.single_sample import Workspace, descents
 
         count, target = len(self._free), self._target
         workspace = Workspace(np.empty((1, 4)), np.empty((4, count + 1)), np.empty((count, count)), contact_workspace())
-        known = target.reading, target.curvature, target.whitening, who, np.array(self._free)
+        of_rods = target.rods.curvature, varied_of(target.rods.profile)
+        known = target.reading, *of_rods, target.whitening, who, np.array(self._free)
         descents(*known, gain, most_steps, self.z, self.misfit, self._normal, self._hardness, workspace)
 
     def misfit_before(self, delta: Floats) -> Floats:
@@ -262,10 +268,10 @@ def _inverse(matrix: Floats) -> Floats:
 class _Target:
     """Samples, and the weights of deviations from them."""
 
-    def __init__(self, reading: Reading, delta: Floats, curvature: Floats) -> None:
+    def __init__(self, reading: Reading, delta: Floats, rods: Rods) -> None:
         self.reading = plain(reading)
         self.delta = delta
-        self.curvature = curvature
+        self.rods = rods
         self.is_exact = not np.any(reading.angle_deviation)
         self.whitening = np.linalg.inv(np.linalg.cholesky(reading.covariance))
 
@@ -275,14 +281,10 @@ def plain(reading: Reading) -> Reading:
     return Reading(*(np.array(column, dtype=float, order="C") for column in reading))
 
 
-def _each(values: Floats | float, count: int) -> Floats:
-    return np.array(np.broadcast_to(values, (count,)), dtype=float)
-
-
-def _raw_start(reading: Reading, delta: Floats, curvature: Floats) -> tuple[Floats, Floats]:
+def _raw_start(reading: Reading, delta: Floats, rods: Rods) -> tuple[Floats, Floats]:
     """Arc length and ψ1 by raw Step 2; where the moment has the wrong sign, with a small one of the right sign."""
     moment, force_x, force_y = reading.loads.T
     least = _LEAST_MOMENT * np.sqrt(reading.covariance[:, 0, 0])
-    wrench = reading.drive_angle, np.maximum(moment, least), force_x, force_y
-    raw = contact_from_wrench(*wrench, delta, side=1.0, rest_curvature=curvature)
-    return raw.contact_arclength, raw.tip_angle - raw.slope_angle - delta
+    wrenches = np.stack([reading.drive_angle, np.maximum(moment, least), force_x, force_y, delta], axis=-1)
+    _, _, slope_angle, arclength, tip_angle, _ = forward_contacts(wrenches, rods)
+    return arclength, tip_angle - slope_angle - delta

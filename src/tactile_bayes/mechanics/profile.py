@@ -8,13 +8,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from tactile_bayes.arrays import Floats
+from tactile_bayes.arrays import Floats, Index
 from tactile_bayes.checks import check_number
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.along import Along, GivenAlong, along
 
-__all__ = ["STEEPEST_TAPER", "Profile", "profile_of"]
+__all__ = ["STEEPEST_TAPER", "Profile", "Rods", "profile_of", "rods_of"]
 
 STEEPEST_TAPER = 0.95
 """Largest taper: the rod bends 1.6e5 times as easily at its tip as at its base."""
@@ -38,6 +39,23 @@ class Profile(NamedTuple):
     """A number to be added to the rest curvature [1/L]."""
     sign: float
     """−1 for the mirrored rod of backward sweeps, else 1."""
+
+
+class Rods(NamedTuple):
+    """The rods of many contacts: arcs, or one rod, mirrored like the contacts."""
+
+    curvature: Floats
+    """Rest curvatures of arcs [1/L]; with a profile −1 for a mirrored rod, else 1, shape (n,)."""
+    profile: Profile | None = None
+
+    def take(self, where: Index | slice) -> Rods:
+        return Rods(self.curvature[where], self.profile)
+
+
+def rods_of(rods: Rods | ArrayLike, count: int) -> Rods:
+    """Return rods from themselves, or from the rest curvatures of arcs."""
+    curvature, profile = rods if isinstance(rods, Rods) else (rods, None)
+    return Rods(np.array(np.broadcast_to(curvature, (count,)), dtype=float), profile)
 
 
 def profile_of(rest_curvature: GivenAlong = 0.0, rigidity_profile: GivenAlong = 1.0, taper: float = 0.0) -> Profile:

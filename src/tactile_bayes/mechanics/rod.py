@@ -14,7 +14,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.checks import check_number, check_positive
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.along import Along, along
-from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile, profile_of
+from tactile_bayes.mechanics.profile import STEEPEST_TAPER, Profile, Rods, profile_of
 
 __all__ = ["LARGEST_STRAIN", "Rod"]
 
@@ -254,6 +254,11 @@ class Rod:
             rigidity_profile=rigidity_profile,
             rest_curvature_deviation=traced.deviation_of_mean / length,
         )
+
+    def mirrored(self, side: ArrayLike) -> Rods:
+        """Return the rods of contacts with the sides +1, or −1 where they are mirrored, shape (n,)."""
+        side = np.where(np.asarray(side) < 0.0, -1.0, 1.0)
+        return Rods(side * self.arc_curvature) if self.profile is None else Rods(side, self.profile)
 
     def in_lengths(self) -> Rod:
         """Return the rod in its own units, with a length and a flexural rigidity of 1."""

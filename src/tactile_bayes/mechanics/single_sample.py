@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 from tactile_bayes.arrays import Floats, Index
-from tactile_bayes.mechanics.arc_states import Found, arc_contact
+from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.contact_map import contact_state, moved
 from tactile_bayes.mechanics.fitting import RawFit, Reading
-from tactile_bayes.mechanics.states import contact
+from tactile_bayes.mechanics.states import contact_of
 
 __all__ = ["Workspace", "descents", "raw_fits"]
 
@@ -41,11 +41,11 @@ class Workspace(NamedTuple):
 
 @compiled
 def _miss(
-    reading: Reading, curvature: float, whitening: Floats, i: int, z: Floats, j: int, free: Index, workspace: Workspace
+    reading: Reading, beam: Beam, whitening: Floats, i: int, z: Floats, j: int, free: Index, workspace: Workspace
 ) -> float:
     """Sum of squared deviations of a possible contact from a sample, in standard deviations; infinite if it is none."""
     slopes, by, count = workspace.slopes, workspace.by, free.size
-    contact_state(z, j, curvature, by)
+    contact_state(z, j, beam, by)
     deviation, turned = reading.angle_deviation[i], z[j, 3] - reading.drive_angle[i]
     for r in range(4):
         for c in range(count + 1):
@@ -70,6 +70,7 @@ def _miss(
 def descents(
     reading: Reading,
     curvature: Floats,
+    varied: Varied | None,
     whitening: Floats,
     who: Index,
     free: Index,
@@ -86,8 +87,8 @@ def descents(
     Parameters
     ----------
     reading : Reading
-    curvature : ndarray, shape (n,)
-        Rest curvature [1/L].
+    curvature, varied
+        As in `Rods`.
     whitening : ndarray, shape (n, 3, 3)
         Inverse of the lower triangular root of the covariance of the loads.
     who : ndarray
@@ -105,6 +106,7 @@ def descents(
     count, inverse, slopes, trial = free.size, workspace.inverse, workspace.slopes, workspace.trial
     for j in range(who.size):
         i = who[j]
+        beam = mirrored_by(curvature[i], varied)
         for _ in range(max(steps, 1)):
             settled = steps == 0
             for k in range(4):
@@ -121,7 +123,7 @@ def descents(
                     promised += step * normal[i, a, count]
                     trial[0, free[a]] -= step
                 settled = promised <= gain * (1.0 + misfit[i])
-            new = _miss(reading, curvature[i], whitening, i, trial, 0, free, workspace)
+            new = _miss(reading, beam, whitening, i, trial, 0, free, workspace)
             if steps == 0 or new <= misfit[i]:
                 misfit[i] = new
                 hardness[i] *= 0.1
@@ -168,6 +170,7 @@ def raw_fits(
     reading: Reading,
     delta: Floats,
     curvature: Floats,
+    varied: Varied | None,
     out: RawFit,
     z: Floats,
     errors: Floats,
@@ -180,8 +183,8 @@ def raw_fits(
     for i in range(delta.size):
         angle, moment = reading.drive_angle[i], reading.loads[i, 0]
         force_x, force_y = reading.loads[i, 1], reading.loads[i, 2]
-        bent = curvature[i]
-        found = _contact(angle, moment, force_x, force_y, delta[i], bent)
+        beam = mirrored_by(curvature[i], varied)
+        found = contact_of(beam, angle, moment, force_x, force_y, delta[i])
         for k in range(4):
             out.place[i, k] = found[k]
             for p in range(4):
@@ -202,9 +205,9 @@ def raw_fits(
         errors[3, 0] = deviation
         z[0, 0], z[0, 1] = math.hypot(force_x, force_y), found.tip_angle - found.slope_angle - delta[i]
         z[0, 2], z[0, 3] = found.arclength, angle
-        bend = contact_state(z, 0, bent, by)
+        bend = contact_state(z, 0, beam, by)
         for k in range(4):
-            change = moved(z, 0, bent, bend, by, errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3])
+            change = moved(z, 0, beam, bend, by, errors[k, 0], errors[k, 1], errors[k, 2], errors[k, 3])
             for p in range(4):
                 changes[k, p] = change[p]
         _spread(changes, out.covariance, i)
@@ -213,16 +216,9 @@ def raw_fits(
             x_off, y_off = -found.x, -found.y
             for sign in (1.0, -1.0):
                 a, m, fx, fy = sign * errors[k, 0], sign * errors[k, 1], sign * errors[k, 2], sign * errors[k, 3]
-                aside = _contact(angle + a, moment + m, force_x + fx, force_y + fy, delta[i], bent)
+                aside = contact_of(beam, angle + a, moment + m, force_x + fx, force_y + fy, delta[i])
                 x_off, y_off = x_off + 0.5 * aside.x, y_off + 0.5 * aside.y
             out.bend[i] = _bent(out.bend[i], x_off, y_off, out.covariance, i)
-
-
-@compiled
-def _contact(angle: float, moment: float, force_x: float, force_y: float, delta: float, curvature: float) -> Found:
-    if curvature == 0.0:
-        return contact(angle, moment, force_x, force_y, delta)
-    return arc_contact(angle, moment, force_x, force_y, delta, curvature)
 
 
 @compiled

@@ -24,9 +24,13 @@ from tactile_bayes.mechanics.arc import (
     chord_direction_rate,
 )
 from tactile_bayes.mechanics.arc_states import NOWHERE, Found, Start, State, arc_contact, arc_state, unloaded_arc
+from tactile_bayes.mechanics.beam import Beam, Varied, mirrored_by
 from tactile_bayes.mechanics.chord import tangential_arc, tip_arc
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.phases import NONE, TANGENTIAL, TIP
+from tactile_bayes.mechanics.profile import Profile
+from tactile_bayes.mechanics.profile_contact import contact_along
+from tactile_bayes.mechanics.profile_shape import shape_along
 from tactile_bayes.mechanics.tables import (
     AMPLITUDE,
     MOST_FRICTION,
@@ -37,7 +41,16 @@ from tactile_bayes.mechanics.tables import (
     series,
 )
 
-__all__ = ["arc_contacts", "arc_wrenches", "contact", "contacts", "wrenches"]
+__all__ = [
+    "arc_contacts",
+    "arc_wrenches",
+    "contact",
+    "contact_of",
+    "contacts",
+    "profile_contacts",
+    "profile_shapes",
+    "wrenches",
+]
 
 _BEYOND = 1e-12
 """Angle by which rounding may turn a chord beyond the line of force through the pivot [rad]."""
@@ -216,6 +229,57 @@ def contacts(columns: Floats, out: Floats) -> None:
         found = contact(columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
         for k in range(6):
             out[i, k] = found[k]
+
+
+@compiled
+def contact_of(beam: Beam, phi0: float, moment: float, fx: float, fy: float, delta: float) -> Found:
+    """Contact of any rod that follows from a base wrench, as `contact`."""
+    return _contact_of(beam.varied, beam.curvature, phi0, moment, fx, fy, delta)
+
+
+@compiled
+def _contact_of(
+    varied: Varied | None, curvature: float, phi0: float, moment: float, fx: float, fy: float, delta: float
+) -> Found:
+    if varied is None:
+        if curvature == 0.0:
+            return contact(phi0, moment, fx, fy, delta)
+        return arc_contact(phi0, moment, fx, fy, delta, curvature)
+    found = contact_along(varied.profile, phi0, moment, fx, fy, delta, varied.work)
+    return Found(found.x, found.y, found.slope_angle, found.arclength, found.tip_angle, math.nan)
+
+
+@cached
+def profile_contacts(columns: Floats, varied: Varied, out: Floats) -> None:
+    """Write contacts of a rod with a profile as `contacts` does; the last column is −1 for the mirrored rod, else 1."""
+    for i in range(columns.shape[0]):
+        beam = mirrored_by(columns[i, 5], varied)
+        found = contact_of(beam, columns[i, 0], columns[i, 1], columns[i, 2], columns[i, 3], columns[i, 4])
+        for k in range(6):
+            out[i, k] = found[k]
+
+
+@cached
+def profile_shapes(wrenches: Floats, varied: Varied, arclengths: Floats, x: Floats, y: Floats) -> None:
+    """Write the centrelines of a rod with a profile, NaN where no contact makes a wrench, shape (n, points).
+
+    Parameters
+    ----------
+    wrenches : ndarray, shape (n, 5)
+        Drive angle, holding moment, support reaction, and −1 for the mirrored rod, else 1.
+    """
+    for i in range(wrenches.shape[0]):
+        phi0, moment, fx, fy = wrenches[i, 0], wrenches[i, 1], wrenches[i, 2], wrenches[i, 3]
+        edges, curvature, rigidity, taper, bend, _ = varied.profile
+        profile, end = Profile(edges, curvature, rigidity, taper, bend, wrenches[i, 4]), 0.0
+        if fx * fx + fy * fy > 0.0 and math.isfinite(moment):
+            end = contact_along(profile, phi0, moment, fx, fy, 0.0, varied.work).arclength
+        else:
+            moment, fx, fy = 0.0, 0.0, 0.0
+        shape_along(profile, phi0, moment, fx, fy, end, arclengths, x[i], y[i], varied.work)
+        if math.isnan(end):
+            for k in range(arclengths.size):
+                x[i, k], y[i, k] = math.nan, math.nan
 
 
 @cached

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.contours.halves import CELLS, OVAL, PARABOLA, POWER_LAW, SLOPES
-from tactile_bayes.mechanics.beam import Beam, Varied, beam_of
+from tactile_bayes.mechanics.beam import Beam, Varied, beam_of, varied_of
 from tactile_bayes.mechanics.branch import MOST_CHANGES, BranchWorkspace, branch_workspace, follow_branch
 from tactile_bayes.mechanics.compiler import cached, compiled
 from tactile_bayes.mechanics.curves import Accuracy
@@ -20,7 +20,6 @@ from tactile_bayes.mechanics.outline import Half, Outline, mirrored
 from tactile_bayes.mechanics.profile import Profile
 from tactile_bayes.mechanics.reachability import Reachability
 from tactile_bayes.mechanics.readings import STATE_COLUMNS, Found, Samples, write_state
-from tactile_bayes.mechanics.taylor import workspace
 
 __all__ = ["Segments", "Shapes", "Solutions", "Sweeps", "solve_events", "solve_sweeps"]
 
@@ -126,10 +125,6 @@ def _as_sweeps(sweeps: Sweeps) -> NDArray[np.void]:
     return out
 
 
-def _varied(profile: Profile | None) -> Varied | None:
-    return None if profile is None else Varied(profile, workspace())
-
-
 def _side_by_side(names: tuple[str, ...]) -> np.dtype[np.void]:
     """Structured type, so that compiled code takes one array instead of one for each name."""
     kinds = {**dict.fromkeys(_INDICES, np.intp), **dict.fromkeys(_FLAGS, np.bool_), **dict.fromkeys(_CODES, np.int8)}
@@ -214,7 +209,7 @@ def solve_events(shapes: Shapes, sweeps: Sweeps, events: Floats, profile: Profil
     """
     out = np.empty((*events.shape[:2], STATE_COLUMNS))
     table = np.empty(shapes.tables.shape[1:])
-    _solve_events(shapes, _varied(profile), _as_sweeps(sweeps), events, table, out)
+    _solve_events(shapes, varied_of(profile), _as_sweeps(sweeps), events, table, out)
     return out
 
 
@@ -318,7 +313,7 @@ def solve_sweeps(
     longest = int(np.diff(segments.first).max(initial=0))
     _solve(
         shapes,
-        _varied(profile),
+        varied_of(profile),
         sweep,
         segments,
         tolerance is None,

@@ -17,6 +17,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
     contact_states_and_slopes,
     place_by_wrench,
 )
+from tactile_bayes.mechanics.profile import Rods
 from tactile_bayes.planning.plan import Plan
 from tactile_bayes.record import CHANNELS
 from tactile_bayes.record.frame import to_fixed_axes
@@ -60,12 +61,12 @@ class _Forward(NamedTuple):
     """Derivatives of the loads by the drive angle, for a load cell that turns with the drive, shape (n, 3)."""
     covariance: Floats
     """Covariance of the readings, shape (n, 3, 3)."""
-    rest_curvature: Floats
-    """Curvature of the unloaded rod in the sweep frame [1/L], shape (n,)."""
+    rods: Rods
+    """Their rods in the sweep frame."""
 
     def take(self, where: Index) -> _Forward:
         """Return some of the contacts."""
-        return _Forward._make(column[where] for column in self)
+        return _Forward._make(c.take(where) if isinstance(c, Rods) else c[where] for c in self)
 
 
 def amplification(plan: Plan) -> xr.Dataset:
@@ -190,14 +191,15 @@ def _forward(plan: Plan, record: xr.Dataset, chosen: Index) -> _Forward:
         axis=-1,
     )
     leaning = side[:, None] * signs * leaning
-    curvature = side * rod.rest_curvature * rod.length
-    whole = _Forward(side, coordinates, tip, slope, from_readings, leaning, cell.covariance(in_cell), curvature)
+    whole = _Forward(
+        side, coordinates, tip, slope, from_readings, leaning, cell.covariance(in_cell), rod.mirrored(side)
+    )
     return whole.take(chosen)
 
 
 def _raw(contacts: _Forward) -> Floats:
     """Return derivatives of (x, y, slope angle, arc length) by the four readings, of raw Step 2, shape (n, 4, 4)."""
-    by_angle_and_loads = place_by_wrench(contacts.coordinates, contacts.rest_curvature)
+    by_angle_and_loads = place_by_wrench(contacts.coordinates, contacts.rods)
     by_loads = by_angle_and_loads[:, :, 1:]
     by_angle = by_angle_and_loads[:, :, :1] + by_loads @ contacts.leaning[:, :, None]
     return np.concatenate([by_loads @ contacts.from_readings, by_angle * contacts.side[:, None, None]], axis=2)
@@ -205,7 +207,7 @@ def _raw(contacts: _Forward) -> Floats:
 
 def _constrained(contacts: _Forward, delta: float, angle_deviation: float) -> Floats:
     """Return the same derivatives of the most likely contact on the surface of its phase, shape (n, 4, 4)."""
-    _, slopes = contact_states_and_slopes(contacts.coordinates, delta, contacts.rest_curvature)
+    _, slopes = contact_states_and_slopes(contacts.coordinates, delta, contacts.rods)
     from_readings = contacts.from_readings
     covariance = from_readings @ contacts.covariance @ np.swapaxes(from_readings, 1, 2)
     whiten = np.linalg.inv(np.linalg.cholesky(covariance))

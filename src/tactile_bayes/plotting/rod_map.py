@@ -85,7 +85,7 @@ def rods(
             state["force_x"] / rod.force_unit,
             state["force_y"] / rod.force_unit,
             side=1 if events.direction == "forward" else -1,
-            rest_curvature=rod.rest_curvature * rod.length,
+            rods=rod.mirrored(1 if events.direction == "forward" else -1),
         )
         return events.base[0] + rod.length_unit * x, events.base[1] + rod.length_unit * y
 

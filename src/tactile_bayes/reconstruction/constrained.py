@@ -8,6 +8,7 @@ from tactile_bayes.arrays import Floats
 from tactile_bayes.errors import ParameterError
 from tactile_bayes.mechanics.contact_coordinates import contact_states, contact_states_and_slopes
 from tactile_bayes.mechanics.fitting import ContactFit, fit_contacts
+from tactile_bayes.mechanics.profile import Rods
 from tactile_bayes.reconstruction.estimate import (
     AT_EDGE,
     EITHER_PHASE,
@@ -53,7 +54,7 @@ def constrained_estimate(samples: Samples, delta: Floats) -> Estimate:
     where = np.flatnonzero(samples.loaded & ~samples.cut_off & usable)
     if where.size:
         reading = samples.reading.take(where)
-        given = delta[where], samples.rest_curvature[where]
+        given = delta[where], samples.rods.take(where)
         fit = fit_contacts(reading, *given)
         rod, slopes = contact_states_and_slopes(fit.coordinates, *given)
         found = np.isfinite(fit.misfit) & np.isfinite(rod.place).all(axis=0)
@@ -95,7 +96,7 @@ def refuse_without_noise(samples: Samples) -> None:
         )
 
 
-def _aside(fit: ContactFit, delta: Floats, curvature: Floats) -> list[tuple[Floats, Floats]]:
+def _aside(fit: ContactFit, delta: Floats, rods: Rods) -> list[tuple[Floats, Floats]]:
     """Contacts one standard deviation aside, along the axes of the covariance."""
     scale = np.sqrt(np.diagonal(fit.covariance, axis1=1, axis2=2))
     scale = np.where((scale > 0.0) & np.isfinite(scale), scale, 1.0)
@@ -107,6 +108,6 @@ def _aside(fit: ContactFit, delta: Floats, curvature: Floats) -> list[tuple[Floa
         step = scale * axes[:, :, k] * np.sqrt(np.maximum(variances[:, k], 0.0))[:, None]
         if np.any(variances[:, k] > 1e-9):
             both = fit.coordinates + step, fit.coordinates - step
-            more, less = (contact_states(aside, delta, curvature).place.T for aside in both)
+            more, less = (contact_states(aside, delta, rods).place.T for aside in both)
             pairs.append((more, less))
     return pairs

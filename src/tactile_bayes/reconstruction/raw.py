@@ -17,7 +17,7 @@ _ROUNDING = 1e-9
 
 def raw_estimate(samples: Samples, delta: Floats) -> Estimate:
     """Contacts by Step 2, with their covariance to first order in the errors of the sensor."""
-    fit = raw_contacts(samples.reading, delta, samples.rest_curvature)
+    fit = raw_contacts(samples.reading, delta, samples.rods)
     slope_angle, arclength = fit.place[:, 2:].T
     found = np.isfinite(arclength) & ~(samples.cut_off & samples.loaded)
     status = unanswered(samples.loaded, samples.cut_off)

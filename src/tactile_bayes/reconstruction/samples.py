@@ -12,6 +12,7 @@ from tactile_bayes.arrays import Flags, Floats, Index
 from tactile_bayes.errors import RecordError
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.mechanics.fitting import Reading
+from tactile_bayes.mechanics.profile import Rods
 from tactile_bayes.mechanics.rod import Rod
 from tactile_bayes.reconstruction.sides import contact_sides
 from tactile_bayes.record import CHANNELS, frame_of, present_channels, rod_of, turned
@@ -34,8 +35,8 @@ class Samples(NamedTuple):
     """Readings corrected for known errors, with forces along the axes of the laboratory."""
     side: Floats
     """+1, or −1 where a sample is mirrored, shape (n,)."""
-    rest_curvature: Floats
-    """Curvature of the unloaded rod, mirrored with the sample, shape (n,)."""
+    rods: Rods
+    """Their rods, mirrored with them."""
     loaded: Flags
     cut_off: Flags
     """True if a channel is at the end of its range."""
@@ -47,7 +48,7 @@ class Samples(NamedTuple):
         return self._replace(
             reading=self.reading.take(where),
             side=self.side[where],
-            rest_curvature=self.rest_curvature[where],
+            rods=self.rods.take(where),
             loaded=self.loaded[where],
             cut_off=self.cut_off[where],
         )
@@ -117,7 +118,7 @@ def samples_of(measured: xr.Dataset, cell: LoadCell, suspension_compliance: floa
         side[:, None] * signs * leaning,
         np.broadcast_to(covariance, (angle.size, 3, 3)),
     )
-    return Samples(rod, reading, side, side * rod.rest_curvature * rod.length, loaded, cut_off, has_noise)
+    return Samples(rod, reading, side, rod.mirrored(side), loaded, cut_off, has_noise)
 
 
 def loaded_samples(measured: xr.Dataset, load_cell: LoadCell | None = None) -> Flags:

@@ -287,9 +287,11 @@ def _check(estimate: Estimate, samples: Samples, cell: LoadCell, friction: float
 
 def _axial_score(samples: Samples, friction: float) -> float:
     """Mean difference, over tangential contacts, of the force along the rod at the pivot and its value from the moment,
-    over its standard error.
+    over its standard error; NaN for rods that vary along their length, which have no first integral.
     """
-    reading, rest = samples.reading, samples.rest_curvature
+    if samples.rods.profile is not None:
+        return np.nan
+    reading, rest = samples.reading, samples.rods.curvature
     moment, force_x, force_y = reading.loads.T
     cos, sin = np.cos(reading.drive_angle), np.sin(reading.drive_angle)
     force = np.hypot(force_x, force_y)

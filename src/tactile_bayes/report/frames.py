@@ -121,8 +121,7 @@ def motion_of(posterior: xr.DataTree, most: int = _MOST) -> Motion:
     slope = np.where(loaded, states.wrench.drive_angle, angle_in_sweep_frame)
     wrench = (np.where(loaded, getattr(states.wrench, name), 0.0) for name in ("holding_moment", "force_x", "force_y"))
     sign = np.where(mirrored, -1.0, 1.0)
-    curvature = sign * rod.rest_curvature * rod.length
-    x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rest_curvature=curvature)
+    x, y = rod_shape(slope, *wrench, points=_POINTS, side=1.0, rods=rod.mirrored(sign))
     loads = np.stack([in_lab_frame[name] for name in ("holding_moment", "force_x", "force_y")], axis=-1)
     return Motion(
         contour=contour.take(np.array(0)),

@@ -21,6 +21,7 @@ from tactile_bayes.mechanics.contact_coordinates import (
     contact_states,
 )
 from tactile_bayes.mechanics.phases import TANGENTIAL, TIP
+from tactile_bayes.mechanics.profile import Rods
 from tactile_bayes.reconstruction import Samples
 from tactile_bayes.record import turned
 
@@ -126,8 +127,9 @@ class ContactDensity:
 
     def _states(self, coordinates: Floats) -> ContactStates:
         """Return contacts from coordinates, shape (..., n, 4), one after the other."""
-        curvature = np.broadcast_to(self.samples.rest_curvature, coordinates.shape[:-1])
-        return contact_states(coordinates.reshape(-1, 4), self.delta, curvature.ravel())
+        curvature, profile = self.samples.rods
+        each = np.broadcast_to(curvature, coordinates.shape[:-1]).ravel()
+        return contact_states(coordinates.reshape(-1, 4), self.delta, Rods(each, profile))
 
     def to_lab_frame(self, contact: Floats) -> Floats:
         """Return contacts on the object's surface, in the laboratory frame and the record's units, (4, ..., n)."""

@@ -104,8 +104,8 @@ def _evaluated(
 def _approximation(density: ContactDensity) -> tuple[Floats, Floats, Floats]:
     """Return normal approximations on both sheets: means (2, n, k), covariances, and the share of tip contact."""
     reading, delta = density.samples.reading, np.full(density.samples.side.size, density.delta)
-    curvature = density.samples.rest_curvature
-    tip, tangential = (fit_sheet(reading, delta, phase, curvature) for phase in (TIP, TANGENTIAL))
+    rods = density.samples.rods
+    tip, tangential = (fit_sheet(reading, delta, phase, rods) for phase in (TIP, TANGENTIAL))
     free = [DRIVE_ANGLE] if density.has_free_angle else []
     means, covariances, usable = [], [], []
     for sheet, way, shift in ((tip, PSI1, density.delta), (tangential, ARCLENGTH, -1.0)):
