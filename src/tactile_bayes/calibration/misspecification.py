@@ -24,6 +24,7 @@ NUMBERS = {
     "friction": 1,
     "rigidity_scale": 1,
     "drive_angle_offset": 1,
+    "rest_curvature": 1,
     "bias": 3,
     "drift": 3,
     "base_shift": 2,
@@ -57,6 +58,8 @@ class Misspecification:
         Flexural rigidity over the stated one, > 0, times the inferred factor.
     drive_angle_offset : float
         Encoder offset in addition to the inferred one [rad].
+    rest_curvature : float
+        Rest curvature of the rod in addition to the stated or inferred one [1/rod length].
     bias, drift : (float, float, float)
         Errors of the readings of moment, force_x and force_y, in the record's units, in addition to the inferred ones:
         a drift is the linear change of a zero from the first sample to the last, a bias its value in the middle.
@@ -86,6 +89,7 @@ class Misspecification:
     further_base_shift: tuple[float, float] = (0.0, 0.0)
     rigidity_scale: float = 1.0
     drive_angle_offset: float = 0.0
+    rest_curvature: float = 0.0
     bias: Triple = _NOTHING
     drift: Triple = _NOTHING
     load_cell: LoadCell | None = None
@@ -147,5 +151,6 @@ class Misspecification:
             suspension_compliance=drawn.suspension_compliance,
             friction=drawn.friction + self.friction,
             drive_angle_backlash=drawn.drive_angle_backlash,
+            rest_curvature=drawn.rest_curvature + self.rest_curvature,
             base_shifts=shifts,
         )

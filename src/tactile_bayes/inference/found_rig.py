@@ -14,7 +14,7 @@ from tactile_bayes.inference.likelihood import bases_of
 from tactile_bayes.inference.result import posterior_draws
 from tactile_bayes.load_cell import LoadCell
 from tactile_bayes.reconstruction import reconstruct
-from tactile_bayes.record import CHANNELS, present_channels
+from tactile_bayes.record import CHANNELS, present_channels, rod_of, with_rod
 
 __all__ = ["FoundRig", "contact_points", "found_rig", "rig_with"]
 
@@ -25,7 +25,7 @@ class FoundRig(NamedTuple):
     """Arguments of `reconstruct` by which Step 2 corrects a record as the posterior does."""
 
     record: xr.Dataset
-    """Record with inferred pivots, and without drift."""
+    """Record with inferred pivots and the inferred shape of the rod, and without drift."""
     load_cell: LoadCell
     """Load cell with inferred bias, gain (which includes the stiffness of the rod), lever and encoder.
 
@@ -107,8 +107,10 @@ def rig_with(measured: xr.Dataset, load_cell: LoadCell, rig: Mapping[str, float]
             shift = rig.get(f"base_{number}_{name[-1]}", 0.0)
             columns[name] = columns.get(name, measured[name]) + shift * at_pivot
     record = measured.assign({name: values.assign_attrs(measured[name].attrs) for name, values in columns.items()})
+    rod = rod_of(measured)
+    shape = rig.get("rest_curvature", rod.mean_rest_curvature), rig.get("taper", rod.taper)
     return FoundRig(
-        record,
+        with_rod(record, rod.reshaped(*shape)),
         cell,
         rig.get("friction", friction),
         rig.get("suspension_compliance", 0.0) * rig.get("rigidity_scale", 1.0),

@@ -7,12 +7,12 @@ from collections.abc import Collection
 __all__ = ["CHECK_RIG", "is_inferred", "what_to_try"]
 
 CHECK_RIG = (
-    "check the rod (length, flexural rigidity; straight, uniform), unit, sign and axes of each load, the zero of the "
-    "drive angle and its backlash, the point where the load cell takes its moment, and the friction"
+    "check the rod (length, flexural rigidity, rest curvature, taper), unit, sign and axes of each load, the zero of "
+    "the drive angle and its backlash, the point where the load cell takes its moment, and the friction"
 )
 """Advice if loads contradict one another for any contour: the cause is the rig."""
 
-_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance")
+_SUSPECTS = ("friction", "gain", "drift", "lever", "backlash", "suspension_compliance", "rest_curvature", "taper")
 """Nuisance parameters, or groups of them, that may cause a misfit."""
 
 _SMOOTH = "shape-free"
@@ -52,7 +52,7 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     --------
     >>> print(what_to_try(["circle"], ["friction", "drift", "lever_x", "lever_y", "backlash"]))
     It may be the family or the rig. Try another family (--family shape-free, or compare), or infer more of the rig \
-(--nuisance gain, suspension_compliance); a rod that is not straight or not uniform looks like this, too.
+(--nuisance gain, suspension_compliance, rest_curvature, taper).
     """
     left = [name for name in _SUSPECTS if not is_inferred(name, nuisances)]
     if friction and "friction" in left:
@@ -61,7 +61,4 @@ def what_to_try(families: Collection[str], nuisances: Collection[str] = (), *, f
     named = [f"{name}{instead}" if name == "gain" and "rigidity_scale" in nuisances else name for name in left]
     more = f", or infer more of the rig (--nuisance {', '.join(named)})" if named else ""
     others = "another family (compare)" if _SMOOTH in families else "another family (--family shape-free, or compare)"
-    return (
-        f"It may be the family or the rig. Try {others}{more}; a rod that is not straight or not uniform looks like "
-        "this, too."
-    )
+    return f"It may be the family or the rig. Try {others}{more}."

@@ -77,6 +77,10 @@ class Along:
         rows = value * powers * np.array(self.coefficients)
         return Along(tuple((length * np.array(self.edges)).tolist()), tuple(map(tuple, rows.tolist())))
 
+    def plus(self, value: float) -> Along:
+        """Return the property with a number added to all values."""
+        return Along(self.edges, tuple((row[0] + value, *row[1:]) for row in self.coefficients))
+
     @property
     def text(self) -> str:
         """The polynomials as JSON, for an attribute; `along` reads it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -288,6 +288,12 @@ class Rod:
         if isinstance(self.rigidity_profile, Along):
             words.append(f"rigidity at the tip {float(self.rigidity_profile(self.length)):.4g} of that at the base")
         return words
+
+    def reshaped(self, mean_rest_curvature: float, taper: float) -> Rod:
+        """Return a rod of another mean rest curvature [1/m] and taper."""
+        more, curvature = mean_rest_curvature - self.mean_rest_curvature, self.rest_curvature
+        curvature = curvature.plus(more) if isinstance(curvature, Along) else mean_rest_curvature
+        return replace(self, rest_curvature=curvature, taper=taper)
 
     @property
     def is_uniform(self) -> bool:

@@ -32,6 +32,8 @@ _MEANINGS = {
     "lever_y": "y of the cell's reference point of the moment, from the pivot",
     "backlash": "encoder reading in forward motion less that in backward motion",
     "friction": "Coulomb's coefficient",
+    "rest_curvature": "mean curvature of the unloaded rod",
+    "taper": "part of its diameter that the rod loses toward its tip",
     "suspension_compliance": "rotation of the pivot per holding moment",
     "gap width": "width of the arc that no sweep touches",
 }
