@@ -121,7 +121,7 @@ def test_flat_spot_leaves_the_lowest_point_where_it_was():
 
 
 def test_by_default_the_rig_is_what_was_drawn():
-    drawn = Rig(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), np.full((1, 2, 2), 0.03))
+    drawn = Rig(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), base_shifts=np.full((1, 2, 2), 0.03))
     rig = Misspecification().rig(drawn, 2)
     for mine, theirs in zip(rig, drawn, strict=True):
         np.testing.assert_array_equal(mine, theirs)
@@ -137,7 +137,7 @@ def test_what_differs_comes_on_top_of_what_was_drawn():
     )
     shifts = np.zeros((1, 2, 2))
     shifts[0, 1] = [0.5, 0.0]
-    rig = world.rig(Rig(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), shifts), 3)
+    rig = world.rig(Rig(*(np.array([value]) for value in (0.02, 1.1, 0.01, 0.2, 0.03)), base_shifts=shifts), 3)
     np.testing.assert_allclose(rig.drive_angle_offset, [0.05])
     np.testing.assert_allclose(rig.rigidity_scale, [1.65])
     np.testing.assert_allclose(rig.suspension_compliance, [0.01])
