@@ -56,6 +56,10 @@ def _untold(world: dict[str, Any], asked: dict[str, Any], **others: dict[str, An
     }
 
 
+OF_UNKNOWN_SHAPE = {
+    "nuisances": (*STANDARD, "rest_curvature"),
+    "priors": {"rest_curvature": stats.norm(0.0, 0.5)},
+}
 BIASES = (0.02, 0.05, 0.05)
 OUTLIERS = {"load_cell": replace(CELL, degrees_of_freedom=2.5)}
 CASES: Mapping[str, Mapping[str, Run]] = {
@@ -79,6 +83,10 @@ CASES: Mapping[str, Mapping[str, Run]] = {
     "biases of one noise": _known_to_vary(
         dict(zip(("moment_bias", "force_x_bias", "force_y_bias"), BIASES, strict=True)), {"bias": BIASES}
     ),
+    "curved by 0.05/L": _untold(
+        {"rest_curvature": 0.05}, {}, rest_curvature_inferred={"nuisances": (*STANDARD, "rest_curvature")}
+    ),
+    "curved by 0.4/L": _untold({"rest_curvature": 0.4}, {}, rest_curvature_inferred=OF_UNKNOWN_SHAPE),
     "drift of two noises": _untold({"drift": (0.04, 0.1, 0.1)}, {}, drift_inferred={"nuisances": (*STANDARD, "drift")}),
     "outliers (t, 2.5)": _untold(OUTLIERS, {}, told_of_them=OUTLIERS),
     **{
