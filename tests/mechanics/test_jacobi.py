@@ -59,8 +59,10 @@ def exact(x, y):
     return s, c, d, r, mp.quad(lambda t: s_at(t) ** 2, [0, mp.mpf(1) / 2, 1])
 
 
-def test_values_are_those_of_mpmath():
-    x, y = parameters()
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 5])
+def test_values_are_those_of_mpmath(every):
+    """Of the ordinary parameters only some, unless there is time; of the special ones all."""
+    x, y = (np.append(values[:40:every], values[40:]) for values in parameters())
     found = by_number(_values, 5)(x, y)
     expected = np.array([[float(value) for value in exact(*pair)] for pair in zip(x, y, strict=True)])
     # Five halvings at most, each of which doubles an error.
@@ -73,12 +75,13 @@ def test_with_slopes_they_are_the_same():
     np.testing.assert_allclose(found, by_number(_values, 5)(x, y), rtol=0, atol=64 * EPS)
 
 
+@pytest.mark.parametrize("every", [pytest.param(4, marks=pytest.mark.slow), 13])
 @pytest.mark.parametrize("number", [0, 1], ids=["x", "y"])
-def test_slopes_are_those_of_differences(number):
+def test_slopes_are_those_of_differences(number, every):
     x, y = (values[:40] for values in parameters())
     found = by_number(_slopes, 15)(x, y)[:, 5 * (number + 1) : 5 * (number + 2)]
     step = mp.mpf(10) ** -12
-    for k in range(0, 40, 4):
+    for k in range(0, 40, every):
         ends = []
         for sign in (1, -1):
             pair = [mp.mpf(x[k]), mp.mpf(y[k])]
