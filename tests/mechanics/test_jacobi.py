@@ -97,3 +97,11 @@ def _in_forty_digits(x, y):
     c, d = (one, other) if x >= y else (other, one)
     integral = mp.quad(lambda t: (mp.ellipfun("sn", root * t, m=m) / root) ** 2, [0, mp.mpf(1) / 2, 1])
     return mp.ellipfun("sn", root, m=m) / root, c, d, (1 - d) / y, integral
+
+
+@pytest.mark.parametrize("row", [(np.inf, 1.0), (1.0, np.inf), (np.nan, 1.0)])
+def test_parameters_that_are_no_numbers_end(row):
+    """A rod that is not loaded finitely has no pose; the search for one goes on elsewhere."""
+    x, y = (np.array([value]) for value in row)
+    assert not np.isfinite(by_number(_values, 5)(x, y)).all()
+    assert not np.isfinite(by_number(_slopes, 15)(x, y)).all()

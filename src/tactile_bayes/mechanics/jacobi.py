@@ -113,11 +113,15 @@ def _series_and_slopes(table: Floats, total: float, product: float) -> tuple[flo
     return value, by_total, by_product
 
 
+_MOST_HALVINGS = 600
+"""Largest number of halvings: enough for any number, and infinite ones are none."""
+
+
 @compiled
 def _halvings(x: float, y: float) -> int:
     """Number of halvings of t after which the power series suffices."""
     count, largest = 0, max(x, y)
-    while largest > _SMALL:
+    while largest > _SMALL and count < _MOST_HALVINGS:
         largest *= 0.25
         count += 1
     return count
