@@ -59,6 +59,8 @@ class Varied(NamedTuple):
     """Coefficients of its pose, from a table."""
     slenderness: float
     """That of the table; 0 if there are no coefficients."""
+    sign: float
+    """Sign of the rod to which these belong; the mirrored one has its shape at rest in them, and not its pose."""
 
 
 class Beam(NamedTuple):
@@ -94,7 +96,7 @@ def varied_of(profile: Profile | None) -> Varied | None:
 
 def varied(profile: Profile) -> Varied:
     """Profile with a workspace, and without coefficients of a table."""
-    return Varied(profile, workspace(), sheet(), 0.0)
+    return Varied(profile, workspace(), sheet(), 0.0, 1.0)
 
 
 @compiled
@@ -104,7 +106,7 @@ def mirrored_by(curvature: float, varied: Varied | None) -> Beam:
         return Beam(curvature, 1.0, curvature, varied)
     edges, bent, rigidity, taper, bend, _ = varied.profile
     of_contact = Profile(edges, bent, rigidity, taper, bend, curvature)
-    return Beam(0.0, 1.0, math.inf, Varied(of_contact, varied.work, varied.sheet, 0.0))
+    return Beam(0.0, 1.0, math.inf, Varied(of_contact, varied.work, varied.sheet, varied.slenderness, varied.sign))
 
 
 @compiled
@@ -128,7 +130,13 @@ def _mirrored(varied: Varied | None) -> Varied | None:
     if varied is None:
         return varied
     edges, curvature, rigidity, taper, bend, sign = varied.profile
-    return Varied(Profile(edges, curvature, rigidity, taper, bend, -sign), varied.work, varied.sheet, 0.0)
+    return Varied(
+        Profile(edges, curvature, rigidity, taper, bend, -sign),
+        varied.work,
+        varied.sheet,
+        varied.slenderness,
+        varied.sign,
+    )
 
 
 @compiled
@@ -148,7 +156,7 @@ def _pose(
 ) -> tuple[Pose, Pose, Pose]:
     if varied is None:
         return pose_and_slopes(psi1, arclength, force, curvature, tip)
-    if varied.slenderness > 0.0:
+    if varied.slenderness > 0.0 and varied.sign == varied.profile.sign:
         inside, here, by_q, by_force = pose_in(
             varied.sheet, varied.slenderness, varied.profile.taper, psi1, arclength, force, tip
         )
@@ -188,7 +196,7 @@ def _chord(varied: Varied | None, curvature: float, reach: float, distance: floa
         arclength = distance if curvature == 0.0 else 2.0 * angle / curvature
         return Chord(arclength, angle, angle, 0.5 * curvature / cos if cos > _ACROSS else 0.0)
     if varied.slenderness > 0.0:
-        in_table = chord_in(varied.sheet, reach, distance)
+        in_table = chord_in(varied.sheet, varied.sign != varied.profile.sign, reach, distance)
         return Chord(in_table.arclength, in_table.at_base, in_table.at_point, in_table.rate)
     found = chord_along(varied.profile, distance, varied.work)
     at_point = found.slope - found.bearing

@@ -3,7 +3,7 @@
 All rods of a likelihood have one profile. Its table holds their pose as polynomials in
 
     tip contact:         ψ1 and f Λ(1)²,
-    tangential contact:  s1 and f Λ(s1)², up to the tip, and beyond it: the series that end with a phase may go on there,
+    tangential contact:  s1 and f Λ(s1)², up to the tip, and beyond it: the last series of a phase may go on there,
 
 with the length Λ(s) = ∫ EI^(−1/2) ds of a uniform rod that bends as much; and in those of taper, addition to the rest
 curvature and friction angle that vary between the rods. These are the same throughout a sweep, and contracted once.
@@ -36,8 +36,8 @@ _ROWS, _TERMS = 16, 24
 
 _COLUMNS = 3 * _TERMS
 
-_TANGENTIAL, _BEYOND_TIP, _AT_REST, _POSE = _ROWS, 2 * _ROWS, 3 * _ROWS, 3 * _ROWS + 1
-"""First rows of a rod's coefficients; those in tip contact come first."""
+_TANGENTIAL, _BEYOND_TIP, _AT_REST, _POSE = _ROWS, 2 * _ROWS, 3 * _ROWS, 3 * _ROWS + 2
+"""First rows of a rod's coefficients; those in tip contact come first, and the mirror image has its own at rest."""
 
 _WORST = 1e-5
 """Largest error of the pose with which a table is of use."""
@@ -60,6 +60,9 @@ _SCALE = 10.0
 """f Λ² from which on polynomials are in its logarithm."""
 
 _SPAN = math.log1p(_FORCE / _SCALE)
+
+_ROUNDING = 1e-12
+"""Distance from the end of a range that counts as zero."""
 
 _CHECKS = 400
 """Points at which the error is measured."""
@@ -219,7 +222,7 @@ def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet:
     """Write the coefficients of one rod, and return False if the table does not hold it."""
     box, values = table.box, (profile.taper, profile.bend, friction_angle)
     for c in range(3):
-        if not box[c, 0] <= values[c] <= box[c, 1]:
+        if not box[c, 0] - _ROUNDING <= values[c] <= box[c, 1] + _ROUNDING:
             return False
     for c in range(3):
         x = (2.0 * values[c] - box[c, 0] - box[c, 1]) / (box[c, 1] - box[c, 0]) if box[c, 1] > box[c, 0] else 0.0
@@ -231,6 +234,7 @@ def prepare(table: ForwardTable, profile: Profile, friction_angle: float, sheet:
     _contract(table.tangential, mirrored, sheet, _TANGENTIAL)
     _contract(table.beyond, mirrored, sheet, _BEYOND_TIP)
     _contract(table.chord, mirrored, sheet, _AT_REST)
+    _contract(table.chord, 1 - mirrored, sheet, _AT_REST + 1)
     return True
 
 
@@ -307,15 +311,16 @@ def _sums(sheet: Floats, row: int, x: float, z: float) -> tuple[Pose, Pose, Pose
 
 
 @compiled
-def chord_in(sheet: Floats, reach: float, distance: float) -> RestChord:
-    """Chord of the rod at rest, which is continued beyond its tip as a straight line."""
+def chord_in(sheet: Floats, mirrored: bool, reach: float, distance: float) -> RestChord:
+    """Chord of a rod or its mirror image at rest, continued beyond its tip as a straight line."""
+    row = _AT_REST + 1 if mirrored else _AT_REST
     x = 2.0 * min(distance / reach, 1.0) - 1.0
     arclength, bearing, slope, to_bearing, to_slope = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(_TERMS - 1, -1, -1):
         to_bearing, to_slope = to_bearing * x + bearing, to_slope * x + slope
-        arclength = arclength * x + sheet[_AT_REST, k]
-        bearing = bearing * x + sheet[_AT_REST, _TERMS + k]
-        slope = slope * x + sheet[_AT_REST, 2 * _TERMS + k]
+        arclength = arclength * x + sheet[row, k]
+        bearing = bearing * x + sheet[row, _TERMS + k]
+        slope = slope * x + sheet[row, 2 * _TERMS + k]
     at_point = slope - bearing
     if distance <= reach:
         return RestChord(arclength, bearing, at_point, 2.0 / reach * (to_slope - to_bearing))

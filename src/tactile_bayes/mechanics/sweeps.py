@@ -180,7 +180,7 @@ def _beam(varied: Varied | None, table: ForwardTable, sweep: Any, sign: float) -
     edges, curvature, rigidity, _, bend, _ = varied.profile
     of_sweep = Profile(edges, curvature, rigidity, sweep.taper, bend + sweep.rest_curvature, sign)
     slenderness = table.slenderness if prepare(table, of_sweep, sweep.friction_angle, varied.sheet) else 0.0
-    return beam_of(0.0, Varied(of_sweep, varied.work, varied.sheet, slenderness))
+    return beam_of(0.0, Varied(of_sweep, varied.work, varied.sheet, slenderness, sign))
 
 
 @cached
