@@ -48,7 +48,7 @@ _OUTER = 6, 5, 8
 _MOST = max(_OUTER)
 
 _NEGLIGIBLE, _AT_ONSET, _BLUNT = 2e-7, 100.0, 100.0
-"""Size of terms in these that are left out, how much smaller it is at f = 0, and how much larger beyond the tip."""
+"""Size of terms in these that are left out, how much smaller it is without a force, and how much larger beyond the tip."""
 
 _PSI1, _FORCE, _BEYOND = (-1.0, 1.4), 36.0, 0.6
 """Range of ψ1, largest f Λ², and largest Λ beyond the tip, over Λ(1)."""
@@ -153,7 +153,7 @@ def _tabulated(profile: Profile, box: Box) -> ForwardTable:
         _terms(tip[:, :, :, None], felt, *inner),
         _terms(tangential[..., 0, :, :, :], felt, *inner),
         _terms(tangential[..., 1, :, :, :], felt / _BLUNT, *inner),
-        _terms(chord[:, None, :, None, None], 1.0, (-1, distances)),
+        _terms(chord[:, None, :, None, None], _AT_ONSET, (-1, distances)),
         np.array(box),
         slenderness,
     )
