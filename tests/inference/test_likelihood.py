@@ -154,7 +154,7 @@ def test_the_taper_of_a_rig_is_that_of_the_rod_in_addition(rod):
 
 def test_rods_that_vary_cost_no_accuracy_where_all_of_the_rig_is_inferred():
     """Draws of taper, rest curvature and friction in the ranges of the table and beyond them, as without a table."""
-    true, _, rod, cell, _, friction = RIGS["curved by a function"]
+    cell, friction = RIGS["curved by a function"][3], RIGS["curved by a function"][5]
     measured, rng = measured_by("curved by a function"), np.random.default_rng(1)
     count = 40
     contours = stack([Parabola(*place) for place in rng.normal([0.5, 0.5, 0.0], 0.01, (count, 3))])

@@ -48,7 +48,8 @@ _OUTER = 6, 5, 8
 _MOST = max(_OUTER)
 
 _NEGLIGIBLE, _AT_ONSET, _BLUNT = 2e-7, 100.0, 100.0
-"""Size of terms in these that are left out, how much smaller it is without a force, and how much larger beyond the tip."""
+"""Size of terms in these that are left out; how much smaller it is without a force, and how much larger beyond the
+tip."""
 
 _PSI1, _FORCE, _BEYOND = (-1.0, 1.4), 36.0, 0.6
 """Range of ψ1, largest f Λ², and largest Λ beyond the tip, over Λ(1)."""
